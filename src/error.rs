@@ -1,0 +1,67 @@
+//! The one error type of the library: each message is a single line that names the place and a way out.
+
+use std::path::{Path, PathBuf};
+
+/// What data or the machine can do to a computation. Broken contracts of the library panic instead.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The operating system refused: opening, reading, writing, renaming.
+    #[error("{}: cannot {action}: {source}", path.display())]
+    Io {
+        path: PathBuf,
+        /// What was tried, as a verb phrase: "read", "create the folder".
+        action: &'static str,
+        source: std::io::Error,
+    },
+    /// A file's text or bytes are not what its format says, at a line where there is one.
+    #[error("{}{}: {what}", path.display(), at_line(*line))]
+    Parse {
+        path: PathBuf,
+        line: Option<usize>,
+        what: String,
+    },
+    /// A mesh that was read but cannot be used: defects, a scheme that refuses it, a boundary.
+    #[error("{mesh}: {what}")]
+    Mesh { mesh: String, what: String },
+    /// A computation that has no result to give.
+    #[error("{0}")]
+    Computation(String),
+    /// A name or number that means nothing here: an unknown built-in mesh, method, scheme.
+    #[error("{0}")]
+    Unknown(String),
+}
+
+/// The library's result.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// An [`Error::Io`] about `path`.
+    pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
+        Error::Io {
+            path: path.to_path_buf(),
+            action,
+            source,
+        }
+    }
+
+    /// An [`Error::Parse`] at a 1-based `line` of `path`; `None` where the place is not a line.
+    pub fn parse(path: &Path, line: Option<usize>, what: impl Into<String>) -> Self {
+        Error::Parse {
+            path: path.to_path_buf(),
+            line,
+            what: what.into(),
+        }
+    }
+
+    /// An [`Error::Mesh`] about the mesh called `mesh`.
+    pub fn mesh(mesh: impl Into<String>, what: impl Into<String>) -> Self {
+        Error::Mesh {
+            mesh: mesh.into(),
+            what: what.into(),
+        }
+    }
+}
+
+fn at_line(line: Option<usize>) -> String {
+    line.map_or_else(String::new, |l| format!(", line {l}"))
+}

@@ -1,0 +1,22 @@
+//! **limitlab**: the sparse linear systems whose solution is the control mesh of a subdivision surface that
+//! passes through given points.
+//!
+//! A subdivision scheme sends the control points `V` (N×3) to limit points `A V`; interpolation asks for the
+//! `V` with `A V = P`. This crate assembles `A = H·M` for five schemes, solves the system by direct and
+//! iterative methods, and explains the convergence by spectra and proven bounds.
+//!
+//! The rooms, each of which uses only the ones above it: [`error`], [`output`], [`mesh`], [`subdivide`],
+//! [`assemble`], [`solvers`], [`analysis`], [`interpolate`], [`report`], [`cli`].
+
+pub mod analysis;
+pub mod assemble;
+pub mod cli;
+pub mod error;
+pub mod interpolate;
+pub mod mesh;
+pub mod output;
+pub mod report;
+pub mod solvers;
+pub mod subdivide;
+
+pub use error::{Error, Result};
