@@ -1,12 +1,16 @@
 //! Polygon meshes: positions and faces, topology, validation, files, built-in meshes, vertex orders.
 //! This room knows no matrices.
 
+pub mod topology;
+
 use glam::DVec3;
+
+pub use topology::{Incidence, Topology};
 
 /// A polygon mesh: one position a vertex, faces of any size as vertex indices in counter-clockwise order
 /// seen from outside. Vertices and faces are numbered from 0 in file order.
 ///
-/// Nothing is checked on construction: [`validate`](validate::validate) reports every defect.
+/// Nothing is checked on construction: the validator reports every defect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     pub positions: Vec<DVec3>,
