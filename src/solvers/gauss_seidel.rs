@@ -67,7 +67,7 @@ impl<S: System> Iterate for Sor<'_, S> {
 }
 
 /// One in-place sweep over the vertices in the order given.
-pub(super) fn sweep<S: System>(
+pub fn sweep<S: System>(
     system: &S,
     points: &[DVec3],
     omega: f64,

@@ -63,7 +63,7 @@ impl<S: System> Iterate for Ssor<'_, S> {
 }
 
 /// A forward and a backward sweep.
-pub(super) fn symmetric_sweep<S: System>(
+pub fn symmetric_sweep<S: System>(
     system: &S,
     points: &[DVec3],
     omega: f64,
