@@ -1,6 +1,12 @@
 //! Polygon meshes: positions and faces, topology, validation, files, built-in meshes, vertex orders.
 //! This room knows no matrices.
 
+pub mod io;
+pub mod obj;
+pub mod off;
+pub mod ply;
+mod text;
+
 use glam::DVec3;
 
 /// A polygon mesh: one position a vertex, faces of any size as vertex indices in counter-clockwise order
