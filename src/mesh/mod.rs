@@ -1,6 +1,11 @@
 //! Polygon meshes: positions and faces, topology, validation, files, built-in meshes, vertex orders.
 //! This room knows no matrices.
 
+pub mod io;
+pub mod obj;
+pub mod off;
+pub mod ply;
+mod text;
 pub mod topology;
 
 use glam::DVec3;
