@@ -79,8 +79,12 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     let mut unknown: Option<(usize, Error)> = None;
     loop {
         s.skip_space();
+        skip_blanks(&mut s);
         if s.at_end() {
             break;
+        }
+        if s.at_line_end() {
+            continue;
         }
         let line = s.line();
         let at = |what| Error::parse(path, Some(line), what);
@@ -282,7 +286,7 @@ mod tests {
     #[test]
     fn forms_of_corners_line_ends_comments_and_continued_lines() {
         let text = "# \u{e9}t\u{e9} \\\nv\t0 0 \\\r\n 0 # first\r\n\r\nv 1. .5 -1e-3\rv +2 0 0\nv 3 0 0\n\
-                    \tf 1 2/7 3//8\nf 1/1/1 -3/-1/-1 -2//-1 4 # all\nf 1 2\\\n3\nv 4 0 0\nf -1 1 2\n";
+                    \tf 1 2/7 3//8\nf 1/1/1 -3/-1/-1 -2//-1 4 # all\nf 1 2\\\n3\n\\\n\\\nv 4 0 0\nf -1 1 2\n\\\n\n\\\n# x";
         let loaded = parse(text).unwrap();
         let faces: Vec<_> = loaded.mesh.faces.iter().collect();
         assert_eq!(
@@ -291,9 +295,12 @@ mod tests {
         );
         assert_eq!(loaded.mesh.positions[1], DVec3::new(1.0, 0.5, -1e-3));
         let lines = loaded.lines.unwrap();
-        assert_eq!(lines.vertices, [2, 5, 6, 7, 12]);
-        assert_eq!(lines.faces, [8, 9, 10, 13]);
-        assert!(loaded.remarks.is_empty(), "{:?}", loaded.remarks);
+        assert_eq!(lines.vertices, [2, 5, 6, 7, 14]);
+        assert_eq!(lines.faces, [8, 9, 10, 15]);
+        assert_eq!(
+            loaded.remarks,
+            ["the last line has no end: was the file cut off?"]
+        );
     }
 
     #[test]

@@ -23,9 +23,9 @@ use values::{Binary, ByteOrder, Text, Values};
 /// passed over and named in a remark. In text files numbers may be spread over lines.
 ///
 /// # Errors
-/// [`Error::Parse`] with the line, or in binary data with the byte and the element: an unknown header statement or
-/// type, missing positions or faces, triangle strips, an index that is negative or no 32-bit number, a face of fewer
-/// than three corners, a file that ends early, data after the last element.
+/// [`Error::Parse`](crate::Error::Parse) with the line, or in binary data with the byte and the element: an unknown
+/// header statement or type, missing positions or faces, triangle strips, an index that is negative or no 32-bit
+/// number, a face of fewer than three corners, a file that ends early, data after the last element.
 ///
 /// ```
 /// let text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\

@@ -117,6 +117,10 @@ impl<'a> Scanner<'a> {
     /// The floating-point number here, correctly rounded; `NaN` and `inf` are numbers. Otherwise `None`, and the
     /// place stays.
     pub fn number(&mut self) -> Option<f64> {
+        if let Some((number, length)) = short_decimal(self.rest()) {
+            self.at += length;
+            return Some(number);
+        }
         let token = self.peek_token();
         let number = std::str::from_utf8(token).ok()?.parse().ok()?;
         self.at += token.len();
@@ -167,6 +171,40 @@ impl<'a> Scanner<'a> {
         let word = self.rest().split(end).next().unwrap_or_default();
         self.error(format!("{} is not {wanted}", quoted(word)))
     }
+}
+
+/// A decimal without exponent of at most 15 digits and its length, where a separator or the end follows; `None` for
+/// all else. Digits and power of ten are exact doubles, so that their quotient is correctly rounded (Clinger 1990).
+fn short_decimal(bytes: &[u8]) -> Option<(f64, usize)> {
+    const MAX_DIGITS: usize = 15;
+    const POWERS: [f64; MAX_DIGITS + 1] = [
+        1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+    ];
+    let sign = usize::from(bytes.first() == Some(&b'-'));
+    let mut digits = 0u64;
+    let mut at = sign;
+    let mut point = None;
+    loop {
+        match bytes.get(at) {
+            Some(b @ b'0'..=b'9') => {
+                digits = digits.wrapping_mul(10).wrapping_add(u64::from(b - b'0'))
+            }
+            Some(b'.') if point.is_none() => point = Some(at),
+            Some(&b) if !is_separator(b) => return None,
+            _ => break,
+        }
+        at += 1;
+        if at > sign + 1 + MAX_DIGITS {
+            return None;
+        }
+    }
+    let length = at - sign - usize::from(point.is_some());
+    if length == 0 || length > MAX_DIGITS {
+        return None;
+    }
+    let decimals = point.map_or(0, |p| at - p - 1);
+    let size = digits as f64 / POWERS[decimals];
+    Some((if sign == 1 { -size } else { size }, at))
 }
 
 /// The number that the digits at the start of `bytes` form, and how many digits they are. `None` without digits, or
@@ -312,6 +350,32 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn numbers_are_those_of_the_standard_library(
+            text in r"[+-]?[0-9]{0,18}(\.[0-9]{0,18})?([eE][+-]?[0-9]{1,3})?",
+            end in r"[ \t\r\n#\\]?",
+        ) {
+            let expected = text.parse::<f64>().ok();
+            let mut s = Scanner::new(text.as_bytes(), Path::new("t"));
+            prop_assert_eq!(s.number().map(f64::to_bits), expected.map(f64::to_bits));
+            let followed = format!("{text}{end}");
+            let mut s = Scanner::new(followed.as_bytes(), Path::new("t"));
+            prop_assert_eq!(s.number().map(f64::to_bits), expected.map(f64::to_bits));
+            prop_assert_eq!(s.at, if expected.is_some() { text.len() } else { 0 });
+        }
+
+        #[test]
+        fn short_decimals_are_those_of_the_standard_library(text in r"-?[0-9]{0,8}\.?[0-9]{0,8}") {
+            let expected = text.parse::<f64>().ok().map(f64::to_bits);
+            let digits = text.bytes().filter(u8::is_ascii_digit).count();
+            let found = short_decimal(text.as_bytes());
+            prop_assert_eq!(found.is_some(), (1..=15).contains(&digits));
+            if let Some((number, length)) = found {
+                prop_assert_eq!(Some(number.to_bits()), expected);
+                prop_assert_eq!(length, text.len());
+            }
+        }
+
         #[test]
         fn every_double_reads_back_with_its_bits(bits: u64) {
             let x = f64::from_bits(bits);
