@@ -57,6 +57,14 @@ impl Format {
     }
 }
 
+/// Checks early that a file of this name can be written as a mesh.
+///
+/// # Errors
+/// [`Error::Parse`] for an unknown extension.
+pub fn check_name(path: &Path) -> Result<()> {
+    Format::of(path).map(|_| ())
+}
+
 /// Reads a mesh file, whose extension (`.obj`, `.off` or `.ply` in any case) names its format.
 ///
 /// # Errors
