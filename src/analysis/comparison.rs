@@ -9,7 +9,6 @@ use super::spectrum::{Spectrum, spectrum};
 use super::sweep::rounding_floor;
 use crate::assemble::LimitSystem;
 use crate::error::Result;
-use crate::solvers::jacobi::THALL_OMEGA;
 use crate::solvers::{Method, Setup, Solution, Stop, run};
 
 /// A method with its parameter in words: a line of a comparison.
