@@ -1,7 +1,14 @@
 //! Polygon meshes: positions and faces, topology, validation, files, built-in meshes, vertex orders.
 //! This room knows no matrices.
 
+pub mod builtin;
+mod defect;
+mod degenerate;
+pub mod generate;
+pub mod noise;
+pub mod order;
 pub mod topology;
+pub mod validate;
 
 use glam::DVec3;
 
