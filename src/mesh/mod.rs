@@ -1,12 +1,19 @@
 //! Polygon meshes: positions and faces, topology, validation, files, built-in meshes, vertex orders.
 //! This room knows no matrices.
 
+pub mod builtin;
+mod defect;
+mod degenerate;
+pub mod generate;
 pub mod io;
+pub mod noise;
 pub mod obj;
 pub mod off;
+pub mod order;
 pub mod ply;
 mod text;
 pub mod topology;
+pub mod validate;
 
 use glam::DVec3;
 

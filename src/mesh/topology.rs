@@ -73,29 +73,40 @@ pub struct Topology {
     pub incidence: Incidence,
     twin: Vec<u32>,
     edges: usize,
-    boundary_edges: usize,
+    boundary: Vec<u32>,
     irregular_edges: Vec<IrregularEdge>,
 }
 
 /// An edge that is not the meeting of at most two, oppositely directed faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IrregularEdge {
-    /// The two vertices, the smaller first.
+    /// The two vertices, the smaller first; equal where a face names a vertex twice in a row (a loop).
     pub vertices: [u32; 2],
     /// How many face sides lie on it.
     pub sides: u32,
-    /// A face on it: that of the last side.
-    pub face: u32,
+    /// The first and the last of these half-edges.
+    pub half_edges: [u32; 2],
+}
+
+impl IrregularEdge {
+    /// An edge from a vertex to itself: its face names the vertex twice in a row.
+    pub fn is_loop(&self) -> bool {
+        self.vertices[0] == self.vertices[1]
+    }
+
     /// Exactly two sides, both in the same direction.
-    pub misoriented: bool,
+    pub fn is_misoriented(&self) -> bool {
+        self.sides == 2 && !self.is_loop()
+    }
 }
 
 impl Topology {
     /// Pairs the half-edges: a counting sort by smaller vertex, then a sort of each (short) bucket.
     /// O(corners) time for bounded valences, O(n log n) within a vertex of valence n.
     ///
-    /// A side whose edge has one side only, more than two, or two in the same direction has no twin;
-    /// [`irregular_edges`](Self::irregular_edges) lists the latter two kinds.
+    /// A side whose edge has one side only, more than two, or two in the same direction has no twin, and
+    /// neither has a loop (a vertex twice in a row); [`irregular_edges`](Self::irregular_edges) lists all but the
+    /// first kind.
     ///
     /// # Panics
     /// If a corner names a vertex ≥ `vertices`.
@@ -104,7 +115,7 @@ impl Topology {
         let corners = faces.corners();
         let mut twin = vec![NONE; corners.len()];
         let mut edges = 0;
-        let mut boundary_edges = 0;
+        let mut boundary = Vec::new();
         let mut irregular_edges = Vec::new();
         // Sides (other vertex, half-edge) of the edges whose smaller vertex is v.
         let mut sides: Vec<(u32, u32)> = Vec::new();
@@ -127,7 +138,7 @@ impl Topology {
             for edge in sides.chunk_by(|a, b| a.0 == b.0) {
                 edges += 1;
                 match *edge {
-                    [_] => boundary_edges += 1,
+                    [(w, c)] if w as usize != v => boundary.push(c),
                     [(w, a), (_, b)]
                         if (corners[a as usize] as usize == v)
                             != (corners[b as usize] as usize == v)
@@ -136,21 +147,21 @@ impl Topology {
                         twin[a as usize] = b;
                         twin[b as usize] = a;
                     }
-                    [.., (w, last)] => irregular_edges.push(IrregularEdge {
+                    [(w, first), ..] => irregular_edges.push(IrregularEdge {
                         vertices: [v as u32, w],
                         sides: edge.len() as u32,
-                        face: incidence.face_of(last) as u32,
-                        misoriented: edge.len() == 2,
+                        half_edges: [first, edge[edge.len() - 1].1],
                     }),
                     [] => {}
                 }
             }
         }
+        boundary.sort_unstable();
         Topology {
             incidence,
             twin,
             edges,
-            boundary_edges,
+            boundary,
             irregular_edges,
         }
     }
@@ -168,20 +179,26 @@ impl Topology {
 
     /// The number of edges with a single side.
     pub fn boundary_edges(&self) -> usize {
-        self.boundary_edges
+        self.boundary.len()
     }
 
-    /// Edges with more than two sides, or with two in the same direction.
+    /// The half-edges of the edges with a single side, ascending.
+    pub fn boundary_half_edges(&self) -> &[u32] {
+        &self.boundary
+    }
+
+    /// Edges with more than two sides, or with two in the same direction, and loops.
     pub fn irregular_edges(&self) -> &[IrregularEdge] {
         &self.irregular_edges
     }
 
     /// Whether every edge has two oppositely directed sides.
     pub fn is_closed(&self) -> bool {
-        self.boundary_edges == 0 && self.irregular_edges.is_empty()
+        self.boundary.is_empty() && self.irregular_edges.is_empty()
     }
 
-    /// One half-edge of every edge: that of the smaller index.
+    /// One half-edge of every edge, ascending: that of the smaller index. An
+    /// [irregular](Self::irregular_edges) edge comes once a side.
     pub fn edge_sides(&self) -> impl Iterator<Item = u32> + '_ {
         self.twin
             .iter()
@@ -190,7 +207,7 @@ impl Topology {
             .map(|(c, _)| c as u32)
     }
 
-    /// The number of edges at every vertex. Loops and repeated edges count as often as they occur.
+    /// The number of edges at vertex `v`. An [irregular](Self::irregular_edges) edge may count more than once.
     pub fn edge_valence(&self, faces: &Faces, v: usize) -> usize {
         let incoming_boundary = self
             .incidence
@@ -255,29 +272,22 @@ impl Topology {
     /// Two vertices of one face are in one component; an isolated vertex is a component of its own.
     pub fn components(&self, faces: &Faces) -> (Vec<u32>, usize) {
         let n = self.incidence.vertices();
-        let mut label = vec![NONE; n];
-        let mut stack = Vec::new();
-        let mut count = 0u32;
-        for seed in 0..n {
-            if label[seed] != NONE {
-                continue;
+        // A forest with the first vertex of every component as its root.
+        let mut label: Vec<u32> = (0..n as u32).collect();
+        for face in faces.iter() {
+            for side in face.windows(2) {
+                join(&mut label, side[0], side[1]);
             }
-            label[seed] = count;
-            stack.push(seed);
-            while let Some(v) = stack.pop() {
-                for &c in self.incidence.corners_at(v) {
-                    let range = faces.range(self.incidence.face_of(c));
-                    // The neighbours along the two sides suffice: faces are connected by their sides.
-                    for w in [next_in(&range, c), prev_in(&range, c)] {
-                        let w = faces.corners()[w as usize] as usize;
-                        if label[w] == NONE {
-                            label[w] = count;
-                            stack.push(w);
-                        }
-                    }
-                }
-            }
-            count += 1;
+        }
+        let mut count = 0;
+        for v in 0..n {
+            // Parents come before their children, so theirs are final numbers already.
+            label[v] = if label[v] == v as u32 {
+                count += 1;
+                count - 1
+            } else {
+                label[label[v] as usize]
+            };
         }
         (label, count as usize)
     }
@@ -315,6 +325,21 @@ impl Topology {
     }
 }
 
+/// Joins the trees of `a` and `b` in a forest of parents, the smaller root above; whether they were two. Paths
+/// are halved on the way (Tarjan and van Leeuwen 1984).
+pub(super) fn join(parent: &mut [u32], a: u32, b: u32) -> bool {
+    let mut root = |mut x: u32| {
+        while parent[x as usize] != x {
+            parent[x as usize] = parent[parent[x as usize] as usize];
+            x = parent[x as usize];
+        }
+        x
+    };
+    let (a, b) = (root(a), root(b));
+    parent[a.max(b) as usize] = a.min(b);
+    a != b
+}
+
 /// The corner after `c` in its face, whose corners are `range`.
 pub fn next_in(range: &std::ops::Range<usize>, c: u32) -> u32 {
     if c as usize + 1 == range.end {
@@ -330,5 +355,138 @@ pub fn prev_in(range: &std::ops::Range<usize>, c: u32) -> u32 {
         range.end as u32 - 1
     } else {
         c - 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn topology(vertices: usize, faces: &[&[u32]]) -> (Faces, Topology) {
+        let faces = Faces::from_lists(faces);
+        let topology = Topology::new(&faces, vertices);
+        (faces, topology)
+    }
+
+    const TETRAHEDRON: [&[u32]; 4] = [&[0, 1, 2], &[0, 3, 1], &[1, 3, 2], &[2, 3, 0]];
+
+    #[test]
+    fn a_tetrahedron_is_closed_and_every_star_turns_once() {
+        let (faces, t) = topology(4, &TETRAHEDRON);
+        assert!(t.is_closed());
+        assert_eq!((t.edges(), t.boundary_edges()), (6, 0));
+        assert_eq!(t.euler_characteristic(&faces), 2);
+        assert_eq!(t.components(&faces), (vec![0; 4], 1));
+        assert_eq!(t.edge_sides().count(), 6);
+        let mut star = Vec::new();
+        for v in 0..4 {
+            assert_eq!(t.edge_valence(&faces, v), 3);
+            assert!(t.star(&faces, v, &mut star));
+            assert_eq!(star.len(), 3);
+            // Counter-clockwise: the side that enters v in one face leaves it in the next.
+            for k in 0..3 {
+                let (here, next) = (star[k], star[(k + 1) % 3]);
+                let range = faces.range(t.incidence.face_of(here));
+                let entering_from = faces.corners()[prev_in(&range, here) as usize];
+                let range = faces.range(t.incidence.face_of(next));
+                let leaving_to = faces.corners()[next_in(&range, next) as usize];
+                assert_eq!(entering_from, leaving_to);
+            }
+        }
+    }
+
+    #[test]
+    fn twins_are_opposite_and_mutual() {
+        let (faces, t) = topology(4, &TETRAHEDRON);
+        for c in 0..12u32 {
+            let d = t.twin(c).unwrap();
+            assert_eq!(t.twin(d), Some(c));
+            let ends = |c: u32| {
+                let range = faces.range(t.incidence.face_of(c));
+                (
+                    faces.corners()[c as usize],
+                    faces.corners()[next_in(&range, c) as usize],
+                )
+            };
+            let ((a, b), (e, f)) = (ends(c), ends(d));
+            assert_eq!((a, b), (f, e));
+        }
+    }
+
+    #[test]
+    fn an_open_fan_is_walked_from_its_first_face_to_its_last() {
+        // Three triangles about vertex 0, given out of order.
+        let (faces, t) = topology(5, &[&[0, 2, 3], &[0, 3, 4], &[0, 1, 2]]);
+        assert_eq!((t.edges(), t.boundary_edges()), (7, 5));
+        let mut star = Vec::new();
+        assert!(!t.star(&faces, 0, &mut star));
+        let order: Vec<usize> = star.iter().map(|&c| t.incidence.face_of(c)).collect();
+        assert_eq!(order, [2, 0, 1]);
+        let valences: Vec<usize> = (0..5).map(|v| t.edge_valence(&faces, v)).collect();
+        assert_eq!(valences, [4, 2, 3, 3, 2]);
+        let loops = t.boundary_loops(&faces);
+        assert_eq!(loops.len(), 1);
+        let walk: Vec<u32> = loops[0]
+            .iter()
+            .map(|&c| faces.corners()[c as usize])
+            .collect();
+        assert_eq!(walk, [2, 3, 4, 0, 1]);
+    }
+
+    #[test]
+    fn two_triangles_at_one_vertex_have_two_boundary_loops_and_a_short_star() {
+        let (faces, t) = topology(5, &[&[0, 1, 2], &[0, 3, 4]]);
+        let mut loops = t.boundary_loops(&faces);
+        loops.sort();
+        assert_eq!(loops, [vec![0, 1, 2], vec![3, 4, 5]]);
+        let mut star = Vec::new();
+        t.star(&faces, 0, &mut star);
+        assert!(star.len() < t.incidence.face_count(0));
+        assert_eq!(t.components(&faces).1, 1);
+    }
+
+    #[test]
+    fn irregular_edges_are_listed_with_their_sides() {
+        // Three triangles on edge 0-1.
+        let (_, t) = topology(5, &[&[0, 1, 2], &[1, 0, 3], &[0, 1, 4]]);
+        assert_eq!(
+            t.irregular_edges(),
+            [IrregularEdge {
+                vertices: [0, 1],
+                sides: 3,
+                half_edges: [0, 6]
+            }]
+        );
+        assert!(!t.irregular_edges()[0].is_misoriented());
+        assert_eq!((t.edges(), t.boundary_edges()), (7, 6));
+        // Two triangles that run along edge 0-1 in the same direction.
+        let (_, t) = topology(4, &[&[0, 1, 2], &[3, 0, 1]]);
+        let edge = t.irregular_edges()[0];
+        assert!(edge.is_misoriented());
+        assert_eq!((edge.vertices, edge.half_edges), ([0, 1], [0, 4]));
+        assert_eq!(t.twin(0), None);
+        // A vertex twice in a row: a loop, neither boundary nor misoriented, however often it occurs.
+        for repeats in 1..4 {
+            let faces: Vec<&[u32]> = vec![&[0, 1, 1]; repeats];
+            let (_, t) = topology(2, &faces);
+            let loops = t.irregular_edges().iter().filter(|e| e.is_loop()).count();
+            assert_eq!(loops, 1);
+            assert!(
+                !t.irregular_edges()
+                    .iter()
+                    .any(|e| e.is_misoriented() && e.is_loop())
+            );
+            assert!(t.boundary_half_edges().is_empty());
+        }
+    }
+
+    #[test]
+    fn isolated_vertices_are_components_of_their_own() {
+        let (faces, t) = topology(5, &[&[1, 2, 4]]);
+        assert_eq!(t.components(&faces), (vec![0, 1, 1, 2, 1], 3));
+        assert_eq!(t.incidence.face_count(0), 0);
+        let mut star = vec![7];
+        assert!(!t.star(&faces, 0, &mut star));
+        assert!(star.is_empty());
     }
 }

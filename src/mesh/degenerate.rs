@@ -1,0 +1,178 @@
+//! Oddities of position: vertices on the same point, faces on the same points, faces without area.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::validate::counted;
+use super::{Faces, Mesh};
+
+/// A remark for each kind of oddity that occurs, with its count and first place.
+///
+/// # Panics
+/// If a face names a vertex that does not exist.
+pub(super) fn remarks(mesh: &Mesh) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let copies = duplicate_positions(&mesh.positions);
+    if let Some(&(v, original)) = copies.first() {
+        remarks.push(format!(
+            "{} (first: vertex {v} lies on vertex {original})",
+            counted(copies.len(), "duplicate position")
+        ));
+    }
+    let copies = duplicate_faces(&mesh.faces, mesh.len(), &copies);
+    if let Some(&(f, original)) = copies.first() {
+        remarks.push(format!(
+            "{} on the same positions as another (first: face {f} lies on face {original})",
+            counted(copies.len(), "face")
+        ));
+    }
+    let flat = zero_area_faces(mesh);
+    if let Some(&f) = flat.first() {
+        remarks.push(format!("{} (first: face {f})", flat.len()));
+    }
+    remarks
+}
+
+/// The vertices whose coordinates equal those of a vertex before them, with the first such vertex; ascending.
+/// Zeros of either sign are equal; vertices that are not finite do not count. O(n log n).
+fn duplicate_positions(positions: &[DVec3]) -> Vec<(u32, u32)> {
+    // Adding +0 makes −0 to +0.
+    let bits = |v: u32| {
+        (positions[v as usize] + DVec3::ZERO)
+            .to_array()
+            .map(f64::to_bits)
+    };
+    let keys = positions
+        .par_iter()
+        .enumerate()
+        .filter(|(_, p)| p.is_finite())
+        .map(|(v, _)| {
+            let key = bits(v as u32).into_iter().fold(0, |h, b| mix(h ^ b));
+            (key, v as u32)
+        })
+        .collect();
+    copies(keys, bits)
+}
+
+/// The faces whose corners, in any order, lie on the same positions as those of a face before them, with the
+/// first such face; ascending. O(n log n). `same` are the duplicate positions.
+fn duplicate_faces(faces: &Faces, vertices: usize, same: &[(u32, u32)]) -> Vec<(u32, u32)> {
+    let mut place: Vec<u32> = (0..vertices as u32).collect();
+    for &(v, original) in same {
+        place[v as usize] = original;
+    }
+    let place = &place;
+    let keys = (0..faces.len())
+        .into_par_iter()
+        .map(|f| {
+            // A sum does not depend on the order of the corners.
+            let places = faces.face(f).iter().map(|&v| place[v as usize]);
+            let key = places.fold(0u64, |h, p| h.wrapping_add(mix(u64::from(p))));
+            (key, f as u32)
+        })
+        .collect();
+    copies(keys, |f| {
+        let mut places: Vec<u32> = faces
+            .face(f as usize)
+            .iter()
+            .map(|&v| place[v as usize])
+            .collect();
+        places.sort_unstable();
+        places
+    })
+}
+
+/// Of the items `(key, item)`, those equal to one before them by `value`, each with the first of its equals.
+/// Equal values must have equal keys; few unequal ones may.
+fn copies<T: Ord>(mut keys: Vec<(u64, u32)>, value: impl Fn(u32) -> T) -> Vec<(u32, u32)> {
+    keys.par_sort_unstable();
+    let mut copies = Vec::new();
+    for run in keys.chunk_by(|a, b| a.0 == b.0).filter(|run| run.len() > 1) {
+        let mut values: Vec<(T, u32)> = run.iter().map(|&(_, item)| (value(item), item)).collect();
+        values.sort_unstable();
+        for equal in values.chunk_by(|a, b| a.0 == b.0) {
+            copies.extend(equal[1..].iter().map(|&(_, item)| (item, equal[0].1)));
+        }
+    }
+    copies.sort_unstable();
+    copies
+}
+
+/// Spreads the bits of a word: the finaliser of SplitMix64 (Steele, Lea and Flood 2014).
+fn mix(word: u64) -> u64 {
+    let z = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// The faces whose vector area ½ Σ (pᵢ − p₀) × (pᵢ₊₁ − p₀) vanishes to the rounding of its terms.
+fn zero_area_faces(mesh: &Mesh) -> Vec<u32> {
+    // Each product of differences carries a relative error of at most 4 units in the last place.
+    const ROUNDING: f64 = 8.0 * f64::EPSILON;
+    (0..mesh.faces.len() as u32)
+        .into_par_iter()
+        .filter(|&f| {
+            let face = mesh.faces.face(f as usize);
+            let at = |k: usize| mesh.positions[face[k] as usize] - mesh.positions[face[0] as usize];
+            let (mut area, mut scale) = (DVec3::ZERO, 0.0);
+            for k in 2..face.len() {
+                let (a, b) = (at(k - 1), at(k));
+                area += a.cross(b);
+                scale += a.length() * b.length();
+            }
+            area.length() <= ROUNDING * scale
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn duplicates_are_found_in_order_and_zeros_of_either_sign_are_one() {
+        let p = |x: f64| DVec3::new(x, 0.0, 1.0);
+        let positions = [
+            p(1.0),
+            p(-0.0),
+            p(2.0),
+            p(0.0),
+            p(1.0),
+            p(f64::NAN),
+            p(f64::NAN),
+            p(1.0),
+        ];
+        assert_eq!(duplicate_positions(&positions), [(3, 1), (4, 0), (7, 0)]);
+    }
+
+    #[test]
+    fn faces_are_compared_by_position_in_any_rotation_and_direction() {
+        let faces = Faces::from_lists([[0u32, 1, 2], [2, 3, 1], [1, 0, 4], [1, 2, 0], [4, 1, 3]]);
+        // 4 lies on 2.
+        let copies = duplicate_faces(&faces, 5, &[(4, 2)]);
+        assert_eq!(copies, [(2, 0), (3, 0), (4, 1)]);
+    }
+
+    #[test]
+    fn zero_area_means_collinear_or_coincident() {
+        let third = 1.0 / 3.0;
+        let positions = vec![
+            DVec3::ZERO,
+            DVec3::new(0.1, 0.2, 0.3),
+            DVec3::new(0.2, 0.4, 0.6),
+            DVec3::new(1.0, third, 0.7),
+            // Far from collinear compared with rounding, though small.
+            DVec3::new(1e-9, 2e-9, 3e-9 + 1e-20),
+        ];
+        let faces = Faces::from_lists(vec![
+            vec![0, 1, 2],
+            vec![0, 1, 3],
+            vec![3, 3, 1],
+            vec![0, 1, 3, 2],
+            vec![0, 1, 4],
+        ]);
+        let flat = zero_area_faces(&Mesh::new(positions, faces));
+        assert_eq!(flat, [0, 2]);
+    }
+}

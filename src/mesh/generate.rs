@@ -1,0 +1,514 @@
+//! New meshes from old ones, and random ones from a seed: splits, duals, unions, edge flips, merged faces,
+//! renumberings. Everything is deterministic, and linear in the size of the mesh for bounded valences.
+//!
+//! The operations expect closed meshes without defects and give such again, unless they say otherwise.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec3;
+use rand::{Rng, RngExt, SeedableRng, seq::SliceRandom};
+use rand_chacha::ChaCha8Rng;
+
+use super::topology::{NONE, Topology, next_in, prev_in};
+use super::{Faces, Mesh, builtin};
+
+/// For every half-edge the number of its edge, and the two ends of every edge, numbered by
+/// [`Topology::edge_sides`].
+fn number_edges(faces: &Faces, topology: &Topology) -> (Vec<u32>, Vec<[u32; 2]>) {
+    let mut edge = vec![0; faces.corners().len()];
+    let mut ends = Vec::with_capacity(topology.edges());
+    for c in topology.edge_sides() {
+        let range = faces.range(topology.incidence.face_of(c));
+        let end = faces.corners()[next_in(&range, c) as usize];
+        edge[c as usize] = ends.len() as u32;
+        if let Some(d) = topology.twin(c) {
+            edge[d as usize] = ends.len() as u32;
+        }
+        ends.push([faces.corners()[c as usize], end]);
+    }
+    (edge, ends)
+}
+
+fn midpoints(positions: &[DVec3], ends: &[[u32; 2]]) -> impl Iterator<Item = DVec3> {
+    ends.iter()
+        .map(|&[a, b]| (positions[a as usize] + positions[b as usize]) / 2.0)
+}
+
+fn centroid(mesh: &Mesh, f: usize) -> DVec3 {
+    let face = mesh.faces.face(f);
+    let sum: DVec3 = face.iter().map(|&v| mesh.positions[v as usize]).sum();
+    sum / face.len() as f64
+}
+
+/// Every n-gon becomes n quads about its centroid, through the midpoints of its edges: V + E + F vertices, in
+/// this order, and as many faces as there were corners. The mesh may be open.
+pub fn quad_split(mesh: &Mesh) -> Mesh {
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    let (edge, ends) = number_edges(&mesh.faces, &topology);
+    let (v, e) = (mesh.len() as u32, ends.len() as u32);
+    let mut positions = mesh.positions.clone();
+    positions.extend(midpoints(&mesh.positions, &ends));
+    positions.extend((0..mesh.faces.len()).map(|f| centroid(mesh, f)));
+    let corners = mesh.faces.corners().len();
+    let mut faces = Faces::with_capacity(corners, 4 * corners);
+    for f in 0..mesh.faces.len() {
+        let range = mesh.faces.range(f);
+        for c in range.clone() {
+            let before = prev_in(&range, c as u32) as usize;
+            faces.push(&[
+                mesh.faces.corners()[c],
+                v + edge[c],
+                v + e + f as u32,
+                v + edge[before],
+            ]);
+        }
+    }
+    Mesh::new(positions, faces)
+}
+
+/// Every triangle becomes four through the midpoints of its edges: V + E vertices, the old ones first. The mesh
+/// may be open.
+///
+/// # Panics
+/// If a face is not a triangle.
+pub fn midpoint_split(mesh: &Mesh) -> Mesh {
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    let (edge, ends) = number_edges(&mesh.faces, &topology);
+    let v = mesh.len() as u32;
+    let mut positions = mesh.positions.clone();
+    positions.extend(midpoints(&mesh.positions, &ends));
+    let mut faces = Faces::with_capacity(4 * mesh.faces.len(), 12 * mesh.faces.len());
+    for (f, face) in mesh.faces.iter().enumerate() {
+        let &[a, b, c] = face else {
+            panic!("face {f} is not a triangle");
+        };
+        let first = mesh.faces.range(f).start;
+        let [ab, bc, ca] = [0, 1, 2].map(|k| v + edge[first + k]);
+        for triangle in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
+            faces.push(&triangle);
+        }
+    }
+    Mesh::new(positions, faces)
+}
+
+/// The dual: a vertex at the centroid of every face, a face for every vertex. All valences are the old face
+/// sizes and the reverse. Without defects if no two faces of `mesh` share more than one edge, so for every
+/// triangulation.
+pub fn dual(mesh: &Mesh) -> Mesh {
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    let positions = (0..mesh.faces.len()).map(|f| centroid(mesh, f)).collect();
+    let mut faces = Faces::with_capacity(mesh.len(), mesh.faces.corners().len());
+    let (mut star, mut face) = (Vec::new(), Vec::new());
+    for v in 0..mesh.len() {
+        topology.star(&mesh.faces, v, &mut star);
+        face.clear();
+        face.extend(star.iter().map(|&c| topology.incidence.face_of(c) as u32));
+        faces.push(&face);
+    }
+    Mesh::new(positions, faces)
+}
+
+/// All meshes in one, their vertices and faces one mesh after the other.
+pub fn union(meshes: &[Mesh]) -> Mesh {
+    let mut positions = Vec::new();
+    let (mut offsets, mut corners) = (vec![0u32], Vec::new());
+    for mesh in meshes {
+        let (first_vertex, first_corner) = (positions.len() as u32, corners.len() as u32);
+        positions.extend_from_slice(&mesh.positions);
+        corners.extend(mesh.faces.corners().iter().map(|&v| v + first_vertex));
+        offsets.extend(mesh.faces.offsets()[1..].iter().map(|&o| o + first_corner));
+    }
+    Mesh::new(positions, Faces::from_parts(offsets, corners))
+}
+
+/// The connected sum of two triangulations: the last face of each is removed and the two holes are glued, so
+/// that genera add up and V = V₁ + V₂ − 3. The second mesh is moved and turned inside out as needed only in
+/// combinatorics; its positions are shifted beside the first.
+///
+/// # Panics
+/// If a mesh has no faces or its last face is not a triangle.
+pub fn connected_sum(a: &Mesh, b: &Mesh) -> Mesh {
+    let last = |mesh: &Mesh| -> [u32; 3] {
+        mesh.faces
+            .iter()
+            .last()
+            .and_then(|f| f.try_into().ok())
+            .expect("the last face is a triangle")
+    };
+    let ([a0, a1, a2], [b0, b1, b2]) = (last(a), last(b));
+    // Opposite directions along the seam.
+    let seam = [(b0, a0), (b1, a2), (b2, a1)];
+    let shift = DVec3::X * (a.diagonal() + b.diagonal()) / 2.0;
+    let mut positions = a.positions.clone();
+    let renumbered: Vec<u32> = (0..b.len() as u32)
+        .map(|v| {
+            if let Some(&(_, glued)) = seam.iter().find(|&&(s, _)| s == v) {
+                return glued;
+            }
+            positions.push(b.positions[v as usize] + shift);
+            positions.len() as u32 - 1
+        })
+        .collect();
+    let mut faces = Faces::with_capacity(a.faces.len() + b.faces.len() - 2, 0);
+    for face in a.faces.iter().take(a.faces.len() - 1) {
+        faces.push(face);
+    }
+    let mut moved = Vec::new();
+    for face in b.faces.iter().take(b.faces.len() - 1) {
+        moved.clear();
+        moved.extend(face.iter().map(|&v| renumbered[v as usize]));
+        faces.push(&moved);
+    }
+    Mesh::new(positions, faces)
+}
+
+/// The same mesh with vertex `order[k]` as its k-th. Faces keep their order. Valid on any mesh.
+///
+/// # Panics
+/// If `order` is not a permutation of the vertices.
+pub fn permute_vertices(mesh: &Mesh, order: &[u32]) -> Mesh {
+    assert_eq!(order.len(), mesh.len(), "one entry a vertex");
+    let inverse = super::order::inverse(order);
+    let positions = order.iter().map(|&v| mesh.positions[v as usize]).collect();
+    let mut faces = mesh.faces.clone();
+    for v in faces.corners_mut() {
+        *v = inverse[*v as usize];
+    }
+    Mesh::new(positions, faces)
+}
+
+/// The same mesh with its faces in random order, each starting at a random corner. Valid on any mesh.
+pub fn shuffle_faces(mesh: &Mesh, seed: u64) -> Mesh {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut order: Vec<usize> = (0..mesh.faces.len()).collect();
+    order.shuffle(&mut rng);
+    let mut faces = Faces::with_capacity(order.len(), mesh.faces.corners().len());
+    let mut face = Vec::new();
+    for f in order {
+        face.clear();
+        face.extend_from_slice(mesh.faces.face(f));
+        if !face.is_empty() {
+            let start = rng.random_range(0..face.len());
+            face.rotate_left(start);
+        }
+        faces.push(&face);
+    }
+    Mesh::new(mesh.positions.clone(), faces)
+}
+
+/// Flips the diagonal of two adjacent triangles, `attempts` times for a random edge, where afterwards no two
+/// vertices are joined twice, all valences are at least 3, and the two triangles do not fold over each other:
+/// their vector areas keep a positive part along that of the quadrilateral. Counts, genus, orientation and
+/// positions stay.
+///
+/// # Panics
+/// If a face is not a triangle.
+pub fn flip_edges(mesh: &mut Mesh, attempts: usize, seed: u64) {
+    assert!(
+        mesh.faces.is_empty() || mesh.faces.uniform_size() == Some(3),
+        "all faces are triangles"
+    );
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    let positions = &mesh.positions;
+    let corners = mesh.faces.corners_mut();
+    if corners.is_empty() {
+        return;
+    }
+    let mut valence: Vec<u32> = (0..positions.len())
+        .map(|v| topology.incidence.face_count(v) as u32)
+        .collect();
+    let mut twin: Vec<u32> = (0..corners.len() as u32)
+        .map(|c| topology.twin(c).unwrap_or(NONE))
+        .collect();
+    let next = |c: u32| if c % 3 == 2 { c - 2 } else { c + 1 };
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    for _ in 0..attempts {
+        // Triangles (a, b, x) and (b, a, y) become (a, y, x) and (y, b, x).
+        let c = rng.random_range(0..corners.len() as u32);
+        let d = twin[c as usize];
+        if d == NONE {
+            continue;
+        }
+        let [bx, xa] = [next(c), next(next(c))];
+        let [ay, yb] = [next(d), next(next(d))];
+        let [a, b, x, y] = [c, d, xa, yb].map(|c| corners[c as usize]);
+        if valence[a as usize] <= 3 || valence[b as usize] <= 3 {
+            continue;
+        }
+        let joined = {
+            // Around the one of x and y with fewer edges, looking for the other.
+            let (start, other) = if valence[x as usize] <= valence[y as usize] {
+                (xa, y)
+            } else {
+                (yb, x)
+            };
+            let mut around = start;
+            loop {
+                if corners[next(around) as usize] == other {
+                    break true;
+                }
+                around = twin[next(next(around)) as usize];
+                if around == start || around == NONE {
+                    break false;
+                }
+            }
+        };
+        if joined {
+            continue;
+        }
+        let [pa, pb, px, py] = [a, b, x, y].map(|v| positions[v as usize]);
+        let area = |p: DVec3, q: DVec3, r: DVec3| (q - p).cross(r - p);
+        let (first, second) = (area(pa, py, px), area(py, pb, px));
+        let whole = first + second;
+        if first.dot(whole) <= 0.0 || second.dot(whole) <= 0.0 {
+            continue;
+        }
+        let outer = [bx, xa, ay, yb].map(|c| twin[c as usize]);
+        let (t, u) = (c - c % 3, d - d % 3);
+        for (at, v) in [
+            (t, a),
+            (t + 1, y),
+            (t + 2, x),
+            (u, y),
+            (u + 1, b),
+            (u + 2, x),
+        ] {
+            corners[at as usize] = v;
+        }
+        let [from_bx, from_xa, from_ay, from_yb] = outer;
+        for (p, q) in [
+            (t, from_ay),
+            (t + 1, u + 2),
+            (t + 2, from_xa),
+            (u, from_yb),
+            (u + 1, from_bx),
+        ] {
+            twin[p as usize] = q;
+            if q != NONE {
+                twin[q as usize] = p;
+            }
+        }
+        valence[a as usize] -= 1;
+        valence[b as usize] -= 1;
+        valence[x as usize] += 1;
+        valence[y as usize] += 1;
+    }
+}
+
+/// Removes up to `removals` random edges, each of which joins its two faces to one of at most `max_size`
+/// corners, where both ends keep a valence of at least 3 and the two faces share nothing but the edge. Fewer
+/// are removed only when no edge is left that can be: `mesh.faces.len()` tells. Vertices stay.
+pub fn merge_faces(mesh: &Mesh, removals: usize, max_size: usize, seed: u64) -> Mesh {
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    let corners = mesh.faces.corners();
+    let mut face_of: Vec<u32> = (0..corners.len() as u32)
+        .map(|c| topology.incidence.face_of(c) as u32)
+        .collect();
+    let (mut next, mut previous) = (vec![0u32; corners.len()], vec![0u32; corners.len()]);
+    let mut start: Vec<u32> = mesh.faces.offsets()[..mesh.faces.len()].to_vec();
+    let mut size: Vec<usize> = mesh.faces.iter().map(<[u32]>::len).collect();
+    for f in 0..mesh.faces.len() {
+        let range = mesh.faces.range(f);
+        for c in range.clone() {
+            next[c] = next_in(&range, c as u32);
+            previous[c] = prev_in(&range, c as u32);
+        }
+    }
+    let mut valence: Vec<usize> = (0..mesh.len())
+        .map(|v| topology.incidence.face_count(v))
+        .collect();
+    // The attempt at which a vertex was last seen on the first of the two faces.
+    let mut seen = vec![usize::MAX; mesh.len()];
+    let mut edges: Vec<u32> = topology.edge_sides().collect();
+    edges.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+    let mut left = removals;
+    for (attempt, &c) in edges.iter().enumerate() {
+        if left == 0 {
+            break;
+        }
+        let Some(d) = topology.twin(c) else { continue };
+        let [a, b] = [c, d].map(|c| corners[c as usize] as usize);
+        let [f, g] = [c, d].map(|c| face_of[c as usize] as usize);
+        let merged = size[f] + size[g] - 2;
+        if f == g || merged > max_size || valence[a] <= 3 || valence[b] <= 3 {
+            continue;
+        }
+        let around = |first: u32, next: &[u32], visit: &mut dyn FnMut(u32)| {
+            let mut k = next[first as usize];
+            while k != first {
+                visit(k);
+                k = next[k as usize];
+            }
+        };
+        around(c, &next, &mut |k| {
+            seen[corners[k as usize] as usize] = attempt
+        });
+        seen[a] = usize::MAX;
+        seen[b] = usize::MAX;
+        let mut apart = true;
+        around(d, &next, &mut |k| {
+            apart &= seen[corners[k as usize] as usize] != attempt
+        });
+        if !apart {
+            continue;
+        }
+        around(d, &next, &mut |k| face_of[k as usize] = f as u32);
+        let (after_c, before_c) = (next[c as usize], previous[c as usize]);
+        let (after_d, before_d) = (next[d as usize], previous[d as usize]);
+        for (p, q) in [(before_c, after_d), (before_d, after_c)] {
+            next[p as usize] = q;
+            previous[q as usize] = p;
+        }
+        start[f] = after_c;
+        size[f] = merged;
+        size[g] = 0;
+        valence[a] -= 1;
+        valence[b] -= 1;
+        left -= 1;
+    }
+    let mut faces = Faces::with_capacity(mesh.faces.len(), corners.len());
+    let mut face = Vec::new();
+    for f in (0..size.len()).filter(|&f| size[f] > 0) {
+        face.clear();
+        let mut c = start[f];
+        for _ in 0..size[f] {
+            face.push(corners[c as usize]);
+            c = next[c as usize];
+        }
+        faces.push(&face);
+    }
+    Mesh::new(mesh.positions.clone(), faces)
+}
+
+/// A triangulation of the unit sphere with exactly `n` ≥ 5 nearly even vertices: the north pole, rings of
+/// latitude, the south pole. 2n − 4 triangles.
+///
+/// # Panics
+/// If `n` < 5.
+pub fn ring_sphere(n: usize) -> Mesh {
+    assert!(n >= 5, "two poles and a ring of three");
+    // The edge of n even triangles pairs on the sphere: 4π = (2n) (√3/4) h².
+    let h = (8.0 * PI / (3f64.sqrt() * n as f64)).sqrt();
+    let rings = ((PI / h).round() as usize)
+        .saturating_sub(1)
+        .clamp(1, (n - 2) / 3);
+    let latitude = |k: usize| PI * (k + 1) as f64 / (rings + 1) as f64;
+    // Three vertices in every ring, and the others in proportion to what its length asks for beyond.
+    let spare = n - 2 - 3 * rings;
+    let wish: Vec<f64> = (0..rings)
+        .map(|k| (TAU * latitude(k).sin() / h - 3.0).max(0.0) + f64::MIN_POSITIVE)
+        .collect();
+    let total: f64 = wish.iter().sum();
+    let mut granted = 0;
+    let mut sum = 0.0;
+    let sizes: Vec<usize> = wish
+        .iter()
+        .enumerate()
+        .map(|(k, w)| {
+            sum += w;
+            let upto = if k + 1 == rings {
+                spare
+            } else {
+                (spare as f64 * (sum / total)).round() as usize
+            };
+            let size = 3 + upto - granted;
+            granted = upto;
+            size
+        })
+        .collect();
+
+    let mut positions = vec![DVec3::Z];
+    let mut faces = Faces::with_capacity(2 * n - 4, 6 * n - 12);
+    // The angle of vertex j in ring k of the given size; odd rings are turned by half a step.
+    let angle = |k: usize, size: usize, j: usize| {
+        TAU * (j as f64 + if k % 2 == 1 { 0.5 } else { 0.0 }) / size as f64
+    };
+    let mut first = 1u32;
+    for (k, &size) in sizes.iter().enumerate() {
+        let (sin, cos) = latitude(k).sin_cos();
+        for j in 0..size {
+            let (s, c) = angle(k, size, j).sin_cos();
+            positions.push(DVec3::new(sin * c, sin * s, cos));
+        }
+        let here = |j: usize| first + (j % size) as u32;
+        if k == 0 {
+            for j in 0..size {
+                faces.push(&[here(j), here(j + 1), 0]);
+            }
+        } else {
+            // A strip to the ring above, always across the shorter way round.
+            let above_size = sizes[k - 1];
+            let above = |i: usize| first - above_size as u32 + (i % above_size) as u32;
+            let (mut i, mut j) = (0, 0);
+            while i < above_size || j < size {
+                let advance_above = j == size
+                    || i < above_size && angle(k - 1, above_size, i + 1) < angle(k, size, j + 1);
+                if advance_above {
+                    faces.push(&[here(j), above(i + 1), above(i)]);
+                    i += 1;
+                } else {
+                    faces.push(&[here(j), here(j + 1), above(i)]);
+                    j += 1;
+                }
+            }
+        }
+        first += size as u32;
+    }
+    let last = sizes[rings - 1];
+    let lowest = |j: usize| first - last as u32 + (j % last) as u32;
+    for j in 0..last {
+        faces.push(&[lowest(j + 1), lowest(j), first]);
+    }
+    positions.push(DVec3::NEG_Z);
+    Mesh::new(positions, faces)
+}
+
+/// A random closed triangulation of a few to about two thousand vertices: a sphere, a torus, a connected sum, or
+/// two components, with valences from 3 to 1000, edges flipped at random, vertices and faces in random order.
+pub fn random_triangulation(seed: u64) -> Mesh {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut mesh = match rng.random_range(0..8) {
+        0 => connected_sum(&random_base(&mut rng), &random_base(&mut rng)),
+        1 => union(&[random_base(&mut rng), random_base(&mut rng)]),
+        _ => random_base(&mut rng),
+    };
+    let attempts = rng.random_range(0..6 * mesh.len());
+    flip_edges(&mut mesh, attempts, rng.next_u64());
+    shuffle(&mesh, &mut rng)
+}
+
+fn random_base(rng: &mut ChaCha8Rng) -> Mesh {
+    match rng.random_range(0..6) {
+        0 => builtin::tetrahedron(),
+        1 => builtin::bipyramid(rng.random_range(3..40)),
+        2 => builtin::bipyramid(rng.random_range(3..=1000)),
+        3 => builtin::tri_torus(rng.random_range(3..12), rng.random_range(3..12)),
+        4 => builtin::icosphere(rng.random_range(0..3)),
+        _ => ring_sphere(rng.random_range(5..400)),
+    }
+}
+
+/// A random closed polygon mesh from a [`random_triangulation`]: mixed polygons, its dual, quads, or itself.
+pub fn random_polygons(seed: u64) -> Mesh {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let triangles = random_triangulation(rng.next_u64());
+    let mut merged = || {
+        let removals = rng.random_range(0..=triangles.faces.len());
+        let max_size = rng.random_range(4..12);
+        merge_faces(&triangles, removals, max_size, rng.next_u64())
+    };
+    let mesh = match seed % 5 {
+        0 => merged(),
+        1 => dual(&triangles),
+        2 => quad_split(&triangles),
+        3 => quad_split(&merged()),
+        _ => triangles,
+    };
+    shuffle(&mesh, &mut rng)
+}
+
+fn shuffle(mesh: &Mesh, rng: &mut ChaCha8Rng) -> Mesh {
+    let mut order: Vec<u32> = (0..mesh.len() as u32).collect();
+    order.shuffle(rng);
+    shuffle_faces(&permute_vertices(mesh, &order), rng.next_u64())
+}

@@ -1,0 +1,815 @@
+//! What is wrong with a mesh, all of it at once and each defect with its place; and what is merely odd.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::str::FromStr;
+
+use rayon::prelude::*;
+use serde::{Serialize, Serializer, ser::SerializeStruct};
+
+pub use super::defect::{Defect, DefectKind};
+use super::topology::{Incidence, NONE, Topology, join, next_in, prev_in};
+use super::{Faces, Mesh, degenerate};
+use crate::{Error, Result};
+
+/// What to make of boundary edges: `--boundary refuse | as-interior`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Boundary {
+    /// An open mesh is invalid.
+    #[default]
+    Refuse,
+    /// Boundary vertices get the masks of interior ones with as many edges, as in the paper that has the Boy
+    /// model. Only schemes whose masks need edges alone (Loop, √3) can do this.
+    AsInterior,
+}
+
+impl FromStr for Boundary {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text {
+            "refuse" => Ok(Boundary::Refuse),
+            "as-interior" => Ok(Boundary::AsInterior),
+            _ => Err(Error::Unknown(format!(
+                "unknown treatment of the boundary `{text}`: use refuse or as-interior"
+            ))),
+        }
+    }
+}
+
+impl fmt::Display for Boundary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Boundary::Refuse => "refuse",
+            Boundary::AsInterior => "as-interior",
+        })
+    }
+}
+
+/// The size and shape of a mesh whose indices are good.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    pub vertices: usize,
+    pub edges: usize,
+    pub faces: usize,
+    /// Isolated vertices are not components here.
+    pub components: usize,
+    /// V − E + F, isolated vertices included.
+    pub euler_characteristic: i64,
+    pub boundary_edges: usize,
+    /// `None` where an edge with more than two sides, or a misoriented one, leaves the loops undefined.
+    pub boundary_loops: Option<usize>,
+    /// The number of edges at a vertex, isolated vertices aside; 0 and 0 for a mesh without faces.
+    pub min_valence: usize,
+    pub max_valence: usize,
+}
+
+/// How to mend an orientation that is not consistent.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Orientation {
+    /// How many faces to turn round, the fewest: in every component the smaller side of the two.
+    pub faces_to_flip: usize,
+    /// The first of them.
+    pub first: Option<u32>,
+    /// Components of faces that cannot be oriented at all, such as a Möbius band.
+    pub unorientable_components: usize,
+}
+
+/// The whole report. [`Serialize`] gives the JSON of `--defects`.
+#[derive(Clone, Debug)]
+pub struct Validation {
+    /// All defects, in the order of [`DefectKind`] and, within a kind, of the file.
+    pub defects: Vec<Defect>,
+    /// Oddities that real closed models have and that no method minds: duplicate positions, zero-area faces,
+    /// faces on the same positions; and the boundary, where it is treated as interior.
+    pub remarks: Vec<String>,
+    /// Absent if a face names a vertex that does not exist.
+    pub counts: Option<Counts>,
+    /// Present if an edge has its two faces in the same direction.
+    pub orientation: Option<Orientation>,
+    /// Absent if a face names a vertex that does not exist.
+    pub topology: Option<Topology>,
+}
+
+impl Serialize for Validation {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        let mut report = serializer.serialize_struct("Validation", 6)?;
+        report.serialize_field("valid", &self.is_valid())?;
+        report.serialize_field("totals", &self.totals())?;
+        report.serialize_field("defects", &self.defects)?;
+        report.serialize_field("remarks", &self.remarks)?;
+        report.serialize_field("counts", &self.counts)?;
+        report.serialize_field("orientation", &self.orientation)?;
+        report.end()
+    }
+}
+
+impl Validation {
+    pub fn is_valid(&self) -> bool {
+        self.defects.is_empty()
+    }
+
+    /// How many defects there are of every kind that occurs.
+    pub fn totals(&self) -> BTreeMap<DefectKind, usize> {
+        let mut totals = BTreeMap::new();
+        for group in self.groups() {
+            totals.insert(group[0].kind, group.len());
+        }
+        totals
+    }
+
+    fn groups(&self) -> impl Iterator<Item = &[Defect]> {
+        self.defects.chunk_by(|a, b| a.kind == b.kind)
+    }
+
+    /// All kinds of defects in one line, each with its count and first place, and what to do about the first
+    /// kind; for a valid mesh `no defects`.
+    pub fn summary_line(&self) -> String {
+        let Some(first) = self.defects.first() else {
+            return "no defects".into();
+        };
+        let groups: Vec<String> = self
+            .groups()
+            .map(|group| {
+                let title = group[0].kind.title(group.len());
+                let place = group[0].to_string();
+                match group {
+                    _ if place.is_empty() => title,
+                    [_] => format!("{title} ({place})"),
+                    _ => format!("{title} (first: {place})"),
+                }
+            })
+            .collect();
+        format!("{}; {}", groups.join("; "), self.advice(first.kind))
+    }
+
+    fn advice(&self, kind: DefectKind) -> String {
+        match kind {
+            DefectKind::NoVertices => "give a mesh with vertices and faces".into(),
+            DefectKind::NoFaces => {
+                "give a mesh with faces: a point cloud has no limit surface".into()
+            }
+            DefectKind::IndexOutOfRange => {
+                "correct the face or add the missing vertices (vertices are numbered from 0 here)".into()
+            }
+            DefectKind::TooFewCorners => "remove such faces".into(),
+            DefectKind::RepeatedVertex => "remove the repetitions, or the faces".into(),
+            DefectKind::NonFiniteCoordinate => "give finite coordinates".into(),
+            DefectKind::NonManifoldEdge => {
+                "delete the extra faces, or split the mesh along such edges".into()
+            }
+            DefectKind::InconsistentOrientation => match &self.orientation {
+                Some(o) if o.unorientable_components > 0 => {
+                    "the surface cannot be oriented (a Möbius band or Klein bottle): no turning of faces helps".into()
+                }
+                Some(Orientation {
+                    faces_to_flip,
+                    first: Some(first),
+                    ..
+                }) => format!(
+                    "turn {} round (first: face {first}) to orient the mesh consistently",
+                    counted(*faces_to_flip, "face")
+                ),
+                _ => "orient the faces consistently".into(),
+            },
+            DefectKind::NonManifoldVertex => {
+                "split such a vertex into one for each umbrella of faces".into()
+            }
+            DefectKind::IsolatedVertex => "remove vertices that no face uses".into(),
+            DefectKind::LowValence => {
+                "give such vertices three edges or more, or remove them".into()
+            }
+            DefectKind::BoundaryEdge if self.totals().contains_key(&DefectKind::LowValence) => {
+                "close the holes or stitch the faces".into()
+            }
+            DefectKind::BoundaryEdge => {
+                "close the holes or stitch the faces, or use --boundary as-interior with --scheme loop or sqrt3".into()
+            }
+        }
+    }
+
+    /// The topology of a valid mesh.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] about `name` with [`summary_line`](Self::summary_line) if there are defects.
+    pub fn into_topology(self, name: &str) -> Result<Topology> {
+        match self.topology {
+            Some(topology) if self.defects.is_empty() => Ok(topology),
+            _ => Err(Error::mesh(name, self.summary_line())),
+        }
+    }
+}
+
+/// `1 face`, `2 faces`.
+pub(super) fn counted(count: usize, one: &str) -> String {
+    format!("{count} {one}{}", if count == 1 { "" } else { "s" })
+}
+
+/// Looks for every defect of `mesh`. `lines` are the 1-based lines of the vertices and of the faces in the file.
+///
+/// Time is linear in the corners for bounded valences and face sizes, but for the sorts that find duplicate
+/// positions and faces; vertices are examined in parallel and reported in the same order with any number of
+/// threads.
+///
+/// ```
+/// use limitlab::mesh::{Faces, Mesh, validate::{validate, Boundary}};
+/// use glam::DVec3;
+/// let triangle = Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], Faces::from_lists([[0, 1, 2]]));
+/// let report = validate(&triangle, None, Boundary::Refuse);
+/// assert!(report.summary_line().contains("3 boundary edges (first: face 0, vertices 0 and 1)"));
+/// ```
+pub fn validate(mesh: &Mesh, lines: Option<(&[u32], &[u32])>, boundary: Boundary) -> Validation {
+    let mut report = Validation {
+        defects: Vec::new(),
+        remarks: Vec::new(),
+        counts: None,
+        orientation: None,
+        topology: None,
+    };
+    if mesh.is_empty() {
+        report.defects.push(Defect::new(DefectKind::NoVertices));
+    }
+    if mesh.faces.is_empty() {
+        report.defects.push(Defect::new(DefectKind::NoFaces));
+    }
+    let isolated = examine_faces(mesh, &mut report.defects);
+    for (v, p) in mesh.positions.iter().enumerate() {
+        if !p.is_finite() {
+            let defect = Defect::at_vertex(DefectKind::NonFiniteCoordinate, v as u32);
+            report.defects.push(defect);
+        }
+    }
+    let indices_are_good = report
+        .defects
+        .iter()
+        .all(|d| d.kind != DefectKind::IndexOutOfRange);
+    if indices_are_good {
+        let (_, remarks) = rayon::join(
+            || examine_topology(mesh, isolated, boundary, &mut report),
+            || degenerate::remarks(mesh),
+        );
+        report.remarks.extend(remarks);
+    }
+    report.defects.sort_by_key(|d| d.kind);
+    if let Some((vertex_lines, face_lines)) = lines {
+        for d in &mut report.defects {
+            let line = match (d.face, d.vertex) {
+                (Some(f), _) => face_lines.get(f as usize),
+                (None, Some(v)) => vertex_lines.get(v as usize),
+                (None, None) => None,
+            };
+            d.line = line.copied();
+            let other = d.other_face.and_then(|f| face_lines.get(f as usize));
+            d.other_line = other.copied();
+        }
+    }
+    report
+}
+
+/// Defects of faces by themselves, and vertices of no face. Returns the number of the latter.
+fn examine_faces(mesh: &Mesh, defects: &mut Vec<Defect>) -> usize {
+    let n = mesh.len();
+    // The face that named a vertex last.
+    let mut named_by = vec![NONE; n];
+    for (f, face) in mesh.faces.iter().enumerate() {
+        if face.len() < 3 {
+            defects.push(Defect {
+                count: Some(face.len() as u32),
+                ..Defect::at_face(DefectKind::TooFewCorners, f)
+            });
+        }
+        let mut repeated = None;
+        for &v in face {
+            match named_by.get_mut(v as usize) {
+                Some(last) => {
+                    if *last == f as u32 && repeated.is_none() {
+                        repeated = Some(v);
+                    }
+                    *last = f as u32;
+                }
+                None => defects.push(Defect {
+                    vertex: Some(v),
+                    count: Some(n as u32),
+                    ..Defect::at_face(DefectKind::IndexOutOfRange, f)
+                }),
+            }
+        }
+        if repeated.is_some() {
+            defects.push(Defect {
+                vertex: repeated,
+                ..Defect::at_face(DefectKind::RepeatedVertex, f)
+            });
+        }
+    }
+    let isolated = named_by.iter().filter(|&&f| f == NONE).count();
+    // Without any face that defect says it all.
+    if !mesh.faces.is_empty() {
+        for (v, _) in named_by.iter().enumerate().filter(|&(_, &f)| f == NONE) {
+            defects.push(Defect::at_vertex(DefectKind::IsolatedVertex, v as u32));
+        }
+    }
+    isolated
+}
+
+/// Defects of edges and vertices, the counts, and the topology itself.
+fn examine_topology(mesh: &Mesh, isolated: usize, boundary: Boundary, report: &mut Validation) {
+    let faces = &mesh.faces;
+    let topology = Topology::new(faces, mesh.len());
+    let incidence = &topology.incidence;
+    for edge in topology.irregular_edges().iter().filter(|e| !e.is_loop()) {
+        let [first, last] = edge.half_edges.map(|c| incidence.face_of(c));
+        report.defects.push(if edge.is_misoriented() {
+            Defect {
+                other_face: Some(last as u32),
+                ..Defect::at_edge(DefectKind::InconsistentOrientation, first, edge.vertices)
+            }
+        } else {
+            Defect {
+                count: Some(edge.sides),
+                ..Defect::at_edge(DefectKind::NonManifoldEdge, first, edge.vertices)
+            }
+        });
+    }
+    if topology
+        .irregular_edges()
+        .iter()
+        .any(|e| e.is_misoriented())
+    {
+        report.orientation = Some(examine_orientation(faces, &topology));
+    }
+    let (min_valence, max_valence) = examine_vertices(faces, incidence, &mut report.defects);
+    let boundary_edges = topology.boundary_edges();
+    let boundary_loops = topology.irregular_edges().is_empty().then(|| {
+        if boundary_edges == 0 {
+            0
+        } else {
+            topology.boundary_loops(faces).len()
+        }
+    });
+    match boundary {
+        Boundary::Refuse => {
+            for &c in topology.boundary_half_edges() {
+                let f = incidence.face_of(c);
+                let end = faces.corners()[next_in(&faces.range(f), c) as usize];
+                let ends = [faces.corners()[c as usize], end];
+                let defect = Defect::at_edge(DefectKind::BoundaryEdge, f, ends);
+                report.defects.push(defect);
+            }
+        }
+        Boundary::AsInterior if boundary_edges > 0 => {
+            let edges = counted(boundary_edges, "boundary edge");
+            let loops = boundary_loops.map(|l| format!(" in {}", counted(l, "loop")));
+            report.remarks.push(format!(
+                "{edges}{}: boundary vertices are treated as interior",
+                loops.unwrap_or_default()
+            ));
+        }
+        Boundary::AsInterior => {}
+    }
+    report.counts = Some(Counts {
+        vertices: mesh.len(),
+        edges: topology.edges(),
+        faces: faces.len(),
+        components: topology.components(faces).1 - isolated,
+        euler_characteristic: topology.euler_characteristic(faces),
+        boundary_edges,
+        boundary_loops,
+        min_valence,
+        max_valence,
+    });
+    report.topology = Some(topology);
+}
+
+/// Umbrellas and valences of all vertices, in parallel. Returns the least and the greatest valence.
+fn examine_vertices(
+    faces: &Faces,
+    incidence: &Incidence,
+    defects: &mut Vec<Defect>,
+) -> (usize, usize) {
+    const CHUNK: usize = 4096;
+    let n = incidence.vertices();
+    let chunks: Vec<(Vec<Defect>, usize, usize)> = (0..n.div_ceil(CHUNK))
+        .into_par_iter()
+        .map_init(Link::default, |link, chunk| {
+            let mut found = Vec::new();
+            let (mut min, mut max) = (usize::MAX, 0);
+            for v in chunk * CHUNK..n.min((chunk + 1) * CHUNK) {
+                if incidence.face_count(v) == 0 {
+                    continue;
+                }
+                let (valence, umbrellas) = link.examine(faces, incidence, v);
+                min = min.min(valence);
+                max = max.max(valence);
+                let mut report = |kind, count: usize| {
+                    found.push(Defect {
+                        count: Some(count as u32),
+                        ..Defect::at_vertex(kind, v as u32)
+                    });
+                };
+                if umbrellas > 1 {
+                    report(DefectKind::NonManifoldVertex, umbrellas);
+                }
+                if valence < 3 {
+                    report(DefectKind::LowValence, valence);
+                }
+            }
+            (found, min, max)
+        })
+        .collect();
+    let (mut min, mut max) = (usize::MAX, 0);
+    for (found, lo, hi) in chunks {
+        defects.extend(found);
+        min = min.min(lo);
+        max = max.max(hi);
+    }
+    (min.min(max), max)
+}
+
+/// The surroundings of one vertex, whatever the orientation of its faces and the number of sides of its edges.
+#[derive(Default)]
+struct Link {
+    /// Neighbour in the upper half, corner (counted at the vertex) in the lower.
+    sides: Vec<u64>,
+    /// A forest over the corners: those joined by an edge at the vertex have one root.
+    parent: Vec<u32>,
+}
+
+impl Link {
+    /// The number of edges at `v`, each once, loops not counted, and the number of its umbrellas: the classes of
+    /// its corners under sharing an edge at `v`, or a face.
+    fn examine(&mut self, faces: &Faces, incidence: &Incidence, v: usize) -> (usize, usize) {
+        let corners = incidence.corners_at(v);
+        self.sides.clear();
+        self.parent.clear();
+        self.parent.extend(0..corners.len() as u32);
+        let mut umbrellas = corners.len();
+        for (k, &c) in corners.iter().enumerate() {
+            let f = incidence.face_of(c);
+            let range = faces.range(f);
+            for side in [next_in(&range, c), prev_in(&range, c)] {
+                let w = faces.corners()[side as usize];
+                if w as usize != v {
+                    self.sides.push(u64::from(w) << 32 | k as u64);
+                }
+            }
+            // A face that passes the vertex twice is a repeated vertex, not a second umbrella.
+            if k > 0 && incidence.face_of(corners[k - 1]) == f {
+                umbrellas -= usize::from(join(&mut self.parent, k as u32 - 1, k as u32));
+            }
+        }
+        self.sides.sort_unstable();
+        let mut valence = 0;
+        for edge in self.sides.chunk_by(|a, b| a >> 32 == b >> 32) {
+            valence += 1;
+            for pair in edge.windows(2) {
+                umbrellas -= usize::from(join(&mut self.parent, pair[0] as u32, pair[1] as u32));
+            }
+        }
+        (valence, umbrellas)
+    }
+}
+
+/// Walks over all faces across edges with two sides, noting which must be turned round to agree with the first
+/// of their component. Linear.
+fn examine_orientation(faces: &Faces, topology: &Topology) -> Orientation {
+    let incidence = &topology.incidence;
+    let mut same_direction = vec![NONE; faces.corners().len()];
+    for edge in topology
+        .irregular_edges()
+        .iter()
+        .filter(|e| e.is_misoriented())
+    {
+        let [a, b] = edge.half_edges;
+        same_direction[a as usize] = b;
+        same_direction[b as usize] = a;
+    }
+    let mut turned: Vec<Option<bool>> = vec![None; faces.len()];
+    let mut verdict = Orientation {
+        faces_to_flip: 0,
+        first: None,
+        unorientable_components: 0,
+    };
+    let mut component = Vec::new();
+    for seed in 0..faces.len() {
+        if turned[seed].is_some() {
+            continue;
+        }
+        turned[seed] = Some(false);
+        component.clear();
+        component.push(seed);
+        let mut conflict = false;
+        let mut next = 0;
+        while next < component.len() {
+            let f = component[next];
+            next += 1;
+            for c in faces.range(f) {
+                let (across, flip) = match (topology.twin(c as u32), same_direction[c]) {
+                    (Some(d), _) => (d, false),
+                    (None, NONE) => continue,
+                    (None, d) => (d, true),
+                };
+                let g = incidence.face_of(across);
+                let wanted = turned[f].map(|t| t != flip);
+                if turned[g].is_none() {
+                    turned[g] = wanted;
+                    component.push(g);
+                } else {
+                    conflict |= turned[g] != wanted;
+                }
+            }
+        }
+        if conflict {
+            verdict.unorientable_components += 1;
+            continue;
+        }
+        let ones = component
+            .iter()
+            .filter(|&&f| turned[f] == Some(true))
+            .count();
+        let fewer = 2 * ones <= component.len();
+        verdict.faces_to_flip += ones.min(component.len() - ones);
+        let first = component
+            .iter()
+            .filter(|&&f| turned[f] == Some(fewer))
+            .min()
+            .map(|&f| f as u32);
+        verdict.first = match (verdict.first, first) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        };
+    }
+    verdict
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::builtin;
+    use glam::DVec3;
+
+    fn mesh(vertices: usize, faces: &[&[u32]]) -> Mesh {
+        // Points on a moment curve: no two equal, no three collinear.
+        let at = |k: usize| DVec3::new(k as f64, (k * k) as f64, (k * k * k) as f64);
+        Mesh::new((0..vertices).map(at).collect(), Faces::from_lists(faces))
+    }
+
+    fn refuse(mesh: &Mesh) -> Validation {
+        validate(mesh, None, Boundary::Refuse)
+    }
+
+    fn kinds(report: &Validation) -> Vec<(DefectKind, usize)> {
+        report.totals().into_iter().collect()
+    }
+
+    #[test]
+    fn closed_meshes_have_no_defects_and_known_counts() {
+        let report = refuse(&builtin::cube());
+        assert!(report.is_valid() && report.remarks.is_empty());
+        assert_eq!(report.summary_line(), "no defects");
+        let counts = report.counts.clone().unwrap();
+        assert_eq!((counts.vertices, counts.edges, counts.faces), (8, 12, 6));
+        assert_eq!((counts.euler_characteristic, counts.components), (2, 1));
+        assert_eq!((counts.min_valence, counts.max_valence), (3, 3));
+        assert_eq!(counts.boundary_loops, Some(0));
+        assert_eq!(report.into_topology("cube").unwrap().edges(), 12);
+    }
+
+    #[test]
+    fn an_index_out_of_range_comes_first_and_hides_the_topology_only() {
+        let mut m = mesh(5, &[&[0, 1, 9], &[0, 1, 1], &[0, 1, 2], &[7, 8, 0]]);
+        m.positions[3].y = f64::NAN;
+        let (vertex_lines, face_lines) = ([2, 3, 4, 5, 6], [7, 8, 9, 11]);
+        let report = validate(&m, Some((&vertex_lines, &face_lines)), Boundary::Refuse);
+        assert!(report.topology.is_none() && report.counts.is_none());
+        let places: Vec<_> = (report.defects.iter())
+            .map(|d| (d.kind, d.face, d.vertex, d.line))
+            .collect();
+        use DefectKind::*;
+        assert_eq!(
+            places,
+            [
+                (IndexOutOfRange, Some(0), Some(9), Some(7)),
+                (IndexOutOfRange, Some(3), Some(7), Some(11)),
+                (IndexOutOfRange, Some(3), Some(8), Some(11)),
+                (RepeatedVertex, Some(1), Some(1), Some(8)),
+                (NonFiniteCoordinate, None, Some(3), Some(5)),
+                (IsolatedVertex, None, Some(3), Some(5)),
+                (IsolatedVertex, None, Some(4), Some(6)),
+            ]
+        );
+        let line = report.summary_line();
+        assert!(
+            line.starts_with(
+                "3 indices out of range (first: face 0, line 7, vertex 9, the mesh has 5 vertices); \
+                 1 face with a repeated vertex (face 1, line 8, vertex 1); "
+            ),
+            "{line}"
+        );
+        assert!(!line.contains('\n'));
+        let error = report.into_topology("a.off").unwrap_err().to_string();
+        assert_eq!(error, format!("a.off: {line}"));
+    }
+
+    #[test]
+    fn empty_meshes_say_what_is_missing() {
+        let kinds = |m: &Mesh| kinds(&refuse(m));
+        use DefectKind::*;
+        assert_eq!(kinds(&mesh(0, &[])), [(NoVertices, 1), (NoFaces, 1)]);
+        assert_eq!(kinds(&mesh(3, &[])), [(NoFaces, 1)]);
+        assert!(
+            refuse(&mesh(3, &[]))
+                .summary_line()
+                .starts_with("no faces; ")
+        );
+        assert_eq!(
+            kinds(&mesh(0, &[&[0, 1, 2]])),
+            [(NoVertices, 1), (IndexOutOfRange, 3)]
+        );
+    }
+
+    #[test]
+    fn faces_of_two_one_and_no_corners_are_defects_and_do_no_harm() {
+        let m = mesh(
+            4,
+            &[
+                &[0, 1, 2],
+                &[0, 3, 1],
+                &[1, 3, 2],
+                &[2, 3, 0],
+                &[1, 2],
+                &[3],
+                &[],
+            ],
+        );
+        let report = refuse(&m);
+        let small: Vec<_> = (report.defects.iter())
+            .filter(|d| d.kind == DefectKind::TooFewCorners)
+            .map(|d| (d.face, d.count))
+            .collect();
+        assert_eq!(
+            small,
+            [(Some(4), Some(2)), (Some(5), Some(1)), (Some(6), Some(0))]
+        );
+    }
+
+    #[test]
+    fn a_vertex_twice_in_a_row_is_no_edge_defect() {
+        // A cone over the square 0123 whose faces at the apex 4 are quads with the apex twice, and its base.
+        let m = mesh(
+            5,
+            &[
+                &[0, 1, 4, 4],
+                &[1, 2, 4, 4],
+                &[2, 3, 4, 4],
+                &[3, 0, 4, 4],
+                &[3, 2, 1, 0],
+            ],
+        );
+        let report = refuse(&m);
+        assert_eq!(kinds(&report), [(DefectKind::RepeatedVertex, 4)]);
+        let counts = report.counts.unwrap();
+        assert_eq!((counts.min_valence, counts.max_valence), (3, 4));
+    }
+
+    #[test]
+    fn an_open_mesh_is_refused_or_treated_as_interior() {
+        let mut open = builtin::icosahedron();
+        open.faces = Faces::from_lists(open.faces.iter().skip(1));
+        let report = refuse(&open);
+        assert_eq!(kinds(&report), [(DefectKind::BoundaryEdge, 3)]);
+        assert!(report.summary_line().contains("--boundary as-interior"));
+        let report = validate(&open, None, Boundary::AsInterior);
+        assert!(report.is_valid());
+        assert_eq!(
+            report.remarks,
+            ["3 boundary edges in 1 loop: boundary vertices are treated as interior"]
+        );
+        // Valences count edges: the removed face took no edge away.
+        assert_eq!(report.counts.unwrap().min_valence, 5);
+        // A single triangle has valence 2 whatever is made of its boundary.
+        let report = validate(&mesh(3, &[&[0, 1, 2]]), None, Boundary::AsInterior);
+        assert_eq!(kinds(&report), [(DefectKind::LowValence, 3)]);
+    }
+
+    #[test]
+    fn turned_faces_are_found_and_the_fewest_are_named() {
+        let base = builtin::irregular_tri(500, 7);
+        for turned in [vec![3], vec![0, 17, 18, 400], (0..500).collect()] {
+            let mut lists: Vec<Vec<u32>> = base.faces.iter().map(<[u32]>::to_vec).collect();
+            for &f in &turned {
+                lists[f].reverse();
+            }
+            let m = Mesh::new(base.positions.clone(), Faces::from_lists(&lists));
+            let report = refuse(&m);
+            assert_eq!(kinds(&report).len(), 1);
+            let orientation = report.orientation.clone().unwrap();
+            let fewest = turned.len().min(lists.len() - turned.len());
+            assert_eq!(orientation.faces_to_flip, fewest);
+            assert_eq!(orientation.unorientable_components, 0);
+            // An edge is misoriented when just one of its two faces is turned.
+            let topology = Topology::new(&base.faces, base.len());
+            let is_turned = |c: u32| turned.contains(&topology.incidence.face_of(c));
+            let expected = (topology.edge_sides())
+                .filter(|&c| is_turned(c) != is_turned(topology.twin(c).unwrap()))
+                .count();
+            assert_eq!(report.defects.len(), expected);
+            assert!(
+                report
+                    .summary_line()
+                    .contains("to orient the mesh consistently")
+            );
+        }
+    }
+
+    #[test]
+    fn a_moebius_band_cannot_be_oriented() {
+        let n = 7u32;
+        let band: Vec<[u32; 4]> = (0..n)
+            .map(|k| match k + 1 {
+                next if next < n => [2 * k, 2 * next, 2 * next + 1, 2 * k + 1],
+                _ => [2 * k, 1, 0, 2 * k + 1],
+            })
+            .collect();
+        let lists: Vec<&[u32]> = band.iter().map(|f| &f[..]).collect();
+        let report = refuse(&mesh(2 * n as usize, &lists));
+        assert_eq!(
+            kinds(&report),
+            [
+                (DefectKind::InconsistentOrientation, 1),
+                (DefectKind::BoundaryEdge, 2 * n as usize)
+            ]
+        );
+        assert_eq!(
+            report.orientation.as_ref().unwrap().unorientable_components,
+            1
+        );
+        assert!(report.summary_line().contains("Möbius"));
+    }
+
+    #[test]
+    fn two_surfaces_in_one_vertex_or_edge_are_not_manifold() {
+        // Two tetrahedra that share vertex 0, then edge 0-1.
+        let at_vertex = mesh(
+            7,
+            &[
+                &[0, 1, 2],
+                &[0, 3, 1],
+                &[1, 3, 2],
+                &[2, 3, 0],
+                &[0, 4, 5],
+                &[0, 6, 4],
+                &[4, 6, 5],
+                &[5, 6, 0],
+            ],
+        );
+        let report = refuse(&at_vertex);
+        assert_eq!(kinds(&report), [(DefectKind::NonManifoldVertex, 1)]);
+        assert_eq!(report.defects[0].vertex, Some(0));
+        assert_eq!(report.defects[0].count, Some(2));
+        let at_edge = mesh(
+            6,
+            &[
+                &[0, 1, 2],
+                &[0, 3, 1],
+                &[1, 3, 2],
+                &[2, 3, 0],
+                &[0, 1, 4],
+                &[0, 5, 1],
+                &[1, 5, 4],
+                &[4, 5, 0],
+            ],
+        );
+        let report = refuse(&at_edge);
+        assert_eq!(kinds(&report), [(DefectKind::NonManifoldEdge, 1)]);
+        let edge = &report.defects[0];
+        assert_eq!(
+            (edge.vertex, edge.other_vertex, edge.count),
+            (Some(0), Some(1), Some(4))
+        );
+    }
+
+    #[test]
+    fn the_json_has_every_defect_with_its_place() {
+        let m = mesh(4, &[&[0, 1, 2]]);
+        let report = validate(&m, Some((&[3, 4, 5, 6], &[7])), Boundary::Refuse);
+        let json: serde_json::Value = serde_json::to_value(&report).unwrap();
+        assert_eq!(json["valid"], false);
+        assert_eq!(json["totals"]["boundary-edge"], 3);
+        assert_eq!(json["totals"]["isolated-vertex"], 1);
+        let isolated = serde_json::json!({"kind": "isolated-vertex", "vertex": 3, "line": 6});
+        assert_eq!(json["defects"][0], isolated);
+        let edge = serde_json::json!(
+            {"kind": "boundary-edge", "face": 0, "vertex": 0, "other_vertex": 1, "line": 7}
+        );
+        assert_eq!(json["defects"][1], edge);
+        assert_eq!(json["counts"]["edges"], 3);
+    }
+
+    #[test]
+    fn boundary_treatments_are_read_and_written() {
+        for b in [Boundary::Refuse, Boundary::AsInterior] {
+            assert_eq!(b.to_string().parse::<Boundary>().unwrap(), b);
+        }
+        assert!("".parse::<Boundary>().is_err() && "Refuse".parse::<Boundary>().is_err());
+    }
+}
