@@ -31,6 +31,6 @@ pub use compare::compare;
 pub use figure::{Figure, Panel};
 pub use plot::LinePlot;
 pub use png::Image;
-pub use series::Series;
+pub use series::{Rule, Series, palette};
 pub use sparsity::SparsityPlot;
 pub use table::{Cell, Column, Table};
