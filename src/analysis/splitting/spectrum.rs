@@ -15,6 +15,10 @@ const CLUSTER: f64 = 1e-4;
 /// Means of clusters closer than this, in different blocks, are one eigenvalue; means are good to rounding.
 const EQUAL: f64 = 1e-9;
 
+/// Moduli closer than this count as equal. Simple eigenvalues of the blocks are good to 1e-14; near a collision of two,
+/// to the square root of that.
+pub const LEAD: f64 = 1e-7;
+
 /// An eigenvalue with the frequency k ≤ n/2 of its block. For 0 < k < n/2 its conjugate belongs to block n−k.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
@@ -175,6 +179,25 @@ impl SplittingMatrix {
             )));
         }
         Ok(leading.re)
+    }
+
+    /// Whether the [`leading_pair`](Self::leading_pair) is real and beats all other eigenvalues but λ_0 = 1 by more
+    /// than [`LEAD`]: Reif's condition λ_0 > λ_1 = λ_2 > λ_3, without which characteristic map and tangent masks say
+    /// nothing about the surface.
+    ///
+    /// # Errors
+    /// As [`modes`](Self::modes).
+    pub fn pair_leads(&self) -> Result<bool> {
+        let modes = self.modes()?;
+        let Some(at) = modes.iter().position(|m| m.frequency == 1) else {
+            return Ok(false);
+        };
+        let pair = modes[at].value;
+        // The first is λ_0; of the others none may come close, and the sort puts the largest first.
+        let next = (1..modes.len())
+            .find(|&i| i != at)
+            .map_or(0.0, |i| modes[i].value.norm());
+        Ok(at > 0 && pair.im.abs() < EQUAL && pair.norm() - next > LEAD)
     }
 
     /// The tangent masks, cosine and sine: a basis of the left eigenspace of the [`leading_pair`](Self::leading_pair),
