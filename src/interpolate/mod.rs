@@ -1,1 +1,3 @@
-//! (room)
+//! The papers' whole pipelines, built on the rooms above. This room knows no plotting.
+
+pub mod pia;
