@@ -1,1 +1,369 @@
-//! atomic
+//! Writing files so that nothing half-written is ever seen under the name that was asked for.
+//!
+//! A file is first written under another name beside its target, then renamed. A symbolic link at the target is
+//! followed; the file's mode is the one that the umask gives. What is not a regular file (`/dev/stdout`, a
+//! terminal, a pipe) is written straight. Data are handed to the operating system, not forced onto the disk.
+
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::{Error, Result};
+
+/// Bytes collected before each call of the operating system.
+const BUFFER: usize = 1 << 18;
+
+/// More links in a row than this are taken for a loop; Linux draws the line at the same number.
+const MAX_LINKS: usize = 40;
+
+/// Writes the file `path` with what `fill` gives.
+///
+/// # Errors
+/// [`Error::Io`] naming `path` if anything fails, `fill` included. Then nothing new is left behind, and a file
+/// that was there before is unchanged.
+///
+/// ```
+/// let path = std::env::temp_dir().join(format!("limitlab-doc-{}.txt", std::process::id()));
+/// limitlab::output::write_file(&path, |out| writeln!(out, "42"))?;
+/// assert_eq!(std::fs::read_to_string(&path).unwrap(), "42\n");
+/// # std::fs::remove_file(&path).unwrap();
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn write_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
+    let mut batch = Batch::default();
+    batch.write(path, fill)?;
+    batch.commit()
+}
+
+/// Creates a folder and the folders above it; one that is there already is fine.
+pub fn create_dir(path: &Path) -> Result<()> {
+    fs::create_dir_all(path).map_err(|e| Error::io(path, "create the folder", e))
+}
+
+/// Several files that appear together: each [`write`](Batch::write) fills one out of sight,
+/// [`commit`](Batch::commit) gives all of them their names. A batch dropped before leaves nothing behind.
+#[derive(Default)]
+pub struct Batch {
+    staged: Vec<Staged>,
+}
+
+struct Staged {
+    asked: PathBuf,
+    temporary: Temporary,
+    target: PathBuf,
+}
+
+impl Batch {
+    /// Writes one file of the batch; a target that is not a regular file gets its data here and now.
+    pub fn write(
+        &mut self,
+        path: &Path,
+        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<()> {
+        let refused = |e| Error::io(path, "write", e);
+        match destination(path).map_err(refused)? {
+            Destination::Straight => {
+                // Appending keeps what a redirected standard output holds already.
+                let file = OpenOptions::new()
+                    .append(true)
+                    .open(path)
+                    .map_err(refused)?;
+                fill_file(file, fill).map_err(refused)
+            }
+            Destination::Rename { folder, name } => {
+                let (temporary, file) = Temporary::create(&folder).map_err(refused)?;
+                fill_file(file, fill).map_err(refused)?;
+                self.staged.push(Staged {
+                    asked: path.to_path_buf(),
+                    temporary,
+                    target: folder.join(name),
+                });
+                Ok(())
+            }
+        }
+    }
+
+    /// Renames all files to their targets, in the order in which they were written. If one cannot be renamed,
+    /// those before it stay and the rest is removed.
+    pub fn commit(self) -> Result<()> {
+        for staged in self.staged {
+            staged
+                .temporary
+                .rename(&staged.target)
+                .map_err(|e| Error::io(&staged.asked, "write", e))?;
+        }
+        Ok(())
+    }
+}
+
+fn fill_file(file: File, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut out = BufWriter::with_capacity(BUFFER, file);
+    fill(&mut out)?;
+    out.flush()
+}
+
+enum Destination {
+    Straight,
+    Rename { folder: PathBuf, name: OsString },
+}
+
+/// Where the data for `path` go once links are followed.
+fn destination(path: &Path) -> io::Result<Destination> {
+    match fs::metadata(path) {
+        Ok(found) if found.is_dir() => {
+            return Err(io::Error::new(
+                io::ErrorKind::IsADirectory,
+                "it is a folder: name a file",
+            ));
+        }
+        Ok(found) if !found.is_file() => return Ok(Destination::Straight),
+        _ => {}
+    }
+    let mut hop = path.to_path_buf();
+    for _ in 0..MAX_LINKS {
+        let (folder, name) = split(&hop)?;
+        // The links below /proc/self/fd stand for open files, whatever name they show; /dev/stdout leads there.
+        if folder.starts_with("/proc") {
+            return Ok(Destination::Straight);
+        }
+        hop = folder.join(&name);
+        match fs::symlink_metadata(&hop) {
+            Ok(found) if found.is_symlink() => hop = folder.join(fs::read_link(&hop)?),
+            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
+            _ => return Ok(Destination::Rename { folder, name }),
+        }
+    }
+    Err(io::Error::other("too many symbolic links"))
+}
+
+/// The folder of `path`, free of links, and the name in it.
+fn split(path: &Path) -> io::Result<(PathBuf, OsString)> {
+    let name = path
+        .file_name()
+        .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "it names no file"))?;
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let real = folder.canonicalize().map_err(|e| {
+        if e.kind() == io::ErrorKind::NotFound {
+            let what = format!("there is no folder {}: create it first", folder.display());
+            io::Error::new(e.kind(), what)
+        } else {
+            e
+        }
+    })?;
+    Ok((real, name.to_os_string()))
+}
+
+/// A file that is removed when dropped, unless it was renamed.
+struct Temporary {
+    path: PathBuf,
+    renamed: bool,
+}
+
+impl Temporary {
+    fn create(folder: &Path) -> io::Result<(Self, File)> {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        loop {
+            let n = NEXT.fetch_add(1, Ordering::Relaxed);
+            let path = folder.join(format!(".limitlab-{}-{n}.tmp", std::process::id()));
+            match OpenOptions::new().write(true).create_new(true).open(&path) {
+                // Left by a process of the same number that was killed.
+                Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
+                opened => {
+                    let file = opened?;
+                    let renamed = false;
+                    return Ok((Temporary { path, renamed }, file));
+                }
+            }
+        }
+    }
+
+    fn rename(mut self, target: &Path) -> io::Result<()> {
+        fs::rename(&self.path, target)?;
+        self.renamed = true;
+        Ok(())
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if !self.renamed {
+            // Nothing sensible is left to do if this fails too.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    fn write(path: &Path, text: &str) -> Result<()> {
+        write_file(path, |out| out.write_all(text.as_bytes()))
+    }
+
+    #[test]
+    fn a_file_is_created_and_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        for text in ["one", "two", ""] {
+            write(&path, text).unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), text);
+        }
+        assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn a_failing_fill_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write(&path, "old").unwrap();
+        let error = write_file(&path, |out| {
+            out.write_all(&[b'x'; 3 * BUFFER])?;
+            Err(io::Error::other("out of ideas"))
+        })
+        .unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            format!("{}: cannot write: out of ideas", path.display())
+        );
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+        assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn a_panicking_fill_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        let caught = std::panic::catch_unwind(|| write_file(&path, |_| panic!("on purpose")));
+        assert!(caught.is_err());
+        assert!(names(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn folders_that_are_missing_or_in_the_way_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("no/such/a.txt");
+        let error = write(&missing, "x").unwrap_err().to_string();
+        assert!(error.contains("there is no folder"), "{error}");
+        assert!(error.contains("create it first"), "{error}");
+        let error = write(folder.path(), "x").unwrap_err().to_string();
+        assert!(error.contains("it is a folder"), "{error}");
+        assert!(write(Path::new(""), "x").is_err());
+        assert!(write(Path::new("/"), "x").is_err());
+        assert!(names(folder.path()).is_empty());
+
+        create_dir(missing.parent().unwrap()).unwrap();
+        create_dir(missing.parent().unwrap()).unwrap();
+        write(&missing, "x").unwrap();
+        let error = create_dir(&missing).unwrap_err().to_string();
+        assert!(error.contains("cannot create the folder"), "{error}");
+    }
+
+    #[test]
+    fn a_batch_appears_as_a_whole_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let mut batch = Batch::default();
+        batch.write(&path("a"), |out| out.write_all(b"1")).unwrap();
+        assert!(!path("a").exists());
+        batch
+            .write(&path("b"), |_| Err(io::Error::other("no")))
+            .unwrap_err();
+        drop(batch);
+        assert!(names(folder.path()).is_empty());
+
+        let mut batch = Batch::default();
+        batch.write(&path("a"), |out| out.write_all(b"1")).unwrap();
+        batch.write(&path("b"), |out| out.write_all(b"2")).unwrap();
+        batch.commit().unwrap();
+        assert_eq!(names(folder.path()), ["a", "b"]);
+        assert_eq!(fs::read_to_string(path("b")).unwrap(), "2");
+    }
+
+    #[cfg(unix)]
+    mod unix {
+        use super::*;
+        use std::os::unix::fs::{PermissionsExt, symlink};
+
+        #[test]
+        fn the_mode_is_the_one_of_a_plainly_created_file() {
+            let folder = tempfile::tempdir().unwrap();
+            let [plain, ours] = ["plain", "ours"].map(|name| folder.path().join(name));
+            fs::write(&plain, "x").unwrap();
+            write(&ours, "x").unwrap();
+            let mode = |path| fs::metadata(path).unwrap().permissions().mode();
+            assert_eq!(mode(&ours), mode(&plain));
+        }
+
+        #[test]
+        fn links_are_followed_also_relative_chained_and_dangling_ones() {
+            let folder = tempfile::tempdir().unwrap();
+            let path = |name: &str| folder.path().join(name);
+            fs::create_dir(path("deep")).unwrap();
+            symlink("deep/middle", path("link")).unwrap();
+            symlink("../target", path("deep/middle")).unwrap();
+            for text in ["created through the dangling link", "replaced"] {
+                write(&path("link"), text).unwrap();
+                assert_eq!(fs::read_to_string(path("target")).unwrap(), text);
+            }
+            assert!(path("link").is_symlink() && path("deep/middle").is_symlink());
+            assert!(!path("target").is_symlink());
+            assert_eq!(names(folder.path()), ["deep", "link", "target"]);
+        }
+
+        #[test]
+        fn a_loop_of_links_is_an_error() {
+            let folder = tempfile::tempdir().unwrap();
+            let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
+            symlink(&b, &a).unwrap();
+            symlink(&a, &b).unwrap();
+            let error = write(&a, "x").unwrap_err().to_string();
+            assert!(error.contains("cannot write"), "{error}");
+            assert_eq!(names(folder.path()), ["a", "b"]);
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    mod linux {
+        use super::*;
+
+        #[test]
+        fn a_full_device_is_an_error_and_stays_a_device() {
+            let full = Path::new("/dev/full");
+            let error = write(full, "x").unwrap_err().to_string();
+            assert!(error.starts_with("/dev/full: cannot write: "), "{error}");
+            write(Path::new("/dev/null"), "x").unwrap();
+            assert!(!fs::metadata("/dev/null").unwrap().is_file());
+        }
+
+        #[test]
+        fn an_open_file_named_by_its_number_is_written_in_place() {
+            use std::os::fd::AsRawFd;
+            let folder = tempfile::tempdir().unwrap();
+            let mut file = File::create(folder.path().join("a")).unwrap();
+            file.write_all(b"first, ").unwrap();
+            for place in ["/proc/self/fd", "/dev/fd"] {
+                let path = PathBuf::from(format!("{place}/{}", file.as_raw_fd()));
+                write(&path, "more").unwrap();
+            }
+            assert_eq!(
+                fs::read_to_string(folder.path().join("a")).unwrap(),
+                "first, moremore"
+            );
+        }
+    }
+}

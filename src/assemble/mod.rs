@@ -1,1 +1,13 @@
-//! (room)
+//! From a mesh to its limit system `A V = P`: the schemes as four small functions, one generic assembler into
+//! own compressed sparse rows, proven bounds from valences and face sizes, Matrix Market export.
+//! This room knows no solvers.
+
+pub mod bounds;
+pub mod csr;
+pub mod matrix_market;
+pub mod scheme;
+pub mod system;
+
+pub use csr::Csr;
+pub use scheme::{Masks, Scheme};
+pub use system::LimitSystem;

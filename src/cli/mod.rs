@@ -1,1 +1,232 @@
-//! (room)
+//! What the programs share: flags, MESH names, exit status, progress. This room knows no formulas.
+
+mod input;
+mod progress;
+
+pub use input::{Input, MeshFlags, STAND_IN_NOISE};
+pub use progress::Progress;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+use crate::solvers::Stop;
+
+/// Flags of every program: threads and silence.
+#[derive(Args, Clone, Debug)]
+pub struct CommonFlags {
+    /// Number of threads; all of the machine's unless told
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// No remarks and no progress on standard error
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+impl CommonFlags {
+    /// Sets the number of threads of the whole process.
+    ///
+    /// # Errors
+    /// If the threads cannot be started.
+    pub fn apply(&self) -> Result<()> {
+        let Some(n) = self.threads else {
+            return Ok(());
+        };
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(n.into())
+            .build_global()
+            .map_err(|e| Error::Computation(format!("cannot start {n} threads: {e}")))
+    }
+
+    /// Tells the user something on standard error, unless asked to be quiet.
+    pub fn remark(&self, text: impl std::fmt::Display) {
+        if !self.quiet {
+            eprintln!("{text}");
+        }
+    }
+}
+
+/// When iterations stop.
+#[derive(Args, Clone, Debug)]
+pub struct StopFlags {
+    /// Stop at max_i ‖p_i − (A v)_i‖ ≤ T·L, L the diagonal of the bounding box
+    #[arg(long, value_name = "T", default_value_t = 1e-10, value_parser = positive)]
+    pub tol: f64,
+    /// Stop at max_i ‖p_i − (A v)_i‖ ≤ T, in the units of the mesh
+    #[arg(long, value_name = "T", value_parser = positive, conflicts_with = "tol")]
+    pub tol_absolute: Option<f64>,
+    /// Iterations at most
+    #[arg(long, value_name = "K", default_value_t = 10_000)]
+    pub max_iter: usize,
+}
+
+impl StopFlags {
+    /// The rule for one mesh.
+    pub fn stop(&self, mesh: &Mesh) -> Stop {
+        Stop {
+            tolerance: self.tol_absolute.unwrap_or(self.tol * mesh.diagonal()),
+            max_iterations: self.max_iter,
+        }
+    }
+}
+
+/// Where results go.
+#[derive(Args, Clone, Debug)]
+pub struct OutputFlags {
+    /// Folder for the CSV, Markdown and PNG files
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// Print one JSON object on standard output, and nothing else there
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A `value_parser`: a positive, finite number.
+pub fn positive(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+        _ => Err("a positive number is needed".into()),
+    }
+}
+
+/// A grid `A:B:STEP` with both ends, as a `value_parser`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid(pub Vec<f64>);
+
+/// Points of a grid at most: more is a slip of the step.
+const MOST_POINTS: f64 = 100_000.0;
+
+impl std::str::FromStr for Grid {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let numbers: Vec<f64> = text
+            .split(':')
+            .map(str::parse)
+            .collect::<std::result::Result<_, _>>()
+            .map_err(|_| "a grid is A:B:STEP, three numbers")?;
+        let &[from, to, step] = numbers.as_slice() else {
+            return Err("a grid is A:B:STEP, three numbers".into());
+        };
+        // Both ends belong to the grid, though (b − a)/step may round below a whole number.
+        let steps = ((to - from) / step + 1e-9).floor();
+        if !(step > 0.0 && from <= to && from > 0.0 && steps < MOST_POINTS) {
+            return Err("a grid A:B:STEP needs 0 < A ≤ B, a positive STEP and fewer than 100000 points".into());
+        }
+        // Rounded to what was typed: 0.05 + 15·0.05 is 0.8.
+        Ok(Grid(
+            (0..=steps as usize)
+                .map(|k| ((from + k as f64 * step) * 1e12).round() / 1e12)
+                .collect(),
+        ))
+    }
+}
+
+/// A comma-separated list, as a `value_parser`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct List<T>(pub Vec<T>);
+
+impl<T: std::str::FromStr> std::str::FromStr for List<T>
+where
+    T::Err: std::fmt::Display,
+{
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        text.split(',')
+            .map(|item| item.trim().parse().map_err(|e: T::Err| e.to_string()))
+            .collect::<std::result::Result<_, _>>()
+            .map(List)
+    }
+}
+
+/// Runs a program's body: exit status 0, or 1 with the one line `error: …` on standard error. Bad arguments end
+/// with 2 in clap, before.
+pub fn exit(body: impl FnOnce() -> Result<()>) -> ExitCode {
+    match body() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let line = error.to_string().replace('\n', " ");
+            eprintln!("error: {line}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Prints to standard output. A reader that has gone away is no failure: the rest is not wanted.
+///
+/// # Errors
+/// Any other failure to write.
+pub fn print(text: &str) -> Result<()> {
+    use std::io::{ErrorKind, Write};
+    let mut out = std::io::stdout().lock();
+    match out
+        .write_all(text.as_bytes())
+        .and_then(|()| out.write_all(b"\n"))
+        .and_then(|()| out.flush())
+    {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::io("standard output".as_ref(), "write", e))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Ends a program that took meshes: with `--json` prints the object of one mesh, or `{"results": […]}` of several;
+/// else says where the files are.
+///
+/// # Errors
+/// If standard output cannot be written.
+pub fn finish(mut results: Vec<Value>, output: &OutputFlags, common: &CommonFlags) -> Result<()> {
+    if results.is_empty() {
+        return Ok(());
+    }
+    common.remark(format_args!("tables and plots: {}", output.out.display()));
+    if !output.json {
+        return Ok(());
+    }
+    let object = match results.len() {
+        1 => results.remove(0),
+        _ => json!({ "results": results }),
+    };
+    print(&format!("{object:#}"))
+}
+
+/// A number for JSON: `null` if it is not finite.
+pub fn number(x: f64) -> Value {
+    serde_json::Number::from_f64(x).map_or(Value::Null, Value::Number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_has_both_ends_and_round_numbers() {
+        let grid: Grid = "0.05:1.2:0.05".parse().expect("a grid");
+        assert_eq!(grid.0.len(), 24);
+        assert_eq!((grid.0[0], grid.0[15], grid.0[23]), (0.05, 0.8, 1.2));
+        assert_eq!("0.5:0.5:1".parse::<Grid>().expect("one point").0, [0.5]);
+        for bad in ["", "1", "1:2", "1:2:0", "2:1:0.1", "a:b:c", "0:1:0.1", "1:2:1e-9", "1:nan:1"] {
+            assert!(bad.parse::<Grid>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_list_names_the_item_that_is_wrong() {
+        let list: List<u32> = "3, 4,5".parse().expect("three numbers");
+        assert_eq!(list.0, [3, 4, 5]);
+        assert!("3,x".parse::<List<u32>>().is_err());
+    }
+
+    #[test]
+    fn json_numbers_that_are_not_finite_are_null() {
+        assert_eq!(number(f64::NAN), Value::Null);
+        assert_eq!(number(f64::INFINITY), Value::Null);
+        assert_eq!(number(0.5).to_string(), "0.5");
+    }
+}

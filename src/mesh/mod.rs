@@ -5,8 +5,13 @@ pub mod builtin;
 mod defect;
 mod degenerate;
 pub mod generate;
+pub mod io;
 pub mod noise;
+pub mod obj;
+pub mod off;
 pub mod order;
+pub mod ply;
+mod text;
 pub mod topology;
 pub mod validate;
 

@@ -1,1 +1,36 @@
-//! (room)
+//! Results on paper: tables (CSV, Markdown, JSON), their comparison with committed ones, and PNG plots.
+//!
+//! This room takes plain columns and named series; it calls no solver and knows nothing of how a number came
+//! about. What it writes is the same, byte for byte, for the same input on the same machine.
+//!
+//! - [`table`]: a [`Table`] of typed columns and its three forms;
+//! - [`compare`]: a fresh table held against a committed CSV file, within each column's tolerance;
+//! - [`figure`]: a grid of panels rendered to an [`Image`], drawn three times finer than it is written so that
+//!   every line is anti-aliased;
+//! - [`series`] and [`plot`]: line plots, scatter plots and histograms on linear or logarithmic axes, legend
+//!   beside the data;
+//! - [`sparsity`]: the pattern of a sparse matrix;
+//! - [`png`]: images and their files;
+//! - [`index`]: the page that lists what a folder of reports holds.
+
+mod axis;
+mod canvas;
+pub mod compare;
+pub mod figure;
+pub mod index;
+mod number;
+pub mod plot;
+pub mod png;
+pub mod series;
+pub mod sparsity;
+pub mod table;
+
+pub use axis::Scale;
+pub use canvas::{Colour, Dash, Marker};
+pub use compare::compare;
+pub use figure::{Figure, Panel};
+pub use plot::LinePlot;
+pub use png::Image;
+pub use series::Series;
+pub use sparsity::SparsityPlot;
+pub use table::{Cell, Column, Table};

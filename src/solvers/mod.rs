@@ -1,1 +1,18 @@
-//! (room)
+//! Methods for `A V = P`, one file each, behind one interface: a [`System`] in, control points and a
+//! [`Report`] with the whole history out. This room knows no meshes and no schemes.
+
+pub mod chebyshev;
+pub mod conjugate_gradient;
+pub mod direct;
+pub mod gauss_seidel;
+pub mod incomplete_cholesky;
+pub mod iteration;
+pub mod jacobi;
+pub mod method;
+pub mod pia;
+pub mod ssor;
+pub mod system;
+
+pub use iteration::{Errors, Iterate, Outcome, Report, Step, Stop, solve};
+pub use method::{Method, Setup, Solution, run, run_watched};
+pub use system::System;

@@ -1,1 +1,132 @@
-//! (room)
+//! Subdivision schemes, one file each: the refinement step, and where there are any the limit and tangent masks
+//! of one vertex star. This room knows nothing of global systems: it is what their rows are held against.
+//!
+//! | file | scheme | faces | keeps its vertices |
+//! |---|---|---|---|
+//! | [`catmull_clark`] | Catmull & Clark 1978 | any polygons, quads after a step | no |
+//! | [`loop_scheme`] | Loop 1987 | triangles | no |
+//! | [`doo_sabin`] | Doo & Sabin 1978, and the first step of Zheng & Cai 2005 | any polygons | no |
+//! | [`sqrt3`] | Kobbelt 2000 | triangles | no |
+//! | [`unified_sqrt3`] | Lin & Luo, α per vertex | triangles | where α = 1 |
+//! | [`butterfly`] | modified Butterfly, Zorin, Schröder & Sweldens 1996 | triangles | yes |
+//!
+//! Labsik & Greiner's interpolatory √3 (2000) is missing: its regular mask, (32, −1, −2)/81 on 12 points, follows
+//! from the reproduction of cubics, but its weights at extraordinary vertices could not be established.
+//!
+//! Meshes are closed: an open one is refused with an [`Error::Mesh`]. A step takes time and memory
+//! proportional to the mesh, with flat arrays only: contributions are scattered to the new points in one pass
+//! over the faces, and new faces come from index arithmetic on half-edges.
+//!
+//! ```
+//! use limitlab::mesh::{Faces, Mesh};
+//! use limitlab::subdivide::Refinement;
+//! let points = [[1., 1., 1.], [-1., -1., 1.], [-1., 1., -1.], [1., -1., -1.]];
+//! let faces = Faces::from_lists([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]);
+//! let tetrahedron = Mesh::new(points.map(Into::into).to_vec(), faces);
+//! let scheme: Refinement = "loop".parse()?;
+//! let refined = scheme.refine_n(&tetrahedron, 2)?;
+//! assert_eq!((refined.len(), refined.faces.len()), (34, 64));
+//! # Ok::<(), limitlab::Error>(())
+//! ```
+
+pub mod butterfly;
+pub mod catmull_clark;
+pub mod doo_sabin;
+pub mod loop_scheme;
+pub mod sqrt3;
+mod star;
+pub mod unified_sqrt3;
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::mesh::{Mesh, Topology};
+use crate::{Error, Result};
+
+pub use star::Tangents;
+
+/// A stationary refinement that needs nothing but the mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Refinement {
+    CatmullClark,
+    Loop,
+    DooSabin,
+    Sqrt3,
+    Butterfly,
+}
+
+impl Refinement {
+    /// All of them, in the order in which messages list them.
+    pub const ALL: [Refinement; 5] = [
+        Refinement::CatmullClark,
+        Refinement::Loop,
+        Refinement::DooSabin,
+        Refinement::Sqrt3,
+        Refinement::Butterfly,
+    ];
+
+    /// The name on the command line, which `parse` reads back.
+    pub fn name(self) -> &'static str {
+        match self {
+            Refinement::CatmullClark => "catmull-clark",
+            Refinement::Loop => "loop",
+            Refinement::DooSabin => "doo-sabin",
+            Refinement::Sqrt3 => "sqrt3",
+            Refinement::Butterfly => "butterfly",
+        }
+    }
+
+    /// One step. The scheme's own `refine` says how the result is numbered and what it refuses.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] for a mesh that is not a closed manifold or, where the scheme needs triangles, has
+    /// another face.
+    ///
+    /// # Panics
+    /// If `topology` is not that of `mesh`.
+    pub fn refine(self, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
+        match self {
+            Refinement::CatmullClark => catmull_clark::refine(mesh, topology),
+            Refinement::Loop => loop_scheme::refine(mesh, topology),
+            Refinement::DooSabin => doo_sabin::refine(mesh, topology),
+            Refinement::Sqrt3 => sqrt3::refine(mesh, topology),
+            Refinement::Butterfly => butterfly::refine(mesh, topology),
+        }
+    }
+
+    /// `levels` steps, with the topology of each level found anew; none gives a copy.
+    ///
+    /// # Errors
+    /// As [`refine`](Self::refine).
+    ///
+    /// # Panics
+    /// If a face names a vertex that is not there (the validator reports such faces before).
+    pub fn refine_n(self, mesh: &Mesh, levels: usize) -> Result<Mesh> {
+        let mut refined = mesh.clone();
+        for _ in 0..levels {
+            let topology = Topology::new(&refined.faces, refined.len());
+            refined = self.refine(&refined, &topology)?;
+        }
+        Ok(refined)
+    }
+}
+
+impl fmt::Display for Refinement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Refinement {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let found = Refinement::ALL.into_iter().find(|r| r.name() == name);
+        found.ok_or_else(|| {
+            let known = Refinement::ALL.map(Refinement::name).join(", ");
+            Error::Unknown(format!(
+                "unknown refinement {name:?}: choose one of {known}"
+            ))
+        })
+    }
+}

@@ -1,0 +1,136 @@
+//! ω sweeps: iterations and rates over a grid of ω, with the predicted spectral radius beside them.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::predict::predicted_rate;
+use super::rate::observed_rate;
+use super::spectrum::{Extremes, Operator, Spectrum, excited, spectrum};
+use crate::assemble::LimitSystem;
+use crate::error::Result;
+use crate::solvers::{Errors, Method, Outcome, Setup, Stop, run};
+
+/// A method at one ω.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    pub method: Method,
+    pub omega: f64,
+    pub outcome: Outcome,
+    pub iterations: usize,
+    /// The spectral radius of the error matrix.
+    pub predicted_rho: f64,
+    /// The same over the eigenvectors that the data excite; for relaxations whose spectrum is real.
+    pub predicted_rho_data: Option<f64>,
+    /// The factor per iteration fitted to the history's tail.
+    pub observed_rate: Option<f64>,
+    /// The last iterate's errors.
+    pub errors: Errors,
+}
+
+/// The thresholds of one relaxation: of the matrix (for every start) and of the data (for V₀ = P).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thresholds {
+    pub method: Method,
+    pub matrix: Extremes,
+    pub data: Option<Extremes>,
+}
+
+/// A sweep's result on one system.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sweep {
+    pub spectrum: Spectrum,
+    pub thresholds: Vec<Thresholds>,
+    pub rows: Vec<Row>,
+}
+
+impl Sweep {
+    /// The ω with the fewest iterations among the converged rows of `method`, ties by smaller final error.
+    pub fn best(&self, method: Method) -> Option<&Row> {
+        self.rows
+            .iter()
+            .filter(|r| r.method == method && r.outcome == Outcome::Converged)
+            .min_by(|a, b| {
+                (a.iterations, a.errors.max)
+                    .partial_cmp(&(b.iterations, b.errors.max))
+                    .unwrap_or(std::cmp::Ordering::Equal)
+            })
+    }
+}
+
+/// Rounding level of the errors of points of size `diagonal`: histories are not fitted below.
+pub fn rounding_floor(diagonal: f64) -> f64 {
+    64.0 * f64::EPSILON * diagonal
+}
+
+/// Runs every method at every ω of its grid, in parallel over the grid.
+///
+/// `grids` pairs a method (Jacobi, PIA or SOR) with its values of ω; `order` is the vertex order of SOR;
+/// `floor` the rounding level of the errors; `done` is called after each run.
+///
+/// # Errors
+/// If an eigenvalue computation does not converge.
+///
+/// # Panics
+/// If a method has no ω, or there is not one point a vertex.
+pub fn sweep(
+    system: &LimitSystem,
+    points: &[DVec3],
+    grids: &[(Method, Vec<f64>)],
+    order: Option<&[u32]>,
+    stop: &Stop,
+    floor: f64,
+    done: &(dyn Fn() + Sync),
+) -> Result<Sweep> {
+    let spectrum = spectrum(system)?;
+    let mut thresholds = Vec::new();
+    for (method, _) in grids {
+        let (operator, matrix) = match method {
+            Method::Jacobi => (Operator::Jacobi, spectrum.jacobi),
+            Method::Pia => (Operator::A, spectrum.a),
+            _ => continue,
+        };
+        thresholds.push(Thresholds {
+            method: *method,
+            matrix,
+            data: excited(system, points, operator)?,
+        });
+    }
+    let jobs: Vec<(Method, f64)> = grids
+        .iter()
+        .flat_map(|(method, omegas)| omegas.iter().map(|&omega| (*method, omega)))
+        .collect();
+    let rows: Result<Vec<Row>> = jobs
+        .par_iter()
+        .map(|&(method, omega)| {
+            let setup = match method {
+                Method::Jacobi => Setup::Jacobi { omega },
+                Method::Pia => Setup::Pia { omega },
+                Method::Sor => Setup::Sor { omega, order },
+                other => panic!("{other} is not swept over ω"),
+            };
+            let report = run(system, points, setup, stop).report;
+            let predicted = predicted_rate(system, &spectrum, setup)?;
+            let maxima: Vec<f64> = report.history.iter().map(|e| e.max).collect();
+            let data = thresholds
+                .iter()
+                .find(|t| t.method == method)
+                .and_then(|t| t.data);
+            done();
+            Ok(Row {
+                method,
+                omega,
+                outcome: report.outcome,
+                iterations: report.iterations,
+                predicted_rho: predicted.unwrap_or(f64::NAN),
+                predicted_rho_data: data.map(|d| d.radius(omega)),
+                observed_rate: observed_rate(&maxima, floor),
+                errors: report.last(),
+            })
+        })
+        .collect();
+    Ok(Sweep {
+        spectrum,
+        thresholds,
+        rows: rows?,
+    })
+}

@@ -1,0 +1,176 @@
+//! Compressed sparse rows with 32-bit indices.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+/// Which entries of a square matrix are stored: row `i` holds `columns[offsets[i]..offsets[i + 1]]`, ascending
+/// and without repetition.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pattern {
+    offsets: Vec<u32>,
+    columns: Vec<u32>,
+}
+
+impl Pattern {
+    /// # Panics
+    /// If the arrays do not describe a square matrix with ascending columns in every row.
+    pub fn new(offsets: Vec<u32>, columns: Vec<u32>) -> Self {
+        assert!(
+            offsets.first() == Some(&0) && offsets.is_sorted(),
+            "row offsets ascend from 0"
+        );
+        assert!(
+            offsets.last().map(|&l| l as usize) == Some(columns.len()),
+            "row offsets end at the number of entries"
+        );
+        let n = offsets.len() - 1;
+        let pattern = Pattern { offsets, columns };
+        for i in 0..n {
+            let row = pattern.row(i);
+            assert!(
+                row.is_sorted_by(|a, b| a < b) && row.last().is_none_or(|&c| (c as usize) < n),
+                "the columns of row {i} ascend within the matrix"
+            );
+        }
+        pattern
+    }
+
+    pub fn len(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    pub fn range(&self, i: usize) -> std::ops::Range<usize> {
+        self.offsets[i] as usize..self.offsets[i + 1] as usize
+    }
+
+    pub fn row(&self, i: usize) -> &[u32] {
+        &self.columns[self.range(i)]
+    }
+
+    pub fn offsets(&self) -> &[u32] {
+        &self.offsets
+    }
+
+    pub fn columns(&self) -> &[u32] {
+        &self.columns
+    }
+
+    /// The largest |i − j| of a stored entry.
+    pub fn bandwidth(&self) -> usize {
+        (0..self.len())
+            .flat_map(|i| self.row(i).iter().map(move |&j| i.abs_diff(j as usize)))
+            .max()
+            .unwrap_or(0)
+    }
+}
+
+/// A square sparse matrix of doubles. Matrices of one structure (A and M of a system) share their [`Pattern`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Csr {
+    pattern: Arc<Pattern>,
+    values: Vec<f64>,
+}
+
+impl Csr {
+    /// # Panics
+    /// If there is not one value for every stored entry.
+    pub fn new(pattern: Arc<Pattern>, values: Vec<f64>) -> Self {
+        assert_eq!(
+            pattern.columns.len(),
+            values.len(),
+            "one value for every entry"
+        );
+        Csr { pattern, values }
+    }
+
+    /// The number of rows N.
+    pub fn len(&self) -> usize {
+        self.pattern.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.pattern.is_empty()
+    }
+
+    pub fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    pub fn row_values(&self, i: usize) -> &[f64] {
+        &self.values[self.pattern.range(i)]
+    }
+
+    /// The stored entries of row `i` as (column, value).
+    pub fn row(&self, i: usize) -> impl ExactSizeIterator<Item = (usize, f64)> + '_ {
+        let range = self.pattern.range(i);
+        self.pattern.columns[range.clone()]
+            .iter()
+            .zip(&self.values[range])
+            .map(|(&j, &a)| (j as usize, a))
+    }
+
+    /// The entry (i, j); 0 where none is stored. O(log of the row's length).
+    pub fn get(&self, i: usize, j: usize) -> f64 {
+        let range = self.pattern.range(i);
+        match self.pattern.row(i).binary_search(&(j as u32)) {
+            Ok(k) => self.values[range.start + k],
+            Err(_) => 0.0,
+        }
+    }
+
+    /// The main diagonal.
+    pub fn diagonal(&self) -> Vec<f64> {
+        (0..self.len()).map(|i| self.get(i, i)).collect()
+    }
+
+    /// `diag(scale) · self`, on the same pattern.
+    ///
+    /// # Panics
+    /// If `scale` does not hold one number a row.
+    pub fn scale_rows(&self, scale: &[f64]) -> Csr {
+        assert_eq!(scale.len(), self.len(), "one factor a row");
+        let mut values = Vec::with_capacity(self.values.len());
+        for (i, &s) in scale.iter().enumerate() {
+            values.extend(self.row_values(i).iter().map(|&v| s * v));
+        }
+        Csr {
+            pattern: Arc::clone(&self.pattern),
+            values,
+        }
+    }
+
+    /// Row `i` times the points `x`: Σ_j a_ij x_j.
+    #[inline]
+    pub fn row_times(&self, i: usize, x: &[DVec3]) -> DVec3 {
+        let range = self.pattern.range(i);
+        let mut sum = DVec3::ZERO;
+        for (&j, &a) in self.pattern.columns[range.clone()]
+            .iter()
+            .zip(&self.values[range])
+        {
+            sum += a * x[j as usize];
+        }
+        sum
+    }
+
+    /// Row `i` times the numbers `x`.
+    #[inline]
+    pub fn row_times_scalar(&self, i: usize, x: &[f64]) -> f64 {
+        let range = self.pattern.range(i);
+        let columns = &self.pattern.columns[range.clone()];
+        columns
+            .iter()
+            .zip(&self.values[range])
+            .map(|(&j, &a)| a * x[j as usize])
+            .sum()
+    }
+}

@@ -1,0 +1,57 @@
+//! Matrix Market export: coordinate format for sparse matrices, array format for vectors and points.
+
+use std::io::{self, Write};
+
+use glam::DVec3;
+
+use super::csr::Csr;
+
+/// Writes `matrix` as `matrix coordinate real general`, entries by rows, 17 significant digits.
+pub fn write_general(matrix: &Csr, out: &mut dyn Write) -> io::Result<()> {
+    let n = matrix.len();
+    writeln!(out, "%%MatrixMarket matrix coordinate real general")?;
+    writeln!(out, "{n} {n} {}", matrix.values().len())?;
+    for i in 0..n {
+        for (j, a) in matrix.row(i) {
+            writeln!(out, "{} {} {a:.16e}", i + 1, j + 1)?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes the lower triangle of the symmetric `matrix` as `matrix coordinate real symmetric`.
+pub fn write_symmetric(matrix: &Csr, out: &mut dyn Write) -> io::Result<()> {
+    let n = matrix.len();
+    let lower = |i: usize| matrix.row(i).take_while(move |&(j, _)| j <= i);
+    let entries: usize = (0..n).map(|i| lower(i).count()).sum();
+    writeln!(out, "%%MatrixMarket matrix coordinate real symmetric")?;
+    writeln!(out, "{n} {n} {entries}")?;
+    for i in 0..n {
+        for (j, a) in lower(i) {
+            writeln!(out, "{} {} {a:.16e}", i + 1, j + 1)?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes `values` as an N×1 `matrix array real general`.
+pub fn write_vector(values: &[f64], out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "%%MatrixMarket matrix array real general")?;
+    writeln!(out, "{} 1", values.len())?;
+    for v in values {
+        writeln!(out, "{v:.16e}")?;
+    }
+    Ok(())
+}
+
+/// Writes `points` as an N×3 `matrix array real general`, column by column.
+pub fn write_points(points: &[DVec3], out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "%%MatrixMarket matrix array real general")?;
+    writeln!(out, "{} 3", points.len())?;
+    for axis in 0..3 {
+        for p in points {
+            writeln!(out, "{:.16e}", p[axis])?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,280 @@
+//! Mesh files by their extension: what reading gives, and the parts that the formats share.
+//!
+//! The readers refuse what is not their format, with the line. They do not judge the mesh: indices beyond the last
+//! vertex, coordinates that are not finite, and so on, are for [`validate`](super::validate) to collect.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::{Faces, Mesh, obj, off, ply};
+use crate::output::write_file;
+use crate::{Error, Result};
+
+/// A mesh with what its file tells about it.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The path as it was given.
+    pub name: String,
+    pub mesh: Mesh,
+    /// Where each vertex and face stands; `None` for binary files.
+    pub lines: Option<Lines>,
+    /// One normal a vertex, as in the file: not checked, not normalised. OFF and PLY only.
+    pub normals: Option<Vec<DVec3>>,
+    /// What a user should know, a sentence each: above all what the file holds and the mesh does not keep.
+    pub remarks: Vec<String>,
+}
+
+/// The 1-based line of each vertex and of each face; lines beyond 2³² − 1 are given as that number.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Lines {
+    pub vertices: Vec<u32>,
+    pub faces: Vec<u32>,
+}
+
+#[derive(Clone, Copy)]
+enum Format {
+    Obj,
+    Off,
+    Ply,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self> {
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        match extension.to_ascii_lowercase().as_str() {
+            "obj" => Ok(Format::Obj),
+            "off" => Ok(Format::Off),
+            "ply" => Ok(Format::Ply),
+            _ => Err(Error::parse(
+                path,
+                None,
+                "not a known mesh format: the name must end in .obj, .off or .ply",
+            )),
+        }
+    }
+}
+
+/// Checks early that a file of this name can be written as a mesh.
+///
+/// # Errors
+/// [`Error::Parse`] for an unknown extension.
+pub fn check_name(path: &Path) -> Result<()> {
+    Format::of(path).map(|_| ())
+}
+
+/// Reads a mesh file, whose extension (`.obj`, `.off` or `.ply` in any case) names its format.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read; [`Error::Parse`], with the line where there is one, if it is not what
+/// its format says.
+pub fn read(path: &Path) -> Result<Loaded> {
+    let format = Format::of(path)?;
+    let bytes = fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    match format {
+        Format::Obj => obj::read_bytes(&bytes, path),
+        Format::Off => off::read_bytes(&bytes, path),
+        Format::Ply => ply::read_bytes(&bytes, path),
+    }
+}
+
+/// Writes a mesh file, with `normals` (one a vertex) if given, in the format that the extension names. All doubles
+/// read back equal. The file appears as a whole or not at all ([`write_file`]).
+///
+/// # Errors
+/// [`Error::Parse`] for an unknown extension, [`Error::Io`] if the file cannot be written.
+///
+/// # Panics
+/// If there are not as many normals as vertices.
+pub fn write(path: &Path, mesh: &Mesh, normals: Option<&[DVec3]>) -> Result<()> {
+    let format = Format::of(path)?;
+    write_file(path, |out| match format {
+        Format::Obj => obj::write_to(out, mesh, normals),
+        Format::Off => off::write_to(out, mesh, normals),
+        Format::Ply => ply::write_to(out, mesh, normals),
+    })
+}
+
+pub(super) fn check_normals(mesh: &Mesh, normals: Option<&[DVec3]>) {
+    assert!(
+        normals.is_none_or(|n| n.len() == mesh.len()),
+        "one normal for each vertex"
+    );
+}
+
+/// Writes `rows` lines, each filled by `push` into an empty buffer.
+pub(super) fn write_rows(
+    out: &mut dyn Write,
+    rows: usize,
+    mut push: impl FnMut(&mut Vec<u8>, usize) -> io::Result<()>,
+) -> io::Result<()> {
+    let mut text = Vec::new();
+    for row in 0..rows {
+        text.clear();
+        push(&mut text, row)?;
+        text.push(b'\n');
+        out.write_all(&text)?;
+    }
+    Ok(())
+}
+
+/// A mesh while it is read, within the limits of 32-bit indices. What is refused is said without the place, which
+/// the reader knows.
+pub(super) struct Builder {
+    positions: Vec<DVec3>,
+    offsets: Vec<u32>,
+    corners: Vec<u32>,
+    lines: Option<Lines>,
+}
+
+impl Builder {
+    /// `lines` is empty, or `None` where they are not kept.
+    pub fn new(lines: Option<Lines>) -> Self {
+        Builder {
+            positions: Vec::new(),
+            offsets: vec![0],
+            corners: Vec::new(),
+            lines,
+        }
+    }
+
+    /// Makes room for the vertices that a header announces, at most as many as the file can still hold, so that an
+    /// absurd count asks for no memory.
+    pub fn reserve_vertices(&mut self, count: u64, at_most: usize) {
+        let count = capped(count, at_most);
+        self.positions.reserve(count);
+        if let Some(lines) = &mut self.lines {
+            lines.vertices.reserve(count);
+        }
+    }
+
+    /// The same for faces.
+    pub fn reserve_faces(&mut self, count: u64, at_most: usize) {
+        let count = capped(count, at_most);
+        self.offsets.reserve(count);
+        self.corners.reserve(3 * count);
+        if let Some(lines) = &mut self.lines {
+            lines.faces.reserve(count);
+        }
+    }
+
+    pub fn vertices(&self) -> usize {
+        self.positions.len()
+    }
+
+    pub fn faces(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    pub fn vertex(&mut self, position: DVec3, line: usize) -> std::result::Result<(), String> {
+        if self.positions.len() == u32::MAX as usize {
+            return Err("more vertices than 32-bit indices can name".into());
+        }
+        self.positions.push(position);
+        if let Some(lines) = &mut self.lines {
+            lines.vertices.push(saturate(line));
+        }
+        Ok(())
+    }
+
+    /// Adds a corner to the face that the next [`end_face`](Self::end_face) closes.
+    pub fn corner(&mut self, vertex: u32) {
+        self.corners.push(vertex);
+    }
+
+    pub fn end_face(&mut self, line: usize) -> std::result::Result<(), String> {
+        let size = self.corners.len() - self.offsets[self.faces()] as usize;
+        if size < 3 {
+            let face = self.faces();
+            let s = if size == 1 { "" } else { "s" };
+            return Err(format!(
+                "face {face} has {size} corner{s}, a face needs at least 3: remove it"
+            ));
+        }
+        let Ok(end) = u32::try_from(self.corners.len()) else {
+            return Err("more face corners than 32-bit indices can name".into());
+        };
+        self.offsets.push(end);
+        if let Some(lines) = &mut self.lines {
+            lines.faces.push(saturate(line));
+        }
+        Ok(())
+    }
+
+    pub fn finish(self, path: &Path, normals: Option<Vec<DVec3>>, remarks: Vec<String>) -> Loaded {
+        Loaded {
+            name: path.display().to_string(),
+            mesh: Mesh::new(
+                self.positions,
+                Faces::from_parts(self.offsets, self.corners),
+            ),
+            lines: self.lines,
+            normals,
+            remarks,
+        }
+    }
+}
+
+fn capped(count: u64, at_most: usize) -> usize {
+    usize::try_from(count).unwrap_or(usize::MAX).min(at_most)
+}
+
+fn saturate(line: usize) -> u32 {
+    u32::try_from(line).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formats_are_known_by_extension() {
+        let folder = tempfile::tempdir().unwrap();
+        let mesh = Mesh::new(
+            vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            Faces::from_lists([[0, 1, 2]]),
+        );
+        for name in ["a.obj", "a.OFF", "a.Ply"] {
+            let path = folder.path().join(name);
+            write(&path, &mesh, None).unwrap();
+            let loaded = read(&path).unwrap();
+            assert_eq!(loaded.mesh, mesh);
+            assert_eq!(loaded.name, path.display().to_string());
+            assert!(loaded.remarks.is_empty(), "{:?}", loaded.remarks);
+        }
+        for name in ["a.stl", "obj", ".off", ""] {
+            let path = folder.path().join(name);
+            for error in [write(&path, &mesh, None).err(), read(&path).err()] {
+                let text = error.unwrap().to_string();
+                assert!(text.ends_with("must end in .obj, .off or .ply"), "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn missing_files_and_folders_are_errors_of_the_system() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.off");
+        let text = read(&path).unwrap_err().to_string();
+        assert!(text.contains("a.off: cannot read: "), "{text}");
+        fs::create_dir(&path).unwrap();
+        assert!(matches!(read(&path), Err(Error::Io { .. })));
+    }
+
+    #[test]
+    fn room_is_bounded_by_the_bytes_that_are_there() {
+        let mut builder = Builder::new(Some(Lines::default()));
+        builder.reserve_vertices(u64::MAX, 100);
+        builder.reserve_faces(u64::MAX, 100);
+        assert!(builder.positions.capacity() < 1000);
+        assert!(builder.corners.capacity() < 1000);
+    }
+
+    #[test]
+    #[should_panic(expected = "one normal for each vertex")]
+    fn normals_must_match_the_vertices() {
+        check_normals(&Mesh::new(vec![DVec3::X], Faces::default()), Some(&[]));
+    }
+}

@@ -1,0 +1,404 @@
+//! Wavefront OBJ: `v` and `f` in file order, so that a control mesh can replace its input vertex for vertex.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::Mesh;
+use super::io::{Builder, Lines, Loaded, check_normals, write_rows};
+use super::text::{Scanner, leading_digits, push_point, push_unsigned};
+use crate::{Error, Result};
+
+/// Statements that are read over, by what they are about.
+const DROPPED: [(&str, &[&[u8]]); 8] = [
+    ("texture coordinates (vt)", &[b"vt"]),
+    ("normals (vn)", &[b"vn"]),
+    ("group names (g, o)", &[b"g", b"o"]),
+    ("smoothing groups (s)", &[b"s"]),
+    (
+        "material statements",
+        &[b"usemtl", b"mtllib", b"usemap", b"maplib"],
+    ),
+    ("lines (l)", &[b"l"]),
+    ("points (p)", &[b"p"]),
+    (
+        "free-form and display statements",
+        &[
+            b"vp",
+            b"cstype",
+            b"deg",
+            b"bmat",
+            b"step",
+            b"curv",
+            b"curv2",
+            b"surf",
+            b"parm",
+            b"trim",
+            b"hole",
+            b"scrv",
+            b"sp",
+            b"end",
+            b"con",
+            b"mg",
+            b"bevel",
+            b"c_interp",
+            b"d_interp",
+            b"lod",
+            b"shadow_obj",
+            b"trace_obj",
+            b"ctech",
+            b"stech",
+        ],
+    ),
+];
+
+/// Reads the bytes of an OBJ file; `path` is for messages.
+///
+/// Corners may be `v`, `v/vt`, `v//vn`, `v/vt/vn`, and negative to count back from the last vertex read so far; a
+/// backslash continues a line. One remark names with counts what the mesh does not keep: all other statements,
+/// weights and colours after coordinates. Another tells if the last line has no end, for an OBJ file announces no
+/// counts by which a cut could be noticed.
+///
+/// # Errors
+/// [`Error::Parse`] with the line: a coordinate that is no number, a corner that is none or that reaches before the
+/// first vertex, a face of fewer than three corners; a file without any vertex.
+///
+/// ```
+/// use limitlab::mesh::obj::read_bytes;
+/// let loaded = read_bytes(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -1\n", "a.obj".as_ref())?;
+/// assert_eq!(loaded.mesh.faces.face(0), [0, 1, 2]);
+/// assert_eq!(loaded.lines.unwrap().faces, [4]);
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
+    let mut s = Scanner::new(bytes, path);
+    let mut builder = Builder::new(Some(Lines::default()));
+    let mut dropped = [0usize; DROPPED.len()];
+    let mut extended_vertices = 0;
+    let mut unknown: Option<(usize, Error)> = None;
+    loop {
+        s.skip_space();
+        skip_blanks(&mut s);
+        if s.at_end() {
+            break;
+        }
+        if s.at_line_end() {
+            continue;
+        }
+        let line = s.line();
+        let at = |what| Error::parse(path, Some(line), what);
+        match s.peek_token() {
+            b"v" => {
+                s.advance(1);
+                let vertex = builder.vertices();
+                let position = coordinates(&mut s, vertex)?;
+                extended_vertices += usize::from(has_more_numbers(&mut s, vertex)?);
+                builder.vertex(position, line).map_err(at)?;
+            }
+            b"f" => {
+                s.advance(1);
+                loop {
+                    skip_blanks(&mut s);
+                    if s.at_line_end() {
+                        break;
+                    }
+                    builder.corner(corner(&mut s, &builder)?);
+                }
+                builder.end_face(line).map_err(at)?;
+            }
+            keyword => {
+                match DROPPED
+                    .iter()
+                    .position(|(_, words)| words.contains(&keyword))
+                {
+                    Some(kind) => dropped[kind] += 1,
+                    None => match &mut unknown {
+                        Some((count, _)) => *count += 1,
+                        None => unknown = Some((1, s.unexpected("an OBJ statement"))),
+                    },
+                }
+                skip_statement(&mut s);
+            }
+        }
+    }
+    if builder.vertices() == 0 {
+        let (_, none) = unknown.unwrap_or_else(|| (0, s.unexpected("a vertex (v x y z)")));
+        return Err(none);
+    }
+
+    let mut not_kept: Vec<String> = DROPPED
+        .iter()
+        .zip(dropped)
+        .filter(|&(_, count)| count > 0)
+        .map(|((what, _), count)| format!("{count} {what}"))
+        .collect();
+    if extended_vertices > 0 {
+        not_kept.push(format!(
+            "weights or colours of {extended_vertices} vertices"
+        ));
+    }
+    let mut remarks = Vec::new();
+    if !not_kept.is_empty() {
+        remarks.push(format!("not kept: {}", not_kept.join(", ")));
+    }
+    if let Some((count, first)) = unknown {
+        remarks.push(format!(
+            "{count} unknown statements passed over, the first at {first}"
+        ));
+    }
+    if s.ends_within_a_line() {
+        remarks.push("the last line has no end: was the file cut off?".into());
+    }
+    Ok(builder.finish(path, None, remarks))
+}
+
+/// Skips blanks, over line ends that a backslash continues.
+fn skip_blanks(s: &mut Scanner) {
+    s.skip_blanks();
+    while let [b'\\', b'\n' | b'\r', ..] = s.rest() {
+        s.advance(1);
+        s.skip_line_break();
+        s.skip_blanks();
+    }
+}
+
+fn skip_statement(s: &mut Scanner) {
+    loop {
+        let start = s.rest();
+        s.skip_to_line_end();
+        let line = &start[..start.len() - s.rest().len()];
+        s.skip_line_break();
+        if line.last() != Some(&b'\\') {
+            return;
+        }
+    }
+}
+
+fn coordinates(s: &mut Scanner, vertex: usize) -> Result<DVec3> {
+    let mut position = DVec3::ZERO;
+    for axis in 0..3 {
+        skip_blanks(s);
+        position[axis] = s.number().ok_or_else(|| {
+            let name = ["x", "y", "z"][axis];
+            s.unexpected(format_args!("coordinate {name} of vertex {vertex}"))
+        })?;
+    }
+    Ok(position)
+}
+
+/// Passes over the numbers after the coordinates of a vertex.
+fn has_more_numbers(s: &mut Scanner, vertex: usize) -> Result<bool> {
+    let mut found = false;
+    loop {
+        skip_blanks(s);
+        if s.at_line_end() {
+            return Ok(found);
+        }
+        s.number()
+            .ok_or_else(|| s.unexpected(format_args!("a weight or colour of vertex {vertex}")))?;
+        found = true;
+    }
+}
+
+/// One corner of the face being read, as the vertex it names.
+fn corner(s: &mut Scanner, builder: &Builder) -> Result<u32> {
+    let token = s.peek_token();
+    let refuse = || {
+        let face = builder.faces();
+        s.unexpected(format_args!(
+            "a corner of face {face} (v, v/vt, v//vn or v/vt/vn, counted from 1 or back from -1)"
+        ))
+    };
+    let negative = token.first() == Some(&b'-');
+    let digits = &token[usize::from(negative)..];
+    let (number, length) = leading_digits(digits).ok_or_else(refuse)?;
+    let references = &digits[length..];
+    let plain = references.is_empty()
+        || references[0] == b'/'
+            && references
+                .iter()
+                .all(|b| matches!(b, b'0'..=b'9' | b'/' | b'-'));
+    if number == 0 || !plain {
+        return Err(refuse());
+    }
+    let vertex = if negative {
+        (builder.vertices() as u64).checked_sub(number).ok_or_else(|| {
+            s.error(format!(
+                "corner -{number} of face {} reaches before the first of the {} vertices read so far",
+                builder.faces(),
+                builder.vertices()
+            ))
+        })?
+    } else {
+        number - 1
+    };
+    let vertex = u32::try_from(vertex).map_err(|_| refuse())?;
+    s.advance(token.len());
+    Ok(vertex)
+}
+
+/// Writes `mesh` as OBJ: `v` lines, `vn` lines if there are `normals` (one a vertex), `f` lines.
+///
+/// # Panics
+/// If there are not as many normals as vertices.
+pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<()> {
+    check_normals(mesh, normals);
+    write_rows(out, mesh.len(), |text, v| {
+        text.extend_from_slice(b"v ");
+        push_point(text, mesh.positions[v])
+    })?;
+    if let Some(normals) = normals {
+        write_rows(out, normals.len(), |text, v| {
+            text.extend_from_slice(b"vn ");
+            push_point(text, normals[v])
+        })?;
+    }
+    write_rows(out, mesh.faces.len(), |text, f| {
+        text.push(b'f');
+        for &v in mesh.faces.face(f) {
+            let number = u64::from(v) + 1;
+            text.push(b' ');
+            push_unsigned(text, number);
+            if normals.is_some() {
+                text.extend_from_slice(b"//");
+                push_unsigned(text, number);
+            }
+        }
+        Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Loaded> {
+        read_bytes(text.as_bytes(), Path::new("a.obj"))
+    }
+
+    fn refusal(text: &str) -> String {
+        parse(text).unwrap_err().to_string()
+    }
+
+    const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+
+    #[test]
+    fn forms_of_corners_line_ends_comments_and_continued_lines() {
+        let text = "# \u{e9}t\u{e9} \\\nv\t0 0 \\\r\n 0 # first\r\n\r\nv 1. .5 -1e-3\rv +2 0 0\nv 3 0 0\n\
+                    \tf 1 2/7 3//8\nf 1/1/1 -3/-1/-1 -2//-1 4 # all\nf 1 2\\\n3\n\\\n\\\nv 4 0 0\nf -1 1 2\n\\\n\n\\\n# x";
+        let loaded = parse(text).unwrap();
+        let faces: Vec<_> = loaded.mesh.faces.iter().collect();
+        assert_eq!(
+            faces,
+            [&[0, 1, 2][..], &[0, 1, 2, 3], &[0, 1, 2], &[4, 0, 1]]
+        );
+        assert_eq!(loaded.mesh.positions[1], DVec3::new(1.0, 0.5, -1e-3));
+        let lines = loaded.lines.unwrap();
+        assert_eq!(lines.vertices, [2, 5, 6, 7, 14]);
+        assert_eq!(lines.faces, [8, 9, 10, 15]);
+        assert_eq!(
+            loaded.remarks,
+            ["the last line has no end: was the file cut off?"]
+        );
+    }
+
+    #[test]
+    fn what_is_not_kept_is_named_with_counts() {
+        let text = "mtllib a.mtl\no thing\nv 0 0 0 1 0 0\nv 1 0 0 2\nv 0 1 0\nvt 0 0\nvt 1 0\nvn 0 0 1\n\
+                    g a b\ns 1\nusemtl c:\\m\\\nname\nf 1 2 3\nl 1 2\np 1\nblob 1\nblob 2\nend";
+        let loaded = parse(text).unwrap();
+        assert_eq!(loaded.mesh.len(), 3);
+        assert_eq!(loaded.normals, None);
+        assert_eq!(
+            loaded.remarks,
+            [
+                "not kept: 2 texture coordinates (vt), 1 normals (vn), 2 group names (g, o), \
+                 1 smoothing groups (s), 2 material statements, 1 lines (l), 1 points (p), \
+                 1 free-form and display statements, weights or colours of 2 vertices",
+                "2 unknown statements passed over, the first at a.obj, line 16: \"blob\" is not an OBJ statement",
+                "the last line has no end: was the file cut off?",
+            ]
+        );
+    }
+
+    #[test]
+    fn indices_beyond_the_vertices_and_odd_coordinates_are_left_to_the_validation() {
+        let loaded = parse("v nan 0 inf\nv 0 -Infinity 1e999\nf 1 2 4294967296\n").unwrap();
+        assert_eq!(loaded.mesh.faces.face(0), [0, 1, u32::MAX]);
+        assert!(loaded.mesh.positions[0].x.is_nan());
+        assert_eq!(loaded.mesh.positions[1].z, f64::INFINITY);
+    }
+
+    #[test]
+    fn errors_name_the_line_and_what_is_wrong() {
+        let with = |statement: &str| refusal(&format!("{TRIANGLE}{statement}\n"));
+        for (statement, start) in [
+            (
+                "v 1 2",
+                "the line ends where coordinate z of vertex 3 should be",
+            ),
+            ("v 1 2,5 3", "\"2,5\" is not coordinate y of vertex 3"),
+            (
+                "v 1 2 3 red",
+                "\"red\" is not a weight or colour of vertex 3",
+            ),
+            ("f 1 2", "face 0 has 2 corners"),
+            ("f 1", "face 0 has 1 corner, a face needs at least 3"),
+            ("f", "face 0 has 0 corners"),
+            ("f 1 2 0", "\"0\" is not a corner of face 0 ("),
+            ("f 1 2 -0", "\"-0\" is not a corner of face 0 ("),
+            ("f 1 2 3.5", "\"3.5\" is not a corner of face 0 ("),
+            ("f 1 2 3/x", "\"3/x\" is not a corner of face 0 ("),
+            (
+                "f 1 2 -4",
+                "corner -4 of face 0 reaches before the first of the 3 vertices",
+            ),
+            (
+                "f 1 2 4294967297",
+                "\"4294967297\" is not a corner of face 0 (",
+            ),
+            (
+                "f 1 2 99999999999999999999",
+                "\"99999999999999999999\" is not a corner",
+            ),
+        ] {
+            let text = with(statement);
+            assert!(
+                text.starts_with(&format!("a.obj, line 4: {start}")),
+                "{text}"
+            );
+            assert!(!text.contains('\n'), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_file_without_vertices_is_none() {
+        for (text, message) in [
+            (
+                "",
+                "a.obj, line 1: the file ends where a vertex (v x y z) should be: is it complete?",
+            ),
+            (
+                "# x\ng a\n",
+                "a.obj, line 2: the file ends where a vertex (v x y z) should be: is it complete?",
+            ),
+            (
+                "g a\nPK\u{3}\u{4} x\ny\n",
+                "a.obj, line 2: \"PK\\u{3}\\u{4}\" is not an OBJ statement",
+            ),
+        ] {
+            assert_eq!(refusal(text), message);
+        }
+    }
+
+    #[test]
+    fn normals_are_written_beside_the_vertices() {
+        let loaded = parse(&format!("{TRIANGLE}f 1 2 3\n")).unwrap();
+        let mut text = Vec::new();
+        write_to(&mut text, &loaded.mesh, Some(&[DVec3::Z; 3])).unwrap();
+        let normals = "vn 0 0 1\n".repeat(3);
+        let expected = format!("{TRIANGLE}{normals}f 1//1 2//2 3//3\n");
+        assert_eq!(String::from_utf8(text).unwrap(), expected);
+    }
+}

@@ -1,0 +1,551 @@
+//! PLY (Stanford polygon file format): text and binary of either byte order.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::Mesh;
+use super::io::{Builder, Lines, Loaded, check_normals};
+use super::text::Scanner;
+use crate::Result;
+
+mod header;
+mod values;
+
+use header::{COORDINATES, Element, Format, Header, Keep, Kind};
+use values::{Binary, ByteOrder, Text, Values};
+
+/// Reads the bytes of a PLY file; `path` is for messages.
+///
+/// Positions are the properties `x y z` of the element `vertex`, faces the list `vertex_indices` or `vertex_index`
+/// of the element `face`, in any numeric types; `nx ny nz` are kept as normals. Other properties and elements are
+/// passed over and named in a remark. In text files numbers may be spread over lines.
+///
+/// # Errors
+/// [`Error::Parse`](crate::Error::Parse) with the line, or in binary data with the byte and the element: an unknown
+/// header statement or type, missing positions or faces, triangle strips, an index that is negative or no 32-bit
+/// number, a face of fewer than three corners, a file that ends early, data after the last element.
+///
+/// ```
+/// let text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+///             element face 1\nproperty list uchar int vertex_indices\nend_header\n\
+///             0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+/// let loaded = limitlab::mesh::ply::read_bytes(text.as_bytes(), "a.ply".as_ref())?;
+/// assert_eq!(loaded.mesh.faces.face(0), [0, 1, 2]);
+/// assert_eq!(loaded.lines.unwrap().faces, [13]);
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
+    let mut scanner = Scanner::new(bytes, path);
+    let Header { format, elements } = Header::read(&mut scanner, path)?;
+    let order = match format {
+        Format::Ascii => {
+            let values = Text { scanner, path };
+            return read_elements(&elements, values, Some(Lines::default()), path);
+        }
+        Format::BinaryLittleEndian => ByteOrder::Little,
+        Format::BinaryBigEndian => ByteOrder::Big,
+    };
+    let values = Binary {
+        path,
+        bytes,
+        at: bytes.len() - scanner.rest().len(),
+        order,
+    };
+    read_elements(&elements, values, None, path)
+}
+
+fn read_elements<V: Values>(
+    elements: &[Element],
+    mut values: V,
+    lines: Option<Lines>,
+    path: &Path,
+) -> Result<Loaded> {
+    let mut builder = Builder::new(lines);
+    let mut normals = Vec::new();
+    for element in elements {
+        // Each row takes room in the file, so that the end of the file ends an absurd count.
+        if !element.properties.is_empty() {
+            read_rows(element, &mut values, &mut builder, &mut normals)?;
+        }
+    }
+    if !values.at_end() {
+        let place = values.place();
+        let what = "data after the last element: correct the counts in the header";
+        return Err(values.error(place, what.into()));
+    }
+    let has_normals = elements
+        .iter()
+        .flat_map(|e| &e.properties)
+        .any(|p| matches!(p.keep, Keep::Coordinate(3..)));
+    let remarks = Vec::from_iter(not_kept(elements));
+    Ok(builder.finish(path, has_normals.then_some(normals), remarks))
+}
+
+fn read_rows<V: Values>(
+    element: &Element,
+    values: &mut V,
+    builder: &mut Builder,
+    normals: &mut Vec<DVec3>,
+) -> Result<()> {
+    let (name, count) = (&element.name, element.count);
+    let row_bytes: usize = element
+        .properties
+        .iter()
+        .map(|p| values.least_bytes(p.length.unwrap_or(p.scalar)))
+        .sum();
+    let rows_at_most = values.bytes_left() / row_bytes;
+    let has_normals = element
+        .properties
+        .iter()
+        .any(|p| matches!(p.keep, Keep::Coordinate(3..)));
+    match element.kind {
+        Kind::Vertex => builder.reserve_vertices(count, rows_at_most),
+        Kind::Face => builder.reserve_faces(count, rows_at_most),
+        Kind::Other => {}
+    }
+    for row in 0..count {
+        let place = values.place();
+        let mut coordinates = [0.0; 6];
+        for property in &element.properties {
+            let scalar = property.scalar;
+            let wanted =
+                |what: &str| format!("{what} {} of {name} {row} of {count}", property.name);
+            let items = match property.length {
+                None => 1,
+                Some(length) => values
+                    .unsigned(length)
+                    .ok_or_else(|| values.unexpected(wanted("the length of the list")))?,
+            };
+            match property.keep {
+                Keep::Coordinate(k) => {
+                    coordinates[k] = values
+                        .number(scalar)
+                        .ok_or_else(|| values.unexpected(wanted("the number")))?;
+                }
+                Keep::Corners => {
+                    for _ in 0..items {
+                        let corner = values
+                            .unsigned(scalar)
+                            .ok_or_else(|| values.unexpected(wanted("an index (0, 1, 2, …) in")))?;
+                        builder.corner(corner);
+                    }
+                }
+                Keep::No => values
+                    .skip(scalar, items)
+                    .ok_or_else(|| values.unexpected(wanted("a value of")))?,
+            }
+        }
+        let [x, y, z, nx, ny, nz] = coordinates;
+        match element.kind {
+            Kind::Vertex => builder.vertex(DVec3::new(x, y, z), place),
+            Kind::Face => builder.end_face(place),
+            Kind::Other => Ok(()),
+        }
+        .map_err(|what| values.error(place, what))?;
+        if has_normals {
+            normals.push(DVec3::new(nx, ny, nz));
+        }
+    }
+    Ok(())
+}
+
+/// The remark on what the mesh does not keep, if there is such.
+fn not_kept(elements: &[Element]) -> Option<String> {
+    let mut parts = Vec::new();
+    for element in elements.iter().filter(|e| e.count > 0) {
+        if element.kind == Kind::Other {
+            parts.push(format!("element {} ({})", element.name, element.count));
+            continue;
+        }
+        let dropped: Vec<&str> = element
+            .properties
+            .iter()
+            .filter(|p| p.keep == Keep::No)
+            .map(|p| p.name.as_str())
+            .collect();
+        if !dropped.is_empty() {
+            parts.push(format!("{} properties {}", element.name, dropped.join(" ")));
+        }
+    }
+    (!parts.is_empty()).then(|| format!("not kept: {}", parts.join(", ")))
+}
+
+/// Writes `mesh` as PLY, binary little-endian with doubles, with `normals` (one a vertex) as `nx ny nz` if given.
+///
+/// # Panics
+/// If there are not as many normals as vertices.
+pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<()> {
+    check_normals(mesh, normals);
+    let faces = &mesh.faces;
+    // The usual types unless something does not fit them.
+    let short = faces.iter().all(|f| f.len() <= usize::from(u8::MAX));
+    let length = if short { "uchar" } else { "uint" };
+    let fits_int = faces.corners().iter().all(|&v| i32::try_from(v).is_ok());
+    let index = if fits_int { "int" } else { "uint" };
+    let coordinates = if normals.is_some() { 6 } else { 3 };
+    write!(
+        out,
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n",
+        mesh.len()
+    )?;
+    for name in &COORDINATES[..coordinates] {
+        writeln!(out, "property double {name}")?;
+    }
+    write!(
+        out,
+        "element face {}\nproperty list {length} {index} vertex_indices\nend_header\n",
+        faces.len()
+    )?;
+
+    let mut row = Vec::new();
+    let push_point = |row: &mut Vec<u8>, p: DVec3| {
+        for coordinate in p.to_array() {
+            row.extend_from_slice(&coordinate.to_le_bytes());
+        }
+    };
+    for (v, &position) in mesh.positions.iter().enumerate() {
+        row.clear();
+        push_point(&mut row, position);
+        if let Some(normals) = normals {
+            push_point(&mut row, normals[v]);
+        }
+        out.write_all(&row)?;
+    }
+    for face in faces.iter() {
+        row.clear();
+        let size = (face.len() as u32).to_le_bytes();
+        row.extend_from_slice(if short { &size[..1] } else { &size });
+        for &v in face {
+            row.extend_from_slice(&v.to_le_bytes());
+        }
+        out.write_all(&row)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(bytes: &[u8]) -> Result<Loaded> {
+        read_bytes(bytes, Path::new("a.ply"))
+    }
+
+    fn refusal(bytes: &[u8]) -> String {
+        let text = parse(bytes).unwrap_err().to_string();
+        assert!(!text.contains('\n'), "{text}");
+        text
+    }
+
+    fn triangle() -> Mesh {
+        let faces = crate::mesh::Faces::from_lists([[0, 1, 2]]);
+        Mesh::new(
+            vec![DVec3::ZERO, DVec3::X, DVec3::new(0.0, 2.5, 0.0)],
+            faces,
+        )
+    }
+
+    const XYZ: &str = "property float x\nproperty float y\nproperty float z\n";
+    const FACE: &str = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+
+    fn ascii(vertex_properties: &str, rest: &str) -> String {
+        format!("ply\nformat ascii 1.0\nelement vertex 3\n{vertex_properties}{rest}")
+    }
+
+    /// The triangle with every scalar type in use, lists of other things around, and the face before the vertices.
+    /// `put` gets each value and the number of bytes and whether it is a float, to write it in its own way.
+    fn motley(format: &str, mut put: impl FnMut(&mut Vec<u8>, f64, usize, bool)) -> Vec<u8> {
+        let header = format!(
+            "ply\r\nformat {format} 1.0\r\ncomment caf\u{e9} # x\r\nobj_info y\r\n\r\n\
+             element face 1\r\nproperty char flag\r\nproperty list ushort short uv\r\n\
+             property list int uint vertex_index\r\nproperty list uchar float32 w\r\n\
+             element edge 2\r\nproperty uint16 a\r\nproperty uint8 b\r\n\
+             element nothing 1000000000000\r\n\
+             element vertex 3\r\nproperty int8 x\r\nproperty list uint32 float64 t\r\n\
+             property double y\r\nproperty uint8 red\r\nproperty int16 z\r\n\
+             property float nx\r\nproperty int32 ny\r\nproperty float nz\r\nend_header\r\n"
+        );
+        let mut bytes = header.into_bytes();
+        let mut row = |row: &[(f64, usize, bool)]| {
+            for &(value, size, float) in row {
+                put(&mut bytes, value, size, float);
+            }
+        };
+        let int = |value: f64, size| (value, size, false);
+        let float = |value: f64, size| (value, size, true);
+        row(&[int(-1.0, 1), int(2.0, 2), int(-300.0, 2), int(7.0, 2)]);
+        row(&[int(3.0, 4), int(0.0, 4), int(1.0, 4), int(2.0, 4)]);
+        row(&[int(1.0, 1), float(0.5, 4)]);
+        row(&[int(65535.0, 2), int(255.0, 1), int(1.0, 2), int(2.0, 1)]);
+        for (v, p) in triangle().positions.iter().enumerate() {
+            row(&[int(p.x, 1), int(v as f64, 4)]);
+            for _ in 0..v {
+                row(&[float(1e-300, 8)]);
+            }
+            row(&[float(p.y, 8), int(9.0, 1), int(p.z, 2)]);
+            row(&[float(0.25, 4), int(-70000.0, 4), float(0.0, 4)]);
+        }
+        bytes
+    }
+
+    #[test]
+    fn all_types_lists_and_byte_orders() {
+        let binary = |bytes: &mut Vec<u8>, value: f64, size: usize, float: bool, big: bool| {
+            let mut raw = match (size, float) {
+                (4, true) => (value as f32).to_le_bytes().to_vec(),
+                (_, true) => value.to_le_bytes().to_vec(),
+                (_, false) => (value as i64).to_le_bytes()[..size].to_vec(),
+            };
+            if big {
+                raw.reverse();
+            }
+            bytes.extend(raw);
+        };
+        let cases = [
+            motley("ascii", |b, x, _, _| b.extend(format!("{x}\r\n").bytes())),
+            motley("binary_little_endian", |b, x, n, f| {
+                binary(b, x, n, f, false)
+            }),
+            motley("binary_big_endian", |b, x, n, f| binary(b, x, n, f, true)),
+        ];
+        for (bytes, is_text) in cases.iter().zip([true, false, false]) {
+            let loaded = parse(bytes).unwrap();
+            assert_eq!(loaded.mesh, triangle());
+            let normal = DVec3::new(0.25, -70000.0, 0.0);
+            assert_eq!(loaded.normals, Some(vec![normal; 3]));
+            assert_eq!(
+                loaded.remarks,
+                ["not kept: face properties flag uv w, element edge (2), \
+                  element nothing (1000000000000), vertex properties t red"]
+            );
+            assert_eq!(loaded.lines.is_some(), is_text);
+            if let Some(lines) = loaded.lines {
+                assert_eq!(lines.faces, [25]);
+                assert_eq!(lines.vertices, [39, 47, 56]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_header_of_old_line_ends_before_data_that_look_like_one() {
+        let mut bytes = Vec::new();
+        write_to(&mut bytes, &triangle(), None).unwrap();
+        let end = b"end_header\n";
+        let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+        let mut header = String::from_utf8(bytes[..start].to_vec()).unwrap();
+        header = header.replace('\n', "\r");
+        let mut body = bytes[start..].to_vec();
+        body[0] = b'\n';
+        let loaded = parse(&[header.as_bytes(), &body].concat()).unwrap();
+        let x = loaded.mesh.positions[0].x;
+        assert_eq!(x.to_bits(), u64::from(b'\n'));
+    }
+
+    #[test]
+    fn faces_and_indices_beyond_the_usual_types_are_written_in_wider_ones() {
+        let face: Vec<u32> = (0..300).chain([u32::MAX]).collect();
+        let mesh = Mesh::new(Vec::new(), crate::mesh::Faces::from_lists([face]));
+        let mut bytes = Vec::new();
+        write_to(&mut bytes, &mesh, None).unwrap();
+        assert_eq!(parse(&bytes).unwrap().mesh, mesh);
+    }
+
+    #[test]
+    fn incomplete_normals_are_named() {
+        let text = ascii(
+            &format!("{XYZ}property float nx\nproperty float ny\n"),
+            &format!("{FACE}0 0 0 1 1 1 0 0 1 1 0 1 0 1 1\n3 0 1 2\n"),
+        );
+        let loaded = parse(text.as_bytes()).unwrap();
+        assert_eq!(loaded.normals, None);
+        assert_eq!(loaded.remarks, ["not kept: vertex properties nx ny"]);
+    }
+
+    #[test]
+    fn errors_in_the_header_name_the_line() {
+        let plain = |rest: &str| ascii(XYZ, rest);
+        for (text, message) in [
+            (String::new(), "1: not a PLY file"),
+            ("plywood\n".into(), "1: not a PLY file"),
+            (
+                "ply\nformat ascii 2.0\n".into(),
+                "2: \"2.0\" is not the only version",
+            ),
+            (
+                "ply\nformat text 1.0\n".into(),
+                "2: \"text\" is not a PLY format",
+            ),
+            (
+                "ply\nformat ascii 1.0 x\n".into(),
+                "2: \"x\" is not the end of the line",
+            ),
+            (
+                "ply\nelement vertex x\n".into(),
+                "2: \"x\" is not the number of elements vertex",
+            ),
+            (
+                "ply\nproperty float x\n".into(),
+                "2: a property before the first element",
+            ),
+            (
+                "ply\nend_header\n".into(),
+                "2: the header ends without a format",
+            ),
+            (
+                "ply\nblob\n".into(),
+                "2: \"blob\" is not a PLY header statement",
+            ),
+            (
+                "ply\nformat ascii 1.0\n".into(),
+                "2: the file ends where a PLY header statement",
+            ),
+            (
+                ascii("property long x\n", ""),
+                "4: \"long\" is not a PLY type",
+            ),
+            (
+                ascii("property int\n", ""),
+                "4: the line ends where the name of a property",
+            ),
+            (
+                ascii("property float x\nproperty int x\n", ""),
+                "5: a second property \"x\"",
+            ),
+            (
+                ascii("property list float int x\n", ""),
+                "4: the length of a list must be a whole number",
+            ),
+            (plain("element vertex 1\n"), "7: a second element vertex"),
+            (
+                plain("end_header\n"),
+                "7: the header announces no element face: a point cloud",
+            ),
+            (
+                plain("element tristrips 1\n"),
+                "7: faces as triangle strips are not read: convert",
+            ),
+            (
+                plain("element face 1\nend_header\n"),
+                "8: the element face has no property list",
+            ),
+            (
+                plain("element face 1\nproperty list int float vertex_index\n"),
+                "8: the vertices of a face must be whole numbers",
+            ),
+            (
+                ascii("property float x\nproperty list int int y\n", FACE),
+                "8: the element vertex has no property y",
+            ),
+            (
+                "ply\nformat ascii 1.0\nelement face 0\nend_header\n".into(),
+                "4: the header announces no element vertex",
+            ),
+        ] {
+            let found = refusal(text.as_bytes());
+            assert!(
+                found.starts_with(&format!("a.ply, line {message}")),
+                "{text}: {found}"
+            );
+        }
+    }
+
+    #[test]
+    fn errors_in_text_name_the_line() {
+        for (body, message) in [
+            (
+                "0 0 0\n1 0 0\n0 one 0\n",
+                "12: \"one\" is not the number y of vertex 2 of 3",
+            ),
+            (
+                "0 0 0\n1 0 0\n",
+                "11: the file ends where the number x of vertex 2 of 3",
+            ),
+            (
+                "0 0 0 1 0 0 0 1 0\n3 0 1 -1\n",
+                "11: \"-1\" is not an index (0, 1, 2, …) in vertex_indices",
+            ),
+            (
+                "0 0 0 1 0 0 0 1 0\n3 0 1 4294967296\n",
+                "11: \"4294967296\" is not an index",
+            ),
+            ("0 0 0 1 0 0 0 1 0\n2 0 1\n", "11: face 0 has 2 corners"),
+            (
+                "0 0 0 1 0 0 0 1 0\n1.5 0 1\n",
+                "11: \"1.5\" is not the length of the list",
+            ),
+            (
+                "0 0 0 1 0 0 0 1 0\n3 0 1 2\n\n3 0 1 2\n",
+                "13: data after the last element",
+            ),
+            (
+                "0 0 0 1 0 0 0 1 0\n1000000000000 0 1 2\n",
+                "11: the file ends where an index",
+            ),
+        ] {
+            let found = refusal(ascii(XYZ, &format!("{FACE}{body}")).as_bytes());
+            assert!(
+                found.starts_with(&format!("a.ply, line {message}")),
+                "{found}"
+            );
+        }
+    }
+
+    #[test]
+    fn errors_in_binary_data_name_the_byte_or_the_element() {
+        let mut bytes = Vec::new();
+        write_to(&mut bytes, &triangle(), None).unwrap();
+        let face = bytes.len() - 13;
+        let changed = |at: usize, value: u8| {
+            let mut changed = bytes.clone();
+            changed[at] = value;
+            refusal(&changed)
+        };
+        let ends = |at: usize| refusal(&bytes[..at]);
+        let what = "an index (0, 1, 2, …) in vertex_indices of face 0 of 1";
+        assert_eq!(
+            changed(face + 4, 0xFF),
+            format!("a.ply: byte {}: the value is not {what}", face + 1)
+        );
+        assert_eq!(
+            changed(face, 200),
+            format!("a.ply: the file ends where {what} should be: is it complete?")
+        );
+        let text = changed(face, 2);
+        assert!(
+            text.starts_with(&format!("a.ply: byte {face}: face 0 has 2 corners")),
+            "{text}"
+        );
+        assert_eq!(
+            ends(face - 1),
+            "a.ply: the file ends where the number z of vertex 2 of 3 should be: is it complete?"
+        );
+        assert_eq!(
+            refusal(&[&bytes[..], b"\n x"].concat()),
+            format!(
+                "a.ply: byte {}: data after the last element: correct the counts in the header",
+                bytes.len()
+            )
+        );
+        parse(&[&bytes[..], b"\n"].concat()).unwrap();
+    }
+
+    #[test]
+    fn absurd_counts_are_refused_at_the_end_of_the_data() {
+        for format in ["ascii", "binary_big_endian"] {
+            let header = |n: &str| {
+                format!("ply\nformat {format} 1.0\nelement vertex {n}\n{XYZ}{FACE}0 0 0\n")
+            };
+            for count in ["1000000000000", "18446744073709551615"] {
+                let found = refusal(header(count).as_bytes());
+                assert!(found.contains("the file ends where the number"), "{found}");
+            }
+            let found = refusal(header("18446744073709551616").as_bytes());
+            assert!(
+                found.contains("is not the number of elements vertex"),
+                "{found}"
+            );
+        }
+    }
+}

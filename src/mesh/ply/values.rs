@@ -1,0 +1,180 @@
+//! The values after the header of a PLY file, as text or as bytes.
+
+use std::fmt::Display;
+use std::path::Path;
+
+use super::super::text::Scanner;
+use super::header::Scalar;
+use crate::Error;
+
+/// Values in file order. A method that gives `None` leaves the place for [`unexpected`](Values::unexpected).
+pub(super) trait Values {
+    /// The least number of bytes that a value takes.
+    fn least_bytes(&self, scalar: Scalar) -> usize;
+
+    /// The number of bytes not read yet.
+    fn bytes_left(&self) -> usize;
+
+    /// Where the next value starts: its line in text, its byte otherwise.
+    fn place(&mut self) -> usize;
+
+    fn number(&mut self, scalar: Scalar) -> Option<f64>;
+
+    /// A whole number, not negative, that fits `T`.
+    fn unsigned<T: TryFrom<u64>>(&mut self, scalar: Scalar) -> Option<T>;
+
+    fn skip(&mut self, scalar: Scalar, count: u64) -> Option<()>;
+
+    /// Whether only white space follows.
+    fn at_end(&mut self) -> bool;
+
+    /// The error of finding something else than `wanted`.
+    fn unexpected(&self, wanted: impl Display) -> Error;
+
+    /// An error about what starts at `place`.
+    fn error(&self, place: usize, what: String) -> Error;
+}
+
+pub(super) struct Text<'a> {
+    pub scanner: Scanner<'a>,
+    pub path: &'a Path,
+}
+
+impl Values for Text<'_> {
+    fn least_bytes(&self, _: Scalar) -> usize {
+        2 // a digit and a separator
+    }
+
+    fn bytes_left(&self) -> usize {
+        self.scanner.rest().len()
+    }
+
+    fn place(&mut self) -> usize {
+        self.scanner.skip_space();
+        self.scanner.line()
+    }
+
+    fn number(&mut self, _: Scalar) -> Option<f64> {
+        self.scanner.skip_space();
+        self.scanner.number()
+    }
+
+    fn unsigned<T: TryFrom<u64>>(&mut self, _: Scalar) -> Option<T> {
+        self.scanner.skip_space();
+        self.scanner.unsigned()
+    }
+
+    fn skip(&mut self, scalar: Scalar, count: u64) -> Option<()> {
+        for _ in 0..count {
+            self.number(scalar)?;
+        }
+        Some(())
+    }
+
+    fn at_end(&mut self) -> bool {
+        self.scanner.skip_space();
+        self.scanner.at_end()
+    }
+
+    fn unexpected(&self, wanted: impl Display) -> Error {
+        self.scanner.unexpected(wanted)
+    }
+
+    fn error(&self, place: usize, what: String) -> Error {
+        Error::parse(self.path, Some(place), what)
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum ByteOrder {
+    Little,
+    Big,
+}
+
+pub(super) struct Binary<'a> {
+    pub path: &'a Path,
+    pub bytes: &'a [u8],
+    pub at: usize,
+    pub order: ByteOrder,
+}
+
+impl Binary<'_> {
+    /// The bytes of one value, the least significant first; moves to the end if there are too few.
+    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let Some(&(mut value)) = self.bytes[self.at..].first_chunk::<N>() else {
+            self.at = self.bytes.len();
+            return None;
+        };
+        self.at += N;
+        if self.order == ByteOrder::Big {
+            value.reverse();
+        }
+        Some(value)
+    }
+}
+
+impl Values for Binary<'_> {
+    fn least_bytes(&self, scalar: Scalar) -> usize {
+        scalar.bytes()
+    }
+
+    fn bytes_left(&self) -> usize {
+        self.bytes.len() - self.at
+    }
+
+    fn place(&mut self) -> usize {
+        self.at
+    }
+
+    fn number(&mut self, scalar: Scalar) -> Option<f64> {
+        Some(match scalar {
+            Scalar::I8 => i8::from_le_bytes(self.take()?).into(),
+            Scalar::U8 => u8::from_le_bytes(self.take()?).into(),
+            Scalar::I16 => i16::from_le_bytes(self.take()?).into(),
+            Scalar::U16 => u16::from_le_bytes(self.take()?).into(),
+            Scalar::I32 => i32::from_le_bytes(self.take()?).into(),
+            Scalar::U32 => u32::from_le_bytes(self.take()?).into(),
+            Scalar::F32 => f32::from_le_bytes(self.take()?).into(),
+            Scalar::F64 => f64::from_le_bytes(self.take()?),
+        })
+    }
+
+    fn unsigned<T: TryFrom<u64>>(&mut self, scalar: Scalar) -> Option<T> {
+        let start = self.at;
+        // All whole numbers of the format are exact as doubles; none of them reaches 2³².
+        let value = self.number(scalar)?;
+        let fitting = (value >= 0.0)
+            .then(|| T::try_from(value as u64).ok())
+            .flatten();
+        if fitting.is_none() {
+            self.at = start;
+        }
+        fitting
+    }
+
+    fn skip(&mut self, scalar: Scalar, count: u64) -> Option<()> {
+        let length = usize::try_from(count)
+            .ok()
+            .and_then(|n| n.checked_mul(scalar.bytes()))
+            .filter(|&n| n <= self.bytes_left());
+        self.at += length.unwrap_or(self.bytes_left());
+        length.map(|_| ())
+    }
+
+    fn at_end(&mut self) -> bool {
+        self.bytes[self.at..].trim_ascii().is_empty()
+    }
+
+    fn unexpected(&self, wanted: impl Display) -> Error {
+        let what = if self.bytes_left() == 0 {
+            format!("the file ends where {wanted} should be: is it complete?")
+        } else {
+            format!("byte {}: the value is not {wanted}", self.at)
+        };
+        Error::parse(self.path, None, what)
+    }
+
+    fn error(&self, place: usize, what: String) -> Error {
+        Error::parse(self.path, None, format!("byte {place}: {what}"))
+    }
+}

@@ -1,0 +1,364 @@
+use super::*;
+use crate::report::canvas::{Dash, Marker, PIXELS_PER_POINT};
+use crate::report::series::{Band, Bars, Rule, marker, palette};
+use crate::report::{Scale, Series};
+
+/// Twelve convergence histories, four of which diverge or stagnate.
+fn histories() -> Figure {
+    let names = [
+        "jacobi",
+        "thall",
+        "gauss-seidel",
+        "sor",
+        "ssor",
+        "pia",
+        "w-pia",
+        "chebyshev",
+        "cg",
+        "pcg-jacobi",
+        "pcg-ssor",
+        "pcg-ic0",
+    ];
+    let factors = [
+        1.09, 0.93, 0.87, 0.80, 0.83, 0.96, 0.9, 0.72, 0.66, 0.6, 0.5, 1.03,
+    ];
+    let series = names
+        .iter()
+        .zip(factors)
+        .enumerate()
+        .map(|(i, (name, factor))| {
+            let wiggle = move |k: i32| 1.0 + 0.3 * (f64::from(k) * 0.7 + i as f64).sin();
+            let values = (0..=200).map(move |k| f64::powi(factor, k) * wiggle(k));
+            let values = values.take_while(|v| (1e-12..1e6).contains(v));
+            Series::history(*name, values).marker(marker(i))
+        });
+    Figure::new(LinePlot {
+        title: "Catmull-Clark, torus:64x64, noise 0.1".into(),
+        x_label: "iteration".into(),
+        y_label: "largest vertex error / bounding-box diagonal".into(),
+        y_scale: Scale::Log,
+        series: series.collect(),
+        horizontal_lines: vec![Rule::new(1e-10, "tolerance")],
+        ..LinePlot::default()
+    })
+}
+
+/// Iterations and rates over ω with the optimum and the threshold drawn in.
+fn sweep() -> Figure {
+    let omegas = || (1..=24).map(|i| 0.05 * f64::from(i));
+    let rho = |w: f64| (1.0 - w / 4.0).abs().max((1.0 - 9.0 * w / 4.0).abs());
+    let iterations = |w: f64| {
+        let count = (1e-10_f64.ln() / rho(w).ln()).ceil();
+        if rho(w) < 1.0 { count } else { f64::NAN }
+    };
+    let marks = |labelled: bool| -> Vec<Rule> {
+        let name = |text: &str| {
+            if labelled {
+                text.to_owned()
+            } else {
+                String::new()
+            }
+        };
+        vec![
+            Rule::new(0.8, name("ω_{opt} = 0.8")),
+            Rule::new(8.0 / 9.0, name("ω_{crit} = 0.889")),
+        ]
+    };
+    let upper = LinePlot {
+        y_label: "iterations".into(),
+        y_scale: Scale::Log,
+        series: vec![
+            Series::line("Jacobi", omegas().map(|w| (w, iterations(w)))).marker(Marker::Circle),
+            Series::line("PIA", omegas().map(|w| (w, 2.0 * iterations(w)))).marker(Marker::Square),
+        ],
+        vertical_lines: marks(true),
+        ..LinePlot::default()
+    };
+    let lower = LinePlot {
+        x_label: "relaxation weight ω".into(),
+        y_label: "rate ρ".into(),
+        x_range: Some((0.0, 1.2)),
+        y_range: Some((0.7, 1.4)),
+        series: vec![
+            Series::line(
+                "predicted ρ(ω)",
+                (0..=240).map(|i| 0.005 * f64::from(i)).map(|w| (w, rho(w))),
+            ),
+            Series::scatter("measured", omegas().map(|w| (w, rho(w)))).colour(palette(0)),
+        ],
+        vertical_lines: marks(false),
+        bands: vec![Band {
+            from: 0.0,
+            to: 8.0 / 9.0,
+            label: "converges".into(),
+        }],
+        horizontal_lines: vec![Rule {
+            dash: Dash::Dotted,
+            ..Rule::new(1.0, "ρ = 1")
+        }],
+        ..LinePlot::default()
+    };
+    Figure::stack([upper, lower]).title("Catmull-Clark, torus:16x16, noise 0.1")
+}
+
+/// A nine-point torus in row order and with its rows shuffled.
+fn patterns(side: u32) -> Figure {
+    let n = side * side;
+    let torus = move || {
+        (0..n).flat_map(move |v| {
+            let (i, j) = (v / side, v % side);
+            (0..9).map(move |k| {
+                let (a, b) = ((i + side + k / 3 - 1) % side, (j + side + k % 3 - 1) % side);
+                (v, a * side + b)
+            })
+        })
+    };
+    // A permutation, since 7919 is a prime that does not divide n.
+    let shuffled = move |v: u32| (u64::from(v) * 7919 % u64::from(n)) as u32;
+    Figure::row([
+        SparsityPlot::new(
+            format!("file order, bandwidth {}", n - 1),
+            n as usize,
+            torus(),
+        ),
+        SparsityPlot::new(
+            "shuffled",
+            n as usize,
+            torus().map(move |(r, c)| (shuffled(r), shuffled(c))),
+        ),
+    ])
+}
+
+fn spectrum() -> Figure {
+    let symbol = |k: u32| (2.0 + (f64::from(k) * std::f64::consts::TAU / 64.0).cos()) / 3.0;
+    let values: Vec<f64> = (0..64 * 64)
+        .map(|k| symbol(k / 64) * symbol(k % 64))
+        .collect();
+    Figure::new(LinePlot {
+        x_label: "eigenvalue".into(),
+        y_label: "count".into(),
+        bars: vec![Bars::histogram("torus:64x64", &values, 50)],
+        vertical_lines: vec![Rule::new(1.0 / 9.0, "λ_{min} = 1/9")],
+        ..LinePlot::default()
+    })
+}
+
+fn frames(figure: &Figure) -> Vec<Rect> {
+    let slots = figure.slots().unwrap();
+    slots.iter().map(|slot| slot.frame).collect()
+}
+
+/// The part of a rectangle of points that is not white.
+fn ink(image: &Image, area: Rect) -> f64 {
+    let px = |v: f64| (v * f64::from(PIXELS_PER_POINT)) as u32;
+    let (mut dark, mut all) = (0_u32, 0_u32);
+    for y in px(area.top)..px(area.bottom).min(image.height) {
+        for x in px(area.left)..px(area.right).min(image.width) {
+            all += 1;
+            dark += u32::from(image.pixel(x, y) != [255; 3]);
+        }
+    }
+    f64::from(dark) / f64::from(all)
+}
+
+#[test]
+fn figures_have_their_size_are_drawn_and_come_out_the_same() {
+    for (figure, width, height) in [
+        (histories(), 600, 380),
+        (sweep(), 600, 440),
+        (patterns(64), 600, 320),
+        (spectrum(), 600, 380),
+    ] {
+        let image = figure.render().unwrap();
+        assert_eq!((image.width, image.height), (width * 3, height * 3));
+        for frame in frames(&figure) {
+            assert!(ink(&image, frame) > 0.01, "the data is drawn");
+        }
+        let mut first = Vec::new();
+        image.write_png(&mut first).unwrap();
+        let mut second = Vec::new();
+        figure.render().unwrap().write_png(&mut second).unwrap();
+        assert!(first == second, "the same figure gives the same bytes");
+    }
+}
+
+#[test]
+fn nothing_reaches_the_border_of_the_picture() {
+    for figure in [histories(), sweep(), patterns(64), spectrum()] {
+        let image = figure.render().unwrap();
+        let (width, height) = (f64::from(figure.width), f64::from(figure.height));
+        let strip = |left, top, right, bottom| Rect {
+            left,
+            top,
+            right,
+            bottom,
+        };
+        for side in [
+            strip(0.0, 0.0, width, 1.0),
+            strip(0.0, height - 1.0, width, height),
+            strip(0.0, 0.0, 1.0, height),
+            strip(width - 1.0, 0.0, width, height),
+        ] {
+            assert_eq!(ink(&image, side), 0.0, "{:?}", figure.title);
+        }
+    }
+}
+
+#[test]
+fn the_legend_stands_beside_the_data() {
+    let figure = histories();
+    let frame = frames(&figure)[0];
+    let bare = {
+        let mut figure = figure.clone();
+        for panel in &mut figure.panels {
+            let Panel::Lines(plot) = panel else {
+                unreachable!()
+            };
+            plot.series.iter_mut().for_each(|s| s.name.clear());
+            plot.horizontal_lines[0].label.clear();
+        }
+        figure
+    };
+    let wide = frames(&bare)[0];
+    assert!(
+        wide.right > frame.right + 50.0,
+        "the legend takes room from the frame"
+    );
+    let image = figure.render().unwrap();
+    // Between frame and legend there is nothing, in the legend there is something.
+    let gap = Rect {
+        left: frame.right + 1.0,
+        right: frame.right + 8.0,
+        ..frame
+    };
+    assert_eq!(ink(&image, gap), 0.0);
+    let legend = Rect {
+        left: frame.right + 8.0,
+        right: f64::from(figure.width),
+        ..frame
+    };
+    assert!(ink(&image, legend) > 0.01);
+}
+
+#[test]
+fn stacked_panels_are_in_line() {
+    let frames = frames(&sweep());
+    assert_eq!(
+        (frames[0].left, frames[0].right),
+        (frames[1].left, frames[1].right)
+    );
+    assert!((frames[0].height() - frames[1].height()).abs() < 1e-9);
+    assert!(frames[0].bottom < frames[1].top);
+    let figure = sweep();
+    assert_eq!(figure.x_axis(0), figure.x_axis(1));
+}
+
+#[test]
+fn curves_stay_in_the_frame_and_break_where_there_is_no_value() {
+    let red = Colour(255, 0, 0);
+    let points = [
+        (0.0, 1e-3),
+        (1.0, 1e3),
+        (2.0, 1e-3),
+        (3.0, 0.0),
+        (4.0, 1e-1),
+        (5.0, 1e-1),
+    ];
+    let figure = Figure::new(LinePlot {
+        y_scale: Scale::Log,
+        x_range: Some((0.0, 5.0)),
+        y_range: Some((1e-2, 1e0)),
+        series: vec![Series::line("", points).colour(red)],
+        ..LinePlot::default()
+    });
+    let image = figure.render().unwrap();
+    let frame = frames(&figure)[0];
+    let is_red = |x: u32, y: u32| {
+        let [r, g, b] = image.pixel(x, y);
+        r > 200 && g < 60 && b < 60
+    };
+    let columns = |from: f64, to: f64| {
+        let px =
+            |v: f64| ((frame.left + v / 5.0 * frame.width()) * f64::from(PIXELS_PER_POINT)) as u32;
+        (px(from)..px(to)).map(|x| (0..image.height).filter(|&y| is_red(x, y)).count())
+    };
+    assert!(
+        columns(0.2, 0.3).all(|n| n > 0),
+        "the rising branch crosses the frame"
+    );
+    assert!(
+        columns(0.7, 1.3).all(|n| n == 0),
+        "nothing is drawn along the upper edge"
+    );
+    assert!(
+        columns(2.1, 3.9).all(|n| n == 0),
+        "the point at 0 has no line to it"
+    );
+    assert!(
+        columns(4.1, 4.9).all(|n| n > 0),
+        "the line goes on after the gap"
+    );
+    let outside = (0..image.height)
+        .flat_map(|y| (0..image.width).map(move |x| (x, y)))
+        .filter(|&(x, y)| is_red(x, y))
+        .filter(|&(x, y)| {
+            let at = |v: u32| (f64::from(v) + 0.5) / f64::from(PIXELS_PER_POINT);
+            let (x, y) = (at(x), at(y));
+            // A slanted line of 1.3 points ends at a right angle, so half its width may show.
+            let grown = Rect {
+                left: frame.left - 0.7,
+                top: frame.top - 0.7,
+                right: frame.right + 0.7,
+                bottom: frame.bottom + 0.7,
+            };
+            !grown.contains((x, y))
+        });
+    assert_eq!(outside.count(), 0);
+}
+
+#[test]
+fn no_room_is_an_error_of_one_line() {
+    let mut figure = histories();
+    figure.width = 120;
+    let message = figure.render().unwrap_err().to_string();
+    assert!(
+        message.contains("120×380") && !message.contains('\n'),
+        "{message}"
+    );
+}
+
+#[test]
+fn empty_plots_are_drawn() {
+    assert!(Figure::new(LinePlot::default()).render().is_ok());
+    assert!(Figure::row([SparsityPlot::new("", 0, [])]).render().is_ok());
+    let none: [LinePlot; 0] = [];
+    let figure = Figure {
+        height: 100,
+        ..Figure::stack(none)
+    };
+    assert!(figure.render().is_ok());
+}
+
+#[test]
+fn equal_units_make_a_circle_round() {
+    let circle = (0..=200).map(|i| (f64::from(i) * std::f64::consts::TAU / 200.0).sin_cos());
+    let figure = Figure::new(LinePlot {
+        equal_units: true,
+        series: vec![Series::line("", circle).colour(Colour(255, 0, 0))],
+        ..LinePlot::default()
+    });
+    let image = figure.render().unwrap();
+    let red = |x: u32, y: u32| image.pixel(x, y)[0] > 200 && image.pixel(x, y)[1] < 60;
+    let columns = (0..image.width).filter(|&x| (0..image.height).any(|y| red(x, y)));
+    let rows = (0..image.height).filter(|&y| (0..image.width).any(|x| red(x, y)));
+    let (width, height) = (columns.count(), rows.count());
+    assert!(width.abs_diff(height) <= 2, "{width}×{height}");
+    assert!(height > 700, "it fills the frame: {height}");
+}
+
+#[test]
+fn a_shared_axis_keeps_the_range_that_was_asked_for() {
+    let figure = sweep();
+    let axis = figure.x_axis(0);
+    assert_eq!((axis.lo, axis.hi), (0.0, 1.2));
+}

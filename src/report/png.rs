@@ -1,0 +1,129 @@
+//! Images and their PNG form.
+
+use crate::Result;
+use crate::output::write_file;
+use std::io::{self, Write};
+use std::path::Path;
+
+/// An image of 8-bit red, green, blue.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// In pixels.
+    pub width: u32,
+    pub height: u32,
+    /// Three bytes a pixel, row by row from the top left: 3·width·height bytes.
+    pub rgb: Vec<u8>,
+}
+
+impl Image {
+    /// The image whose pixels are the averages of `factor`×`factor` blocks of this one; what does not fill a
+    /// block at the right and the bottom is left out. Cost: one pass.
+    pub fn reduced(&self, factor: u32) -> Image {
+        let (width, height) = (self.width / factor, self.height / factor);
+        let factor = factor as usize;
+        let (row, out_row) = (3 * self.width as usize, 3 * width as usize);
+        let count = (factor * factor) as u32;
+        let mut rgb = Vec::with_capacity(out_row * height as usize);
+        let mut sums = vec![0_u32; out_row];
+        for lines in self.rgb.chunks(factor * row).take(height as usize) {
+            sums.fill(0);
+            for line in lines.chunks(row) {
+                for (sum, block) in sums.chunks_mut(3).zip(line.chunks_exact(3 * factor)) {
+                    for pixel in block.chunks(3) {
+                        for (s, &p) in sum.iter_mut().zip(pixel) {
+                            *s += u32::from(p);
+                        }
+                    }
+                }
+            }
+            rgb.extend(sums.iter().map(|&s| ((s + count / 2) / count) as u8));
+        }
+        Image { width, height, rgb }
+    }
+
+    /// The colour of the pixel in column `x` and row `y`.
+    ///
+    /// # Panics
+    /// If there is no such pixel.
+    pub fn pixel(&self, x: u32, y: u32) -> [u8; 3] {
+        assert!(x < self.width && y < self.height, "pixel inside the image");
+        let at = 3 * (y as usize * self.width as usize + x as usize);
+        [self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]]
+    }
+
+    /// Writes the image as PNG: RGB, 8 bits, no time stamp, so that the same image gives the same bytes.
+    ///
+    /// # Errors
+    /// Those of `out`, and a width or height of 0.
+    pub fn write_png(&self, out: &mut dyn Write) -> io::Result<()> {
+        let mut encoder = png::Encoder::new(out, self.width, self.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::High);
+        // Drawings are runs of one colour, which deflate sees best unfiltered.
+        encoder.set_filter(png::Filter::NoFilter);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.rgb)?;
+        Ok(writer.finish()?)
+    }
+
+    /// Writes the PNG file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`](crate::Error::Io) if it cannot be written.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        write_file(path, |out| self.write_png(out))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reduction_averages_blocks() {
+        // 5×4 pixels, red = 10·row + column; the fifth column fills no 2×2 block.
+        let rgb = (0..20).flat_map(|i| [10 * (i / 5) + i % 5, 7, 255]);
+        let image = Image {
+            width: 5,
+            height: 4,
+            rgb: rgb.collect(),
+        };
+        let half = image.reduced(2);
+        assert_eq!((half.width, half.height), (2, 2));
+        // Mean of {0, 1, 10, 11} is 5.5, rounded up.
+        assert_eq!(half.pixel(0, 0), [6, 7, 255]);
+        assert_eq!(half.pixel(1, 0), [8, 7, 255]);
+        assert_eq!(half.pixel(0, 1), [26, 7, 255]);
+        assert_eq!(image.reduced(1), image);
+    }
+
+    #[test]
+    fn a_png_decodes_to_its_image() {
+        let rgb: Vec<u8> = (0..3 * 7 * 5).map(|i| (i * 37 % 256) as u8).collect();
+        let image = Image {
+            width: 7,
+            height: 5,
+            rgb,
+        };
+        let mut bytes = Vec::new();
+        image.write_png(&mut bytes).unwrap();
+        let mut reader = png::Decoder::new(io::Cursor::new(&bytes))
+            .read_info()
+            .unwrap();
+        let mut decoded = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut decoded).unwrap();
+        assert_eq!((info.width, info.height), (7, 5));
+        assert_eq!(decoded, image.rgb);
+    }
+
+    #[test]
+    fn an_image_without_pixels_is_an_error() {
+        let image = Image {
+            width: 0,
+            height: 0,
+            rgb: vec![],
+        };
+        assert!(image.write_png(&mut Vec::new()).is_err());
+    }
+}

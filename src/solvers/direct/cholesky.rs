@@ -1,0 +1,149 @@
+//! Sparse Cholesky M = LLᵀ and LDLᵀ by faer, under an approximate minimum degree order.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::ldlt::factor::LdltError;
+use faer::linalg::cholesky::llt::factor::LltError;
+use faer::sparse::linalg::cholesky::{
+    LdltRef, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, Mat, Par, Side};
+use glam::DVec3;
+
+use super::{Factorization, failed};
+use crate::assemble::Csr;
+use crate::solvers::iteration::{Failure, Outcome};
+
+/// Which of the two factorizations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// M = LLᵀ: fails on a pivot that is not positive.
+    Llt,
+    /// M = LDLᵀ: fails on a vanishing pivot only.
+    Ldlt,
+}
+
+/// M factored by faer. Sequential: for these small supernodes a second thread costs more than it gives, and the
+/// result does not depend on the number of threads.
+pub struct Cholesky {
+    kind: Kind,
+    symbolic: SymbolicCholesky<u32>,
+    values: Vec<f64>,
+    right_hand_sides: Mat<f64>,
+    scratch: MemBuffer,
+}
+
+/// M, which is symmetric, as faer's compressed columns, without a copy.
+pub(super) fn faer_pattern(m: &Csr) -> SymbolicSparseColMatRef<'_, u32> {
+    let (offsets, columns) = (m.pattern().offsets(), m.pattern().columns());
+    SymbolicSparseColMatRef::new_checked(m.len(), m.len(), offsets, None, columns)
+}
+
+impl Cholesky {
+    /// Factors the symmetric matrix `m`.
+    ///
+    /// # Errors
+    /// [`Outcome::Singular`] on a pivot that the factorization refuses, [`Outcome::Breakdown`] when memory or
+    /// 32-bit indices do not suffice.
+    pub fn new(m: &Csr, kind: Kind) -> Result<Self, Failure> {
+        let name = match kind {
+            Kind::Llt => "Cholesky",
+            Kind::Ldlt => "LDLᵀ",
+        };
+        let broken = |why: &dyn std::fmt::Debug| failed(name, Outcome::Breakdown, why);
+        let pattern = faer_pattern(m);
+        let symbolic = factorize_symbolic_cholesky(
+            pattern,
+            Side::Upper,
+            SymmetricOrdering::Amd,
+            Default::default(),
+        )
+        .map_err(|e| broken(&e))?;
+        let matrix = SparseColMatRef::new(pattern, m.values());
+        let mut values = vec![0.0; symbolic.len_val()];
+        match kind {
+            Kind::Llt => {
+                let need = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+                let mut memory = MemBuffer::try_new(need).map_err(|e| broken(&e))?;
+                symbolic
+                    .factorize_numeric_llt(
+                        &mut values,
+                        matrix,
+                        Side::Upper,
+                        Default::default(),
+                        Par::Seq,
+                        MemStack::new(&mut memory),
+                        Default::default(),
+                    )
+                    .map_err(|e| match e {
+                        LltError::NonPositivePivot { index } => Failure {
+                            outcome: Outcome::Singular,
+                            detail: format!("{name}: pivot {index} is not positive"),
+                        },
+                    })?;
+            }
+            Kind::Ldlt => {
+                let need = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
+                let mut memory = MemBuffer::try_new(need).map_err(|e| broken(&e))?;
+                symbolic
+                    .factorize_numeric_ldlt(
+                        &mut values,
+                        matrix,
+                        Side::Upper,
+                        Default::default(),
+                        Par::Seq,
+                        MemStack::new(&mut memory),
+                        Default::default(),
+                    )
+                    .map_err(|e| match e {
+                        LdltError::ZeroPivot { index } => Failure {
+                            outcome: Outcome::Singular,
+                            detail: format!("{name}: pivot {index} vanishes"),
+                        },
+                    })?;
+            }
+        }
+        let scratch = MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(3, Par::Seq))
+            .map_err(|e| broken(&e))?;
+        Ok(Cholesky {
+            kind,
+            symbolic,
+            values,
+            right_hand_sides: Mat::zeros(m.len(), 3),
+            scratch,
+        })
+    }
+}
+
+impl Factorization for Cholesky {
+    fn solve(&mut self, h: &[f64], x: &mut [DVec3]) {
+        let b = &mut self.right_hand_sides;
+        for (i, (v, h)) in x.iter().zip(h).enumerate() {
+            for axis in 0..3 {
+                b[(i, axis)] = v[axis] / h;
+            }
+        }
+        let stack = MemStack::new(&mut self.scratch);
+        match self.kind {
+            Kind::Llt => LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+                Conj::No,
+                b.as_mut(),
+                Par::Seq,
+                stack,
+            ),
+            Kind::Ldlt => LdltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+                Conj::No,
+                b.as_mut(),
+                Par::Seq,
+                stack,
+            ),
+        }
+        for (i, v) in x.iter_mut().enumerate() {
+            *v = DVec3::new(b[(i, 0)], b[(i, 1)], b[(i, 2)]);
+        }
+    }
+
+    fn fill(&self) -> Option<usize> {
+        Some(self.symbolic.len_val())
+    }
+}

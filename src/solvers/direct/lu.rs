@@ -1,0 +1,95 @@
+//! Sparse LU of A by faer, with partial pivoting under a COLAMD column order.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::SparseColMatRef;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::lu::{
+    LuRef, LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu,
+};
+use faer::{Conj, Mat, Par};
+use glam::DVec3;
+
+use super::cholesky::faer_pattern;
+use super::{Factorization, failed};
+use crate::assemble::LimitSystem;
+use crate::solvers::iteration::{Failure, Outcome};
+
+/// A factored by faer, sequentially. The supernodal variant always: the simplicial one panics on a vanishing
+/// pivot.
+pub struct SparseLu {
+    symbolic: SymbolicLu<u32>,
+    numeric: NumericLu<u32, f64>,
+    right_hand_sides: Mat<f64>,
+    scratch: MemBuffer,
+}
+
+impl SparseLu {
+    /// Factors A.
+    ///
+    /// # Errors
+    /// [`Outcome::Singular`] if A is structurally singular, [`Outcome::Breakdown`] when memory or 32-bit indices
+    /// do not suffice.
+    pub fn new(system: &LimitSystem) -> Result<Self, Failure> {
+        let broken = |why: &dyn std::fmt::Debug| failed("LU", Outcome::Breakdown, why);
+        // Column j of A holds h_i m_ij: row j of M, weighted by the column's H.
+        let m = &system.m;
+        let values: Vec<f64> = m
+            .pattern()
+            .columns()
+            .iter()
+            .zip(m.values())
+            .map(|(&i, &m)| system.h[i as usize] * m)
+            .collect();
+        let pattern = faer_pattern(m);
+        let params = LuSymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..Default::default()
+        };
+        let symbolic = factorize_symbolic_lu(pattern, params).map_err(|e| broken(&e))?;
+        let need = symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Default::default());
+        let mut memory = MemBuffer::try_new(need).map_err(|e| broken(&e))?;
+        let mut numeric = NumericLu::new();
+        symbolic
+            .factorize_numeric_lu(
+                &mut numeric,
+                SparseColMatRef::new(pattern, &values),
+                Par::Seq,
+                MemStack::new(&mut memory),
+                Default::default(),
+            )
+            .map_err(|e| failed("LU", Outcome::Singular, e))?;
+        let scratch = MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(3, Par::Seq))
+            .map_err(|e| broken(&e))?;
+        Ok(SparseLu {
+            symbolic,
+            numeric,
+            right_hand_sides: Mat::zeros(m.len(), 3),
+            scratch,
+        })
+    }
+}
+
+impl Factorization for SparseLu {
+    fn solve(&mut self, _h: &[f64], x: &mut [DVec3]) {
+        let b = &mut self.right_hand_sides;
+        for (i, v) in x.iter().enumerate() {
+            for axis in 0..3 {
+                b[(i, axis)] = v[axis];
+            }
+        }
+        LuRef::new_unchecked(&self.symbolic, &self.numeric).solve_in_place_with_conj(
+            Conj::No,
+            b.as_mut(),
+            Par::Seq,
+            MemStack::new(&mut self.scratch),
+        );
+        for (i, v) in x.iter_mut().enumerate() {
+            *v = DVec3::new(b[(i, 0)], b[(i, 1)], b[(i, 2)]);
+        }
+    }
+
+    /// faer keeps the size of its supernodal LU factors to itself.
+    fn fill(&self) -> Option<usize> {
+        None
+    }
+}

@@ -1,0 +1,147 @@
+//! Direct methods: a factorization of A or M, as an iteration whose first step solves and whose further steps
+//! refine. Every solve is followed by a check of the true residual: that is the history's next entry.
+
+mod cholesky;
+mod lu;
+mod second_opinion;
+
+pub use cholesky::{Cholesky, Kind};
+pub use lu::SparseLu;
+pub use second_opinion::SecondOpinion;
+
+use glam::DVec3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::iteration::{Errors, Failure, Iterate, Outcome};
+use super::system::{Rows, System};
+
+/// A factored matrix that solves systems with A.
+pub trait Factorization {
+    /// `x ← A⁻¹ x` for three right-hand sides at once. `h` is the diagonal of H.
+    fn solve(&mut self, h: &[f64], x: &mut [DVec3]);
+
+    /// The number of stored entries of the factors, if the library tells.
+    fn fill(&self) -> Option<usize>;
+}
+
+/// A direct method at work. Iteration 1 is the solve; more only follow, as iterative refinement, if its residual
+/// misses the tolerance.
+pub struct Direct<'a, S, F> {
+    system: &'a S,
+    points: &'a [DVec3],
+    factorization: F,
+    current: Vec<DVec3>,
+    residual: Vec<DVec3>,
+    rows: Rows,
+}
+
+/// A is called singular if the estimate of λ_min(A) is below this many times N·ε: backward stable factorizations
+/// perturb the eigenvalues, which are at most 1, by a small multiple of ε that grows with N at most linearly.
+pub const SINGULAR: f64 = 4.0;
+
+impl<'a, S: System, F: Factorization> Direct<'a, S, F> {
+    /// Starts from V = P with a factorization of the system's matrix.
+    ///
+    /// # Errors
+    /// [`Outcome::Singular`] if three steps of inverse iteration on H^½MH^½, which is similar to A, estimate
+    /// λ_min(A) below [`SINGULAR`]·N·ε. (λ_max is 1, so λ_min is the reciprocal condition number.)
+    pub fn new(system: &'a S, points: &'a [DVec3], mut factorization: F) -> Result<Self, Failure> {
+        let n = system.len();
+        let threshold = SINGULAR * n as f64 * f64::EPSILON;
+        let estimate = smallest_eigenvalue(system.weights(), &mut factorization);
+        // Not a number: an exactly vanishing pivot.
+        if estimate.is_nan() || estimate < threshold {
+            return Err(Failure {
+                outcome: Outcome::Singular,
+                detail: format!(
+                    "the smallest eigenvalue of A is estimated as {estimate:.1e}, below {SINGULAR}·N·ε = {threshold:.1e}"
+                ),
+            });
+        }
+        Ok(Direct {
+            system,
+            points,
+            factorization,
+            current: points.to_vec(),
+            residual: vec![DVec3::ZERO; n],
+            rows: Rows::new(n),
+        })
+    }
+}
+
+/// |x|/|A⁻¹x| after inverse iteration from a random vector, three of them at once: an upper bound of the smallest
+/// eigenvalue of H^½MH^½, close where that one is tiny. NaN or 0 if the factors hold a vanishing pivot.
+fn smallest_eigenvalue(h: &[f64], factorization: &mut impl Factorization) -> f64 {
+    let mut rng = ChaCha8Rng::seed_from_u64(0x7069_766f_7473);
+    let mut x: Vec<DVec3> = (0..h.len())
+        .map(|_| {
+            DVec3::new(
+                rng.random_range(-1.0..1.0),
+                rng.random_range(-1.0..1.0),
+                rng.random_range(-1.0..1.0),
+            )
+        })
+        .collect();
+    let norm = |x: &[DVec3]| {
+        x.iter()
+            .fold(DVec3::ZERO, |sum, v| sum + *v * *v)
+            .map(f64::sqrt)
+    };
+    let mut estimate = DVec3::ONE;
+    for _ in 0..3 {
+        let before = norm(&x);
+        // (H^½MH^½)⁻¹ = H^-½ A⁻¹ H^½
+        for (v, h) in x.iter_mut().zip(h) {
+            *v *= h.sqrt() / before;
+        }
+        factorization.solve(h, &mut x);
+        for (v, h) in x.iter_mut().zip(h) {
+            *v /= h.sqrt();
+        }
+        estimate = norm(&x).recip();
+        if estimate.is_nan() || estimate.min_element() == 0.0 {
+            break;
+        }
+    }
+    if estimate.is_nan() {
+        f64::NAN
+    } else {
+        estimate.min_element()
+    }
+}
+
+impl<S: System, F: Factorization> Iterate for Direct<'_, S, F> {
+    fn errors(&mut self) -> Errors {
+        self.rows
+            .residual(
+                self.system,
+                self.points,
+                &self.current,
+                &mut self.residual,
+                |_, e, out, _| *out = e,
+            )
+            .errors
+    }
+
+    fn advance(&mut self) -> Result<(), Failure> {
+        self.factorization
+            .solve(self.system.weights(), &mut self.residual);
+        for (v, d) in self.current.iter_mut().zip(&self.residual) {
+            *v += *d;
+        }
+        Ok(())
+    }
+
+    fn points(&self) -> &[DVec3] {
+        &self.current
+    }
+}
+
+/// A factorization that could not be made.
+fn failed(method: &str, outcome: Outcome, why: impl std::fmt::Debug) -> Failure {
+    Failure {
+        outcome,
+        detail: format!("{method}: {why:?}"),
+    }
+}

@@ -1,0 +1,346 @@
+//! The loop that all methods share: error, stopping rules, update, history.
+
+use std::fmt;
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+
+/// The paper's two errors of an iterate: over the vertices, in the units of the mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Errors {
+    /// max_i ‖p_i − (A v)_i‖₂
+    pub max: f64,
+    /// mean_i ‖p_i − (A v)_i‖₂
+    pub mean: f64,
+}
+
+/// When to stop: at the first iterate with maximum error ≤ `tolerance` (absolute, in mesh units), or after
+/// `max_iterations` updates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop {
+    pub tolerance: f64,
+    pub max_iterations: usize,
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The tolerance is met by the true residual.
+    Converged,
+    /// The error grew: [`GROWTH`]-fold from its smallest value with [`RISES`] rises in a row, or
+    /// [`BLOW_UP`]-fold from the start, or it is no longer finite.
+    Diverged,
+    /// The limit on iterations came first.
+    MaxIterations,
+    /// The smallest error has not improved by a relative [`PROGRESS`] within [`PATIENCE`] iterations.
+    Stagnated,
+    /// The matrix is singular to working precision.
+    Singular,
+    /// The method cannot go on (a factorization or a recurrence broke down).
+    Breakdown,
+    /// The caller's watch said stop.
+    Stopped,
+}
+
+impl Outcome {
+    pub fn name(self) -> &'static str {
+        match self {
+            Outcome::Converged => "converged",
+            Outcome::Diverged => "diverged",
+            Outcome::MaxIterations => "max-iterations",
+            Outcome::Stagnated => "stagnated",
+            Outcome::Singular => "singular",
+            Outcome::Breakdown => "breakdown",
+            Outcome::Stopped => "stopped",
+        }
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// What a run leaves besides the control points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    pub outcome: Outcome,
+    /// Updates of all vertices made.
+    pub iterations: usize,
+    /// The errors of every iterate; entry 0 is the start, so there are `iterations + 1`.
+    pub history: Vec<Errors>,
+    /// What was found where the outcome needs a reason.
+    pub detail: Option<String>,
+}
+
+impl Report {
+    /// The errors of the last iterate.
+    pub fn last(&self) -> Errors {
+        self.history.last().copied().unwrap_or(Errors {
+            max: f64::NAN,
+            mean: f64::NAN,
+        })
+    }
+}
+
+/// What the watch sees after the errors of an iterate are known, first for the start.
+#[derive(Clone, Copy, Debug)]
+pub struct Step<'a> {
+    pub iteration: usize,
+    pub errors: Errors,
+    pub points: &'a [DVec3],
+}
+
+/// Why a method cannot be set up or go on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    /// [`Outcome::Singular`] or [`Outcome::Breakdown`].
+    pub outcome: Outcome,
+    pub detail: String,
+}
+
+/// One method at work on one system: it knows the errors of its current iterate and can replace it by the next.
+pub trait Iterate {
+    /// The errors of the current iterate, by the true residual. Called once an iterate, before
+    /// [`advance`](Self::advance), so that a method may prepare the update in the same pass.
+    fn errors(&mut self) -> Errors;
+
+    /// Replaces the current iterate by the next one.
+    ///
+    /// # Errors
+    /// A recurrence that broke down; the current iterate stays.
+    fn advance(&mut self) -> Result<(), Failure>;
+
+    /// The current iterate: control points, one a vertex.
+    fn points(&self) -> &[DVec3];
+}
+
+/// An error this many times the smallest one so far is divergence, if it also rose [`RISES`] times in a row.
+/// Tuned: errors of convergent runs of all methods here rose less than 100-fold.
+pub const GROWTH: f64 = 1e3;
+/// Rises in a row that go with [`GROWTH`].
+pub const RISES: usize = 10;
+/// An error this many times the start's is divergence at once.
+pub const BLOW_UP: f64 = 1e12;
+/// Errors below this part of the start's count as this much, so that noise at rounding level is no growth.
+pub const NOISE: f64 = 1e-13;
+/// Iterations without [`PROGRESS`] after which a run has stagnated.
+pub const PATIENCE: usize = 100;
+/// The relative improvement of the smallest error that counts as progress.
+pub const PROGRESS: f64 = 1e-8;
+
+/// Runs `method` until a stopping rule applies. The start is the method's current iterate. The watch sees every
+/// iterate and may stop the run.
+pub fn solve(
+    method: &mut dyn Iterate,
+    stop: &Stop,
+    watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
+) -> Report {
+    let mut history: Vec<Errors> = Vec::new();
+    let mut rules = Rules::default();
+    loop {
+        let errors = method.errors();
+        let iteration = history.len();
+        history.push(errors);
+        let step = Step {
+            iteration,
+            errors,
+            points: method.points(),
+        };
+        let told = watch(&step);
+        let ended = if errors.max <= stop.tolerance {
+            Some(Outcome::Converged)
+        } else if let Some(outcome) = rules.judge(errors.max) {
+            Some(outcome)
+        } else if told.is_break() {
+            Some(Outcome::Stopped)
+        } else if iteration >= stop.max_iterations {
+            Some(Outcome::MaxIterations)
+        } else {
+            None
+        };
+        let (outcome, detail) = match ended {
+            Some(outcome) => (outcome, None),
+            None => match method.advance() {
+                Ok(()) => continue,
+                Err(failure) => (failure.outcome, Some(failure.detail)),
+            },
+        };
+        return Report {
+            outcome,
+            iterations: iteration,
+            history,
+            detail,
+        };
+    }
+}
+
+/// The state of the rules for divergence and stagnation.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rules {
+    start: Option<f64>,
+    previous: f64,
+    smallest: f64,
+    rises: usize,
+    since_progress: usize,
+}
+
+impl Rules {
+    fn judge(&mut self, error: f64) -> Option<Outcome> {
+        if !error.is_finite() {
+            return Some(Outcome::Diverged);
+        }
+        let Some(start) = self.start else {
+            *self = Rules {
+                start: Some(error),
+                previous: error,
+                smallest: error,
+                ..Rules::default()
+            };
+            return None;
+        };
+        self.rises = if error > self.previous {
+            self.rises + 1
+        } else {
+            0
+        };
+        self.previous = error;
+        if error < self.smallest * (1.0 - PROGRESS) {
+            self.since_progress = 0;
+        } else {
+            self.since_progress += 1;
+        }
+        self.smallest = self.smallest.min(error);
+        let floor = self.smallest.max(NOISE * start);
+        if error > BLOW_UP * start || (error > GROWTH * floor && self.rises >= RISES) {
+            Some(Outcome::Diverged)
+        } else if self.since_progress >= PATIENCE && self.rises < RISES {
+            Some(Outcome::Stagnated)
+        } else {
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An iteration whose errors are a given sequence.
+    struct Script<'a> {
+        errors: &'a dyn Fn(usize) -> f64,
+        k: usize,
+    }
+
+    impl Iterate for Script<'_> {
+        fn errors(&mut self) -> Errors {
+            let max = (self.errors)(self.k);
+            Errors {
+                max,
+                mean: 0.5 * max,
+            }
+        }
+        fn advance(&mut self) -> Result<(), Failure> {
+            self.k += 1;
+            Ok(())
+        }
+        fn points(&self) -> &[DVec3] {
+            &[]
+        }
+    }
+
+    fn run(errors: &dyn Fn(usize) -> f64, tolerance: f64) -> Report {
+        let stop = Stop {
+            tolerance,
+            max_iterations: 5000,
+        };
+        solve(&mut Script { errors, k: 0 }, &stop, &mut |_| {
+            ControlFlow::Continue(())
+        })
+    }
+
+    #[test]
+    fn converges_at_the_first_iterate_within_tolerance() {
+        let report = run(&|k| 0.5f64.powi(k as i32), 1e-3);
+        assert_eq!(report.outcome, Outcome::Converged);
+        assert_eq!(report.iterations, 10); // 2⁻¹⁰ < 10⁻³ < 2⁻⁹
+        assert_eq!(report.history.len(), 11);
+        assert_eq!(report.history[0].max, 1.0);
+    }
+
+    #[test]
+    fn a_start_within_tolerance_needs_no_iteration() {
+        let report = run(&|_| 0.0, 0.0);
+        assert_eq!(
+            (report.outcome, report.iterations),
+            (Outcome::Converged, 0)
+        );
+    }
+
+    #[test]
+    fn geometric_growth_is_divergence_early() {
+        // 1.25^31 is the first power beyond 1000.
+        let report = run(&|k| 1.25f64.powi(k as i32), 1e-3);
+        assert_eq!((report.outcome, report.iterations), (Outcome::Diverged, 31));
+    }
+
+    #[test]
+    fn decay_that_turns_into_growth_is_divergence() {
+        let report = run(&|k| 0.7f64.powi(k as i32) + 1e-4 * 1.01f64.powi(k as i32), 1e-9);
+        assert_eq!(report.outcome, Outcome::Diverged);
+    }
+
+    #[test]
+    fn slow_growth_is_not_called_stagnation() {
+        let report = run(&|k| 1.0025f64.powi(k as i32), 1e-9);
+        assert_eq!(report.outcome, Outcome::Diverged);
+    }
+
+    #[test]
+    fn a_floor_is_stagnation() {
+        let report = run(&|k| 0.5f64.powi(k as i32) + 1e-5, 1e-9);
+        assert_eq!(report.outcome, Outcome::Stagnated);
+        assert!(report.iterations < 200);
+    }
+
+    #[test]
+    fn slow_convergence_is_no_stagnation() {
+        let report = run(&|k| (-1e-6 * k as f64).exp(), 1e-9);
+        assert_eq!(report.outcome, Outcome::MaxIterations);
+        assert_eq!(report.iterations, 5000);
+    }
+
+    #[test]
+    fn not_a_number_is_divergence() {
+        let report = run(&|k| if k == 3 { f64::NAN } else { 1.0 / (k + 1) as f64 }, 1e-9);
+        assert_eq!((report.outcome, report.iterations), (Outcome::Diverged, 3));
+    }
+
+    #[test]
+    fn the_watch_sees_every_iterate_and_may_stop() {
+        let mut seen = Vec::new();
+        let stop = Stop {
+            tolerance: 0.0,
+            max_iterations: 50,
+        };
+        let errors = |k: usize| 1.0 / (k + 1) as f64;
+        let report = solve(
+            &mut Script {
+                errors: &errors,
+                k: 0,
+            },
+            &stop,
+            &mut |step| {
+                seen.push(step.iteration);
+                if step.iteration == 4 {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            },
+        );
+        assert_eq!(seen, [0, 1, 2, 3, 4]);
+        assert_eq!((report.outcome, report.iterations), (Outcome::Stopped, 4));
+    }
+}

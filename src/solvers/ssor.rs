@@ -1,0 +1,84 @@
+//! Symmetric SOR: a sweep in the vertex order, then one in the reverse order; both together are one iteration.
+//!
+//! Converges for 0 < ω < 2 where A is non-singular. Its iteration matrix has real eigenvalues in [0, 1), and so it
+//! may serve as a preconditioner of conjugate gradients. Three passes over A an iteration, error included.
+
+use glam::DVec3;
+
+use super::gauss_seidel::sweep;
+use super::iteration::{Errors, Failure, Iterate};
+use super::system::{Rows, System};
+
+/// Symmetric SOR at work.
+pub struct Ssor<'a, S> {
+    system: &'a S,
+    points: &'a [DVec3],
+    omega: f64,
+    order: Option<&'a [u32]>,
+    current: Vec<DVec3>,
+    rows: Rows,
+}
+
+impl<'a, S: System> Ssor<'a, S> {
+    /// Starts from V = P; see [`Sor::new`](super::gauss_seidel::Sor::new).
+    ///
+    /// # Panics
+    /// If the order names a vertex that the system lacks.
+    pub fn new(
+        system: &'a S,
+        points: &'a [DVec3],
+        omega: f64,
+        order: Option<&'a [u32]>,
+    ) -> Self {
+        Ssor {
+            system,
+            points,
+            omega,
+            order,
+            current: points.to_vec(),
+            rows: Rows::new(points.len()),
+        }
+    }
+}
+
+impl<S: System> Iterate for Ssor<'_, S> {
+    fn errors(&mut self) -> Errors {
+        self.rows.errors(self.system, self.points, &self.current)
+    }
+
+    fn advance(&mut self) -> Result<(), Failure> {
+        symmetric_sweep(
+            self.system,
+            self.points,
+            self.omega,
+            self.order,
+            &mut self.current,
+        );
+        Ok(())
+    }
+
+    fn points(&self) -> &[DVec3] {
+        &self.current
+    }
+}
+
+/// A forward and a backward sweep.
+pub fn symmetric_sweep<S: System>(
+    system: &S,
+    points: &[DVec3],
+    omega: f64,
+    order: Option<&[u32]>,
+    x: &mut [DVec3],
+) {
+    match order {
+        Some(order) => {
+            let vertices = order.iter().map(|&i| i as usize);
+            sweep(system, points, omega, vertices.clone(), x);
+            sweep(system, points, omega, vertices.rev(), x);
+        }
+        None => {
+            sweep(system, points, omega, 0..points.len(), x);
+            sweep(system, points, omega, (0..points.len()).rev(), x);
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! What a method may ask of a system, and the parallel loop over rows that every fused update uses.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::iteration::Errors;
+use crate::assemble::LimitSystem;
+
+/// The matrix A of a limit system: A = H·M with H = diag(weights) positive, M symmetric, and rows of A that sum
+/// to 1.
+pub trait System: Sync {
+    /// The number of unknown points N.
+    fn len(&self) -> usize;
+
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The diagonal of H.
+    fn weights(&self) -> &[f64];
+
+    /// The diagonal of A.
+    fn diagonal(&self) -> &[f64];
+
+    /// Row `i` of the product, (A x)_i. In-place relaxation calls it while `x` changes.
+    fn row(&self, i: usize, x: &[DVec3]) -> DVec3;
+}
+
+impl System for LimitSystem {
+    fn len(&self) -> usize {
+        self.h.len()
+    }
+
+    fn weights(&self) -> &[f64] {
+        &self.h
+    }
+
+    fn diagonal(&self) -> &[f64] {
+        &self.diagonal
+    }
+
+    #[inline]
+    fn row(&self, i: usize, x: &[DVec3]) -> DVec3 {
+        self.a.row_times(i, x)
+    }
+}
+
+/// Rows of one task. Fixed, so that sums over rows do not depend on the number of threads.
+const CHUNK: usize = 4096;
+
+/// What a pass over the rows adds up.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Tally {
+    max_squared: f64,
+    sum: f64,
+    dot: f64,
+}
+
+impl Tally {
+    /// Counts the difference vector `e` of one vertex into the error norms.
+    #[inline]
+    pub fn error(&mut self, e: DVec3) {
+        let squared = e.length_squared();
+        if squared > self.max_squared {
+            self.max_squared = squared;
+        }
+        // A NaN reaches the sum, whatever the comparison above makes of it.
+        self.sum += squared.sqrt();
+    }
+
+    /// Adds one term of an inner product.
+    #[inline]
+    pub fn dot(&mut self, term: f64) {
+        self.dot += term;
+    }
+
+    fn merge(self, other: Tally) -> Tally {
+        Tally {
+            max_squared: self.max_squared.max(other.max_squared),
+            sum: self.sum + other.sum,
+            dot: self.dot + other.dot,
+        }
+    }
+}
+
+/// The combined result of a pass: error norms and an inner product.
+#[derive(Clone, Copy, Debug)]
+pub struct Totals {
+    pub errors: Errors,
+    pub dot: f64,
+}
+
+/// Passes over all rows, in parallel, with sums that are the same for any number of threads: each chunk of 4096
+/// rows is added up in row order, the chunks in their order.
+#[derive(Clone, Debug)]
+pub struct Rows {
+    tallies: Vec<Tally>,
+    n: usize,
+}
+
+impl Rows {
+    pub fn new(n: usize) -> Self {
+        Rows {
+            tallies: vec![Tally::default(); n.div_ceil(CHUNK)],
+            n,
+        }
+    }
+
+    /// Calls `visit(i, &mut a[i], &mut b[i], tally)` for every row.
+    pub fn pass<A: Send, B: Send>(
+        &mut self,
+        a: &mut [A],
+        b: &mut [B],
+        visit: impl Fn(usize, &mut A, &mut B, &mut Tally) + Sync,
+    ) -> Totals {
+        let chunk = |(k, ((a, b), tally)): (usize, ((&mut [A], &mut [B]), &mut Tally))| {
+            *tally = Tally::default();
+            let mut local = Tally::default();
+            for (offset, (a, b)) in a.iter_mut().zip(b).enumerate() {
+                visit(k * CHUNK + offset, a, b, &mut local);
+            }
+            *tally = local;
+        };
+        if self.tallies.len() > 1 {
+            a.par_chunks_mut(CHUNK)
+                .zip(b.par_chunks_mut(CHUNK))
+                .zip(&mut self.tallies)
+                .enumerate()
+                .for_each(chunk);
+        } else {
+            a.chunks_mut(CHUNK)
+                .zip(b.chunks_mut(CHUNK))
+                .zip(&mut self.tallies)
+                .enumerate()
+                .for_each(chunk);
+        }
+        let total = self
+            .tallies
+            .iter()
+            .fold(Tally::default(), |sum, &t| sum.merge(t));
+        let mean = total.sum / self.n.max(1) as f64;
+        let max = if mean.is_nan() {
+            f64::NAN
+        } else {
+            total.max_squared.sqrt()
+        };
+        Totals {
+            errors: Errors { max, mean },
+            dot: total.dot,
+        }
+    }
+
+    /// The differences e_i = p_i − (A x)_i are handed to `visit(i, e_i, &mut out[i], tally)` after they were
+    /// counted into the error norms.
+    pub fn residual<S: System, B: Send>(
+        &mut self,
+        system: &S,
+        points: &[DVec3],
+        x: &[DVec3],
+        out: &mut [B],
+        visit: impl Fn(usize, DVec3, &mut B, &mut Tally) + Sync,
+    ) -> Totals {
+        self.pass_one(out, |i, out, tally| {
+            let e = points[i] - system.row(i, x);
+            tally.error(e);
+            visit(i, e, out, tally);
+        })
+    }
+
+    /// As [`pass`](Self::pass), over one array.
+    pub fn pass_one<A: Send>(
+        &mut self,
+        a: &mut [A],
+        visit: impl Fn(usize, &mut A, &mut Tally) + Sync,
+    ) -> Totals {
+        let n = a.len();
+        // A vector of () takes no memory.
+        let mut nothing = vec![(); n];
+        self.pass(a, &mut nothing, |i, a, (), tally| visit(i, a, tally))
+    }
+
+    /// The error norms of `x` alone.
+    pub fn errors<S: System>(&mut self, system: &S, points: &[DVec3], x: &[DVec3]) -> Errors {
+        let mut nothing = vec![(); self.n];
+        self.residual(system, points, x, &mut nothing, |_, _, (), _| {})
+            .errors
+    }
+}

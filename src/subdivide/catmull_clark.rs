@@ -1,0 +1,167 @@
+//! Catmull-Clark subdivision (Catmull & Clark 1978) of any closed polygon mesh: new face points at centroids,
+//! edge points (Thall Eq. 12), vertex points (Thall Eq. 13); limit and tangent masks after Halstead, Kass &
+//! DeRose 1993, beside non-quads by the regularisation of Thall §2.3.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec3;
+
+use super::star::{
+    Circle, Tangents, centroid, edge_numbers, for_each_star, require_closed, require_room, sides,
+};
+use crate::Result;
+use crate::mesh::topology::{next_in, prev_in};
+use crate::mesh::{Faces, Mesh, Topology};
+
+/// One step.
+///
+/// Vertices of the result: old vertices, then one for each edge (in order of its first half-edge), then one
+/// for each face. Faces of the result: one quad for each old corner, in corner order, as
+/// (vertex, edge leaving it, face, edge entering it).
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold or the
+/// result too large for 32-bit indices.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
+    require_closed(mesh, topology)?;
+    require_room(mesh, 4)?;
+    let old = &mesh.positions;
+    let (vertices, edges, faces) = (mesh.len(), topology.edges(), mesh.faces.len());
+    let corners = mesh.faces.corners().len();
+    let edge = edge_numbers(mesh, topology);
+    let mut positions = vec![DVec3::ZERO; vertices + edges + faces];
+    let (vertex_points, others) = positions.split_at_mut(vertices);
+    let (edge_points, face_points) = others.split_at_mut(edges);
+    let mut quads = Vec::with_capacity(4 * corners);
+    for (f, face) in mesh.faces.iter().enumerate() {
+        let range = mesh.faces.range(f);
+        let center = centroid(old, face);
+        face_points[f] = center;
+        let face_vertex = (vertices + edges + f) as u32;
+        let mut entering = edge[range.end - 1];
+        for (&leaving, (v, w)) in edge[range].iter().zip(sides(face)) {
+            // Each half-edge brings its own quarter share of the edge point, and one neighbour and one face
+            // to the vertex that it leaves.
+            edge_points[leaving as usize] += 0.25 * (old[v] + center);
+            vertex_points[v] += old[w] + center;
+            quads.extend([
+                v as u32,
+                vertices as u32 + leaving,
+                face_vertex,
+                vertices as u32 + entering,
+            ]);
+            entering = leaving;
+        }
+    }
+    for (v, point) in vertex_points.iter_mut().enumerate() {
+        let n = topology.incidence.face_count(v) as f64;
+        *point = (n - 2.0) / n * old[v] + *point / (n * n);
+    }
+    let offsets = (0..=corners as u32).map(|f| 4 * f).collect();
+    Ok(Mesh::new(positions, Faces::from_parts(offsets, quads)))
+}
+
+/// The limit mask of a vertex of valence `n` among quads: the weight of the vertex, of each edge neighbour, of
+/// each opposite corner of a quad: (n², 4, 1)/(n(n+5)).
+pub fn limit_mask(n: usize) -> [f64; 3] {
+    let n = n as f64;
+    let scale = 1.0 / (n * (n + 5.0));
+    [n * n * scale, 4.0 * scale, scale]
+}
+
+/// The limit points of all vertices, of any valence and beside faces of any size:
+/// ((n²−n) v + Σ_j 2 e_j + Σ_F 4 c_F)/(n(n+5)), c_F the centroids, which is [`limit_mask`] with the
+/// opposite corner of each face replaced by 4c_F − v − e_j − e_{j+1} (Thall Eq. 14).
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_positions(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+    require_closed(mesh, topology)?;
+    let mut limits = vec![DVec3::ZERO; mesh.len()];
+    for face in mesh.faces.iter() {
+        let center = 4.0 * centroid(&mesh.positions, face);
+        for (v, w) in sides(face) {
+            limits[v] += 2.0 * mesh.positions[w] + center;
+        }
+    }
+    for (v, limit) in limits.iter_mut().enumerate() {
+        let n = topology.incidence.face_count(v) as f64;
+        *limit = ((n * n - n) * mesh.positions[v] + *limit) / (n * (n + 5.0));
+    }
+    Ok(limits)
+}
+
+/// A_n = 1 + cos(2π/n) + cos(π/n)·√(2(9 + cos(2π/n))) (Thall Eq. 15): the subdominant eigenvalue is (4+A_n)/16.
+pub fn tangent_constant(n: usize) -> f64 {
+    let cosine = (TAU / n as f64).cos();
+    1.0 + cosine + (PI / n as f64).cos() * (2.0 * (9.0 + cosine)).sqrt()
+}
+
+/// The cosine tangent mask of valence `n`: for j = 0…n−1 the weights of edge neighbour j,
+/// A_n cos(2πj/n), and of the opposite corner of the face between neighbours j and j+1,
+/// cos(2πj/n) + cos(2π(j+1)/n). The sine mask has sines in their place. (Halstead et al. give as second
+/// tangent the cosine mask turned by one sector, which spans the same plane.)
+pub fn tangent_mask(n: usize) -> Vec<[f64; 2]> {
+    let constant = tangent_constant(n);
+    let mut circle = Circle::default();
+    let circle = circle.of(n);
+    (0..n)
+        .map(|j| [constant * circle[j].x, circle[j].x + circle[(j + 1) % n].x])
+        .collect()
+}
+
+/// The tangents of the limit surface at all vertices.
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_tangents(mesh: &Mesh, topology: &Topology) -> Result<Vec<Tangents>> {
+    require_closed(mesh, topology)?;
+    let corners = mesh.faces.corners();
+    let mut tangents = Vec::with_capacity(mesh.len());
+    let mut circle = Circle::default();
+    let centers: Vec<DVec3> = mesh
+        .faces
+        .iter()
+        .map(|face| centroid(&mesh.positions, face))
+        .collect();
+    for_each_star(mesh, topology, |v, star| {
+        let n = star.len();
+        let constant = tangent_constant(n);
+        let circle = circle.of(n);
+        let center = mesh.positions[v];
+        let mut pair = Tangents::default();
+        for (j, &c) in star.iter().enumerate() {
+            let f = topology.incidence.face_of(c);
+            let range = mesh.faces.range(f);
+            let leaving = mesh.positions[corners[next_in(&range, c) as usize] as usize] - center;
+            let entering = mesh.positions[corners[prev_in(&range, c) as usize] as usize] - center;
+            // The regularised opposite corner 4c_F − v − e_j − e_{j+1}, seen from v.
+            let opposite = 4.0 * (centers[f] - center) - leaving - entering;
+            pair.add(constant * circle[j], leaving);
+            pair.add(circle[j] + circle[(j + 1) % n], opposite);
+        }
+        tangents.push(pair);
+    });
+    Ok(tangents)
+}
+
+/// The unit normals of the limit surface at all vertices; zero where [`Tangents::normal`] is.
+///
+/// # Errors
+/// As [`limit_tangents`].
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_normals(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+    let tangents = limit_tangents(mesh, topology)?;
+    Ok(tangents.iter().map(Tangents::normal).collect())
+}

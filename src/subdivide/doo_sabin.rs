@@ -1,0 +1,175 @@
+//! Doo-Sabin subdivision (Doo & Sabin 1978) of any closed polygon mesh, and the modified first step of Zheng &
+//! Cai, after which Doo-Sabin goes on. A vertex's limit point is the centroid of its type-V face after the first
+//! step: the point that Nasri's system, or Zheng and Cai's, puts on the given one.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
+
+use super::star::{Circle, Tangents, centroid, for_each_star, require_closed, require_room, twin};
+use crate::Result;
+use crate::mesh::topology::next_in;
+use crate::mesh::{Faces, Mesh, Topology};
+
+/// The rule of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rule {
+    /// V'_i = Σ_j α_ij V_j (Zheng-Cai Eq. 1).
+    DooSabin,
+    /// V'_i = (V_i + centroid)/2 (Zheng-Cai Eq. 4), meant for the first step only.
+    ZhengCai,
+}
+
+impl Rule {
+    /// The weights of the corners of an `m`-gon in its corner 0, in order. Doo-Sabin: (m+5)/(4m), then
+    /// (3 + 2cos(2πj/m))/(4m); Zheng-Cai: ½ + 1/(2m), then 1/(2m).
+    pub fn circulant(self, m: usize) -> Vec<f64> {
+        let size = m as f64;
+        let weight = |j: usize| match (self, j) {
+            (Rule::DooSabin, 0) => (size + 5.0) / (4.0 * size),
+            (Rule::DooSabin, _) => (3.0 + 2.0 * (TAU * j as f64 / size).cos()) / (4.0 * size),
+            (Rule::ZhengCai, 0) => 0.5 + 0.5 / size,
+            (Rule::ZhengCai, _) => 0.5 / size,
+        };
+        (0..m).map(weight).collect()
+    }
+}
+
+/// The new point of every corner: the geometry of one step. O(m) for a face of m corners, since the rule is a
+/// circulant of the constant, the first harmonic and the identity.
+pub fn corner_points(mesh: &Mesh, rule: Rule) -> Vec<DVec3> {
+    let mut points = Vec::with_capacity(mesh.faces.corners().len());
+    let mut circle = Circle::default();
+    for face in mesh.faces.iter() {
+        let size = face.len() as f64;
+        let circle = circle.of(face.len());
+        let corners = || face.iter().map(|&v| mesh.positions[v as usize]);
+        let (mut sum, mut cosine, mut sine) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        for (point, unit) in corners().zip(circle) {
+            sum += point;
+            cosine += unit.x * point;
+            sine += unit.y * point;
+        }
+        match rule {
+            Rule::DooSabin => points.extend(corners().zip(circle).map(|(point, unit)| {
+                0.25 * point + (0.75 * sum + 0.5 * (unit.x * cosine + unit.y * sine)) / size
+            })),
+            Rule::ZhengCai => points.extend(corners().map(|point| 0.5 * (point + sum / size))),
+        }
+    }
+    points
+}
+
+/// One step of Doo-Sabin: [`refine_by`] with [`Rule::DooSabin`].
+///
+/// # Errors
+/// As [`refine_by`].
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
+    refine_by(Rule::DooSabin, mesh, topology)
+}
+
+/// One step by either rule.
+///
+/// Vertices of the result: one for each old corner, in corner order. Faces of the result: type F, one for each
+/// old face, its corners in order; type E, a quad for each edge (in order of its first half-edge); type V, one
+/// for each old vertex, so that the face of vertex v has index F + E + v.
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold or the
+/// result is too large for 32-bit indices.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
+    require_closed(mesh, topology)?;
+    require_room(mesh, 4)?;
+    let old_corners = mesh.faces.corners().len() as u32;
+    let (vertices, edges, faces) = (mesh.len(), topology.edges(), mesh.faces.len());
+    let mut corners = Vec::with_capacity(4 * old_corners as usize);
+    let mut offsets = Vec::with_capacity(faces + edges + vertices + 1);
+    corners.extend(0..old_corners);
+    offsets.extend_from_slice(mesh.faces.offsets());
+
+    let next = |c: u32| {
+        let range = mesh.faces.range(topology.incidence.face_of(c));
+        next_in(&range, c)
+    };
+    for c in topology.edge_sides() {
+        let t = twin(topology, c);
+        corners.extend([next(c), c, next(t), t]);
+        offsets.push(corners.len() as u32);
+    }
+
+    for_each_star(mesh, topology, |_, star| {
+        corners.extend_from_slice(star);
+        offsets.push(corners.len() as u32);
+    });
+    Ok(Mesh::new(
+        corner_points(mesh, rule),
+        Faces::from_parts(offsets, corners),
+    ))
+}
+
+/// The limit points of all vertices when the first step is by `rule` and all others are Doo-Sabin: the
+/// centroids of the type-V faces, (1/n) Σ of the vertex's corner points.
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_positions(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+    require_closed(mesh, topology)?;
+    let mut limits = vec![DVec3::ZERO; mesh.len()];
+    for (&v, point) in mesh.faces.corners().iter().zip(corner_points(mesh, rule)) {
+        limits[v as usize] += point;
+    }
+    for (v, limit) in limits.iter_mut().enumerate() {
+        *limit /= topology.incidence.face_count(v) as f64;
+    }
+    Ok(limits)
+}
+
+/// The unit normals of the limit surface at the [`limit_positions`]; zero where [`Tangents::normal`] is.
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_normals(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+    let limits = limit_positions(rule, mesh, topology)?;
+    let points = corner_points(mesh, rule);
+    let mut normals = Vec::with_capacity(mesh.len());
+    let mut circle = Circle::default();
+    for_each_star(mesh, topology, |v, star| {
+        let ring = star.iter().map(|&c| points[c as usize]);
+        normals.push(ring_normal(limits[v], ring, circle.of(star.len())));
+    });
+    Ok(normals)
+}
+
+/// The unit normals of the Doo-Sabin limit surface at the centroids of the faces, which it passes through; zero
+/// where [`Tangents::normal`] is.
+pub fn face_normals(mesh: &Mesh) -> Vec<DVec3> {
+    let mut circle = Circle::default();
+    let normal = |face: &[u32]| {
+        let center = centroid(&mesh.positions, face);
+        let ring = face.iter().map(|&v| mesh.positions[v as usize]);
+        ring_normal(center, ring, circle.of(face.len()))
+    };
+    mesh.faces.iter().map(normal).collect()
+}
+
+/// The normal at the centroid of a face: (cos, sin)(2πj/m) on its corners are the left eigenvectors of the
+/// subdominant eigenvalue ½ of the circulant.
+fn ring_normal(center: DVec3, ring: impl Iterator<Item = DVec3>, circle: &[DVec2]) -> DVec3 {
+    let mut pair = Tangents::default();
+    for (point, &weights) in ring.zip(circle) {
+        pair.add(weights, point - center);
+    }
+    pair.normal()
+}

@@ -1,0 +1,107 @@
+//! √3 subdivision (Kobbelt 2000) of closed triangle meshes: a new vertex in every triangle, old edges flipped,
+//! old vertices relaxed. Two steps make a 1-to-9 split.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use super::star::{
+    Tangents, blend_with_neighbors, centroid, require_room, require_triangles, ring_tangents, twin,
+};
+use crate::Result;
+use crate::mesh::{Faces, Mesh, Topology};
+
+/// a_n = (4 − 2cos(2π/n))/9: how far an old vertex moves towards the mean of its neighbours (Lin-Luo Eq. 2).
+pub fn relaxation(n: usize) -> f64 {
+    (4.0 - 2.0 * (TAU / n as f64).cos()) / 9.0
+}
+
+/// The mask of the relaxed vertex at valence `n`: the weight of the vertex, 1 − a_n, and of each neighbour,
+/// a_n/n.
+pub fn vertex_mask(n: usize) -> [f64; 2] {
+    let a = relaxation(n);
+    [1.0 - a, a / n as f64]
+}
+
+/// The limit mask at valence `n`: the weight of the vertex, β_n = 1/(1 + 3a_n), and of each neighbour,
+/// (1−β_n)/n.
+pub fn limit_mask(n: usize) -> [f64; 2] {
+    let beta = 1.0 / (1.0 + 3.0 * relaxation(n));
+    [beta, (1.0 - beta) / n as f64]
+}
+
+/// One step.
+///
+/// Vertices of the result: old vertices, then one for each face. Faces of the result: one for each old
+/// corner, in corner order, as (vertex, face across the edge that leaves it, its own face).
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold, a face is
+/// no triangle (the first is named), or the result is too large for 32-bit indices.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
+    require_triangles(mesh, topology, "sqrt3")?;
+    require_room(mesh, 3)?;
+    let mut positions = blend_with_neighbors(mesh, topology, vertex_mask);
+    positions.extend(
+        mesh.faces
+            .iter()
+            .map(|face| centroid(&mesh.positions, face)),
+    );
+    Ok(Mesh::new(positions, flip(mesh, topology)))
+}
+
+/// The faces after the split in three and the flip of every old edge: one for each half-edge.
+pub(super) fn flip(mesh: &Mesh, topology: &Topology) -> Faces {
+    let vertices = mesh.len() as u32;
+    let mut corners = Vec::with_capacity(3 * mesh.faces.corners().len());
+    for (c, &v) in mesh.faces.corners().iter().enumerate() {
+        let c = c as u32;
+        let across = twin(topology, c);
+        corners.extend([v, vertices + across / 3, vertices + c / 3]);
+    }
+    let offsets = (0..=corners.len() as u32).step_by(3).collect();
+    Faces::from_parts(offsets, corners)
+}
+
+/// The limit points of all vertices.
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold or a face
+/// is no triangle.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_positions(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+    require_triangles(mesh, topology, "sqrt3")?;
+    Ok(blend_with_neighbors(mesh, topology, limit_mask))
+}
+
+/// The tangents of the limit surface at all vertices: cos(2πj/n) and sin(2πj/n) on the neighbours in
+/// counter-clockwise order. A step maps the ring's first harmonic to itself, turned by π/n and scaled by
+/// ⅔cos(π/n), so these span the left eigenspace of the subdominant pair.
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold or a face
+/// is no triangle.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_tangents(mesh: &Mesh, topology: &Topology) -> Result<Vec<Tangents>> {
+    require_triangles(mesh, topology, "sqrt3")?;
+    Ok(ring_tangents(mesh, topology))
+}
+
+/// The unit normals of the limit surface at all vertices; zero where [`Tangents::normal`] is.
+///
+/// # Errors
+/// As [`limit_tangents`].
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_normals(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+    let tangents = limit_tangents(mesh, topology)?;
+    Ok(tangents.iter().map(Tangents::normal).collect())
+}

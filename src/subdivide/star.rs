@@ -1,0 +1,247 @@
+//! What the schemes share: what a mesh must be, edge numbers, sums over vertex stars, harmonics of a ring.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
+
+use crate::mesh::topology::NONE;
+use crate::mesh::{Mesh, Topology};
+use crate::{Error, Result};
+
+/// A normal shorter than this, relative to the reach of its star squared, is rounding: some tens of ε.
+const DEGENERATE: f64 = 1e-14;
+
+/// Refuses a mesh that is not a closed manifold, or has an isolated vertex or a face of fewer than three corners.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub(crate) fn require_closed(mesh: &Mesh, topology: &Topology) -> Result<()> {
+    assert!(
+        topology.incidence.vertices() == mesh.len(),
+        "the topology is that of the mesh"
+    );
+    if let Some(edge) = topology.irregular_edges().first() {
+        let [v, w] = edge.vertices;
+        return refuse(format!(
+            "the edge of vertices {v} and {w} has {} face sides{}; subdivision needs a closed, oriented manifold",
+            edge.sides,
+            if edge.misoriented {
+                " in the same direction"
+            } else {
+                ""
+            },
+        ));
+    }
+    if topology.boundary_edges() > 0 {
+        let corners = mesh.faces.corners();
+        let open = (0..corners.len() as u32).find(|&c| topology.twin(c).is_none());
+        let place = open.map_or_else(String::new, |c| {
+            let vertex = corners[c as usize];
+            let face = topology.incidence.face_of(c);
+            format!(", the first from vertex {vertex} of face {face}")
+        });
+        return refuse(format!(
+            "open: {} boundary edges{place}; subdivision needs a closed mesh: fill the holes",
+            topology.boundary_edges()
+        ));
+    }
+    for v in 0..mesh.len() {
+        let Some(&first) = topology.incidence.corners_at(v).first() else {
+            return refuse(format!("vertex {v} belongs to no face: remove it"));
+        };
+        if umbrella(mesh, topology, first) != topology.incidence.face_count(v) {
+            return refuse(format!(
+                "the faces at vertex {v} form more than one umbrella: split the vertex"
+            ));
+        }
+    }
+    match mesh.faces.iter().position(|face| face.len() < 3) {
+        Some(f) => refuse(format!(
+            "face {f} has {} corners, fewer than three: remove it",
+            mesh.faces.face(f).len()
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a mesh that is not closed or has a face that is no triangle, naming the first such face.
+pub(crate) fn require_triangles(mesh: &Mesh, topology: &Topology, scheme: &str) -> Result<()> {
+    require_closed(mesh, topology)?;
+    match mesh.faces.iter().position(|face| face.len() != 3) {
+        Some(f) => refuse(format!(
+            "face {f} has {} corners, but {scheme} needs triangles: split the faces or use catmull-clark",
+            mesh.faces.face(f).len()
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a result of `factor` corners per old corner that 32-bit indices cannot number. A result has
+/// fewer vertices than corners.
+pub(crate) fn require_room(mesh: &Mesh, factor: usize) -> Result<()> {
+    let corners = factor * mesh.faces.corners().len();
+    if corners < NONE as usize {
+        Ok(())
+    } else {
+        refuse(format!(
+            "a further refinement has {corners} corners, more than 32-bit indices can number: refine less often"
+        ))
+    }
+}
+
+pub(crate) fn refuse<T>(what: String) -> Result<T> {
+    Err(Error::mesh("mesh", what))
+}
+
+/// The edge of every half-edge; edges are numbered by their first half-edge.
+pub(crate) fn edge_numbers(mesh: &Mesh, topology: &Topology) -> Vec<u32> {
+    let mut edge = vec![0; mesh.faces.corners().len()];
+    for (e, c) in topology.edge_sides().enumerate() {
+        edge[c as usize] = e as u32;
+        if let Some(t) = topology.twin(c) {
+            edge[t as usize] = e as u32;
+        }
+    }
+    edge
+}
+
+/// The opposite half-edge in a mesh that [`require_closed`] has let pass.
+pub(crate) fn twin(topology: &Topology, c: u32) -> u32 {
+    topology.twin(c).expect("a closed mesh has every twin")
+}
+
+/// The sides (v, next v) of a face.
+pub(crate) fn sides(face: &[u32]) -> impl Iterator<Item = (usize, usize)> + '_ {
+    let next = face.iter().cycle().skip(1);
+    face.iter()
+        .zip(next)
+        .map(|(&v, &w)| (v as usize, w as usize))
+}
+
+/// The mean of the corners of a face.
+pub(crate) fn centroid(positions: &[DVec3], face: &[u32]) -> DVec3 {
+    let sum: DVec3 = face.iter().map(|&v| positions[v as usize]).sum();
+    sum / face.len() as f64
+}
+
+/// `mask(n) = [a, b]` at every vertex of a closed mesh: a times the vertex plus b times the sum of its n
+/// neighbours. The cost of `mask` is paid once a valence.
+pub(crate) fn blend_with_neighbors(
+    mesh: &Mesh,
+    topology: &Topology,
+    mask: impl Fn(usize) -> [f64; 2],
+) -> Vec<DVec3> {
+    let mut points = vec![DVec3::ZERO; mesh.len()];
+    for face in mesh.faces.iter() {
+        for (v, w) in sides(face) {
+            points[v] += mesh.positions[w];
+        }
+    }
+    let mut masks = Vec::new();
+    for (v, point) in points.iter_mut().enumerate() {
+        let n = topology.incidence.face_count(v);
+        while masks.len() <= n {
+            masks.push(mask(masks.len()));
+        }
+        let [a, b] = masks[n];
+        *point = a * mesh.positions[v] + b * *point;
+    }
+    points
+}
+
+/// The number of faces in the umbrella of a corner of a closed mesh.
+fn umbrella(mesh: &Mesh, topology: &Topology, first: u32) -> usize {
+    let turn = |&c: &u32| topology.counter_clockwise(&mesh.faces, c);
+    let turns = std::iter::successors(Some(first), turn).skip(1);
+    1 + turns.take_while(|&c| c != first).count()
+}
+
+/// Calls `visit(v, corners)` for every vertex with its corners in counter-clockwise order.
+pub(crate) fn for_each_star(
+    mesh: &Mesh,
+    topology: &Topology,
+    mut visit: impl FnMut(usize, &[u32]),
+) {
+    let mut star = Vec::new();
+    for v in 0..mesh.len() {
+        topology.star(&mesh.faces, v, &mut star);
+        visit(v, &star);
+    }
+}
+
+/// The points (cos, sin)(2πj/n) of the unit circle, kept until another n is asked for.
+#[derive(Default)]
+pub(crate) struct Circle(Vec<DVec2>);
+
+impl Circle {
+    pub(crate) fn of(&mut self, n: usize) -> &[DVec2] {
+        if self.0.len() != n {
+            let step = TAU / n as f64;
+            self.0.clear();
+            self.0
+                .extend((0..n).map(|j| DVec2::from_angle(step * j as f64)));
+        }
+        &self.0
+    }
+}
+
+/// Two vectors that span the tangent plane of a limit surface at a point: the tangent masks (left eigenvectors
+/// of the subdominant eigenvalue) applied to the control points, cosine first. Their lengths have no meaning
+/// beyond the mask's own scale; on a regular star they are perpendicular and of the same length.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tangents {
+    pub cosine: DVec3,
+    pub sine: DVec3,
+    /// Σ |weight|·|vector|: what the tangents would measure without cancellation.
+    reach: f64,
+}
+
+impl Tangents {
+    /// Adds a control point, given from the star's centre, with the weights of the two masks.
+    pub(crate) fn add(&mut self, weights: DVec2, vector: DVec3) {
+        self.cosine += weights.x * vector;
+        self.sine += weights.y * vector;
+        self.reach += weights.length() * vector.length();
+    }
+
+    /// The unit normal `cosine × sine`: outward where faces are counter-clockwise seen from outside. The zero
+    /// vector where the tangents are parallel up to rounding, so that no tangent plane is defined (a star in
+    /// one line or point, valence 2).
+    pub fn normal(&self) -> DVec3 {
+        let cross = self.cosine.cross(self.sine);
+        let length = cross.length();
+        if length > DEGENERATE * self.reach * self.reach {
+            cross / length
+        } else {
+            DVec3::ZERO
+        }
+    }
+}
+
+/// The tangents of schemes whose tangent mask is (cos, sin)(2πj/n) on the neighbours in counter-clockwise
+/// order: Loop and √3.
+pub(crate) fn ring_tangents(mesh: &Mesh, topology: &Topology) -> Vec<Tangents> {
+    let mut tangents = Vec::with_capacity(mesh.len());
+    let mut circle = Circle::default();
+    for_each_star(mesh, topology, |v, star| {
+        let mut pair = Tangents::default();
+        for (&c, &weights) in star.iter().zip(circle.of(star.len())) {
+            let w = mesh.faces.corners()[next_in_triangle(c)];
+            pair.add(weights, mesh.positions[w as usize] - mesh.positions[v]);
+        }
+        tangents.push(pair);
+    });
+    tangents
+}
+
+/// The corner after `c` in a mesh of triangles.
+pub(crate) fn next_in_triangle(c: u32) -> usize {
+    let c = c as usize;
+    if c % 3 == 2 { c - 2 } else { c + 1 }
+}
+
+/// The corner before `c` in a mesh of triangles: the one opposite to half-edge `next(c)`.
+pub(crate) fn prev_in_triangle(c: u32) -> usize {
+    let c = c as usize;
+    if c.is_multiple_of(3) { c + 2 } else { c - 1 }
+}

@@ -1,0 +1,225 @@
+//! Limit masks against real refinement.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+use limitlab::mesh::{Mesh, Topology};
+use limitlab::subdivide::doo_sabin::{self, Rule};
+use limitlab::subdivide::{Refinement, catmull_clark, loop_scheme, sqrt3};
+
+use crate::ROUNDING;
+use crate::meshes::*;
+
+type Limits = fn(&Mesh, &Topology) -> limitlab::Result<Vec<DVec3>>;
+
+const PRIMAL: [(Refinement, Limits); 3] = [
+    (Refinement::CatmullClark, catmull_clark::limit_positions),
+    (Refinement::Loop, loop_scheme::limit_positions),
+    (Refinement::Sqrt3, sqrt3::limit_positions),
+];
+
+fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
+    if scheme == Refinement::CatmullClark {
+        polygon_meshes()
+    } else {
+        triangle_meshes()
+    }
+}
+
+#[test]
+fn a_refined_mesh_has_the_same_limit_points() {
+    for (scheme, limits) in PRIMAL {
+        for mesh in meshes_for(scheme) {
+            let fine = scheme.refine_n(&mesh, 2).unwrap();
+            let coarse_limits = limits(&mesh, &topology(&mesh)).unwrap();
+            let fine_limits = limits(&fine, &topology(&fine)).unwrap();
+            let error = distance(&coarse_limits, &fine_limits[..mesh.len()]);
+            assert!(error < ROUNDING, "{scheme} {error:e}");
+        }
+    }
+}
+
+/// The two eigenvalues μ ≠ 1 with which the points of a vertex approach its limit, as (μ₁ + μ₂, μ₁μ₂): those
+/// of the rotation-invariant block of the splitting matrix.
+fn contraction(scheme: Refinement, n: usize) -> (f64, f64) {
+    let n = n as f64;
+    match scheme {
+        Refinement::CatmullClark => ((3.0 * n - 7.0) / (4.0 * n), (n - 3.0) / (16.0 * n)),
+        Refinement::Loop => ((0.375 + 0.25 * (TAU / n).cos()).powi(2), 0.0),
+        _ => (2.0 / 3.0 - sqrt3::relaxation(n as usize), 0.0),
+    }
+}
+
+/// The tracked vertices of five levels of refinement approach the mask's limit exactly as the splitting
+/// matrix says: e_{k+2} = (μ₁+μ₂) e_{k+1} − μ₁μ₂ e_k with e = point − limit.
+#[test]
+fn refined_vertices_converge_to_the_limit_at_the_known_rate() {
+    for (scheme, limits) in PRIMAL {
+        for k in 3..=12 {
+            let mesh = match scheme {
+                Refinement::CatmullClark => scattered(pyramid(k), 5),
+                _ => scattered(bipyramid(k), 5),
+            };
+            let limits = limits(&mesh, &topology(&mesh)).unwrap();
+            let levels: Vec<Mesh> = (0..=5)
+                .map(|level| scheme.refine_n(&mesh, level).unwrap())
+                .collect();
+            let incidence = topology(&mesh).incidence;
+            for (v, &limit) in limits.iter().enumerate() {
+                let (sum, product) = contraction(scheme, incidence.face_count(v));
+                let error = |level: usize| levels[level].positions[v] - limit;
+                for level in 0..=3 {
+                    let expected = sum * error(level + 1) - product * error(level);
+                    assert!(
+                        (error(level + 2) - expected).length() < ROUNDING,
+                        "{scheme} {k}"
+                    );
+                }
+                assert!(error(0).length() > 1e-3, "the test sees a motion");
+            }
+        }
+    }
+}
+
+#[test]
+fn seven_levels_end_at_the_limit_points() {
+    for (scheme, limits) in PRIMAL {
+        let mesh = scattered(tetrahedron(), 6);
+        let fine = scheme.refine_n(&mesh, 7).unwrap();
+        let limits = limits(&mesh, &topology(&mesh)).unwrap();
+        let error = distance(&fine.positions[..4], &limits);
+        // Valence 3: μ₁ = 1/6, 1/16, 1/9.
+        let rate: f64 = match scheme {
+            Refinement::CatmullClark => 1.0 / 6.0,
+            Refinement::Loop => 1.0 / 16.0,
+            _ => 1.0 / 9.0,
+        };
+        assert!(
+            error < 4.0 * rate.powi(7) && error > 0.0,
+            "{scheme} {error:e}"
+        );
+    }
+}
+
+#[test]
+fn limits_equal_their_masks_evaluated_face_by_face() {
+    for mesh in polygon_meshes() {
+        let found = catmull_clark::limit_positions(&mesh, &topology(&mesh)).unwrap();
+        for (v, &limit) in found.iter().enumerate() {
+            let star = star(&mesh, v);
+            let n = star.valence as f64;
+            let [center, edge, face] = catmull_clark::limit_mask(star.valence);
+            // Thall Eq. 14: the opposite corners of regularised faces, summed over the star.
+            let opposite = 4.0 * star.centroids - n * mesh.positions[v] - 2.0 * star.neighbors;
+            let expected = center * mesh.positions[v] + edge * star.neighbors + face * opposite;
+            assert!((limit - expected).length() < ROUNDING);
+        }
+    }
+    for mesh in triangle_meshes() {
+        let looped = loop_scheme::limit_positions(&mesh, &topology(&mesh)).unwrap();
+        let flipped = sqrt3::limit_positions(&mesh, &topology(&mesh)).unwrap();
+        for v in 0..mesh.len() {
+            let star = star(&mesh, v);
+            for (found, [a, b]) in [
+                (looped[v], loop_scheme::limit_mask(star.valence)),
+                (flipped[v], sqrt3::limit_mask(star.valence)),
+            ] {
+                let expected = a * mesh.positions[v] + b * star.neighbors;
+                assert!((found - expected).length() < ROUNDING);
+            }
+        }
+    }
+}
+
+#[test]
+fn catmull_clark_limits_of_a_regular_grid_are_those_of_the_cubic_spline() {
+    let (rows, columns) = (5usize, 6usize);
+    let mesh = scattered(torus(5, 6), 7);
+    let found = catmull_clark::limit_positions(&mesh, &topology(&mesh)).unwrap();
+    let spline = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
+    for i in 0..rows {
+        for j in 0..columns {
+            let mut expected = DVec3::ZERO;
+            for (a, wa) in spline.iter().enumerate() {
+                for (b, wb) in spline.iter().enumerate() {
+                    let (row, column) =
+                        ((i + rows + a - 1) % rows, (j + columns + b - 1) % columns);
+                    expected += wa * wb * mesh.positions[row * columns + column];
+                }
+            }
+            assert!((found[i * columns + j] - expected).length() < ROUNDING);
+        }
+    }
+}
+
+fn face_centroid(mesh: &Mesh, f: usize) -> DVec3 {
+    let face = mesh.faces.face(f);
+    face.iter()
+        .map(|&v| mesh.positions[v as usize])
+        .sum::<DVec3>()
+        / face.len() as f64
+}
+
+/// The face of vertex v after the first step is face F + E + v, then face F + E + v of all type-F faces for
+/// ever: its centroid stays, and its corners come as near as the circulant's eigenvalue ½ says.
+#[test]
+fn doo_sabin_limits_are_the_centroids_that_stay() {
+    for rule in [Rule::DooSabin, Rule::ZhengCai] {
+        for mesh in polygon_meshes() {
+            let topology = topology(&mesh);
+            let first = mesh.faces.len() + topology.edges();
+            let limits = doo_sabin::limit_positions(rule, &mesh, &topology).unwrap();
+            let once = doo_sabin::refine_by(rule, &mesh, &topology).unwrap();
+            let fine = Refinement::DooSabin.refine_n(&once, 3).unwrap();
+            for (v, limit) in limits.iter().enumerate() {
+                let face = first + v;
+                assert!((face_centroid(&once, face) - *limit).length() < ROUNDING);
+                assert!((face_centroid(&fine, face) - *limit).length() < ROUNDING);
+                let radius = |m: &Mesh| {
+                    let corners = m.faces.face(face).iter();
+                    let squares =
+                        corners.map(|&c| (m.positions[c as usize] - *limit).length_squared());
+                    squares.sum::<f64>().sqrt()
+                };
+                assert!(radius(&fine) <= radius(&once) / 8.0 + ROUNDING);
+            }
+        }
+    }
+}
+
+#[test]
+fn doo_sabin_limits_of_triangles_do_not_depend_on_the_first_rule() {
+    for mesh in triangle_meshes() {
+        let topology = topology(&mesh);
+        let [nasri, zheng_cai] = [Rule::DooSabin, Rule::ZhengCai]
+            .map(|rule| doo_sabin::limit_positions(rule, &mesh, &topology).unwrap());
+        assert!(distance(&nasri, &zheng_cai) < ROUNDING);
+    }
+}
+
+/// Zheng-Cai Eq. 6, vertex by vertex: 2n I = n V + Σ_F Σ_{j∈F} V_j/|F|.
+#[test]
+fn zheng_cai_limits_satisfy_their_equation() {
+    for mesh in polygon_meshes() {
+        let limits = doo_sabin::limit_positions(Rule::ZhengCai, &mesh, &topology(&mesh)).unwrap();
+        for (v, &limit) in limits.iter().enumerate() {
+            let star = star(&mesh, v);
+            let n = star.valence as f64;
+            let residual = 2.0 * n * limit - n * mesh.positions[v] - star.centroids;
+            assert!(residual.length() < ROUNDING);
+        }
+    }
+}
+
+#[test]
+fn the_cube_in_closed_form() {
+    let mut mesh = cube();
+    for p in &mut mesh.positions {
+        *p = DVec3::new(p.x - p.y, p.x + p.y, p.z).signum();
+    }
+    let limits = catmull_clark::limit_positions(&mesh, &topology(&mesh)).unwrap();
+    for (p, limit) in mesh.positions.iter().zip(limits) {
+        // Neighbours and centroids of a corner p sum to p each: (6 + 2 + 4)/24 = 1/2.
+        assert!((limit - 0.5 * *p).length() < ROUNDING);
+    }
+}

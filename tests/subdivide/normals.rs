@@ -1,0 +1,254 @@
+//! Tangent masks: eigenvectors over a real refinement, and normals against those of a finely refined mesh.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DMat3, DVec3};
+use limitlab::mesh::{Mesh, Topology};
+use limitlab::subdivide::doo_sabin::{self, Rule};
+use limitlab::subdivide::{Refinement, Tangents, catmull_clark, loop_scheme, sqrt3};
+
+use crate::ROUNDING;
+use crate::meshes::*;
+
+type TangentsOf = fn(&Mesh, &Topology) -> limitlab::Result<Vec<Tangents>>;
+
+const PRIMAL: [(Refinement, TangentsOf); 3] = [
+    (Refinement::CatmullClark, catmull_clark::limit_tangents),
+    (Refinement::Loop, loop_scheme::limit_tangents),
+    (Refinement::Sqrt3, sqrt3::limit_tangents),
+];
+
+fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
+    match scheme {
+        Refinement::CatmullClark | Refinement::DooSabin => polygon_meshes(),
+        _ => triangle_meshes(),
+    }
+}
+
+fn normals(scheme: Refinement, mesh: &Mesh) -> Vec<DVec3> {
+    let topology = topology(mesh);
+    match scheme {
+        Refinement::CatmullClark => catmull_clark::limit_normals(mesh, &topology),
+        Refinement::Loop => loop_scheme::limit_normals(mesh, &topology),
+        Refinement::Sqrt3 => sqrt3::limit_normals(mesh, &topology),
+        _ => doo_sabin::limit_normals(Rule::DooSabin, mesh, &topology),
+    }
+    .unwrap()
+}
+
+/// The subdominant eigenvalue.
+fn lambda(scheme: Refinement, n: usize) -> f64 {
+    let size = n as f64;
+    match scheme {
+        Refinement::CatmullClark => (4.0 + catmull_clark::tangent_constant(n)) / 16.0,
+        Refinement::Loop => 0.375 + 0.25 * (TAU / size).cos(),
+        _ => 2.0 / 3.0 * (PI / size).cos(),
+    }
+}
+
+/// Left eigenvectors: a step multiplies both tangents by λ (and turns them in their plane as it renumbers the
+/// star), so it multiplies the bivector cosine × sine by λ².
+#[test]
+fn a_step_scales_the_tangents_by_the_subdominant_eigenvalue() {
+    for (scheme, tangents) in PRIMAL {
+        for mesh in meshes_for(scheme) {
+            let fine = scheme.refine_n(&mesh, 1).unwrap();
+            let coarse_pairs = tangents(&mesh, &topology(&mesh)).unwrap();
+            let fine_pairs = tangents(&fine, &topology(&fine)).unwrap();
+            let incidence = topology(&mesh).incidence;
+            for v in 0..mesh.len() {
+                let scale = lambda(scheme, incidence.face_count(v)).powi(2);
+                let [expected, found] =
+                    [coarse_pairs[v], fine_pairs[v]].map(|t| t.cosine.cross(t.sine));
+                let size = 1.0 + expected.length();
+                assert!(
+                    (scale * expected - found).length() < 10.0 * ROUNDING * size,
+                    "{scheme}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_catmull_clark_constant_in_closed_form() {
+    assert!((catmull_clark::tangent_constant(4) - 4.0).abs() < 1e-14);
+    assert!((lambda(Refinement::CatmullClark, 3) - (9.0 + 17f64.sqrt()) / 32.0).abs() < 1e-15);
+    assert!((lambda(Refinement::CatmullClark, 4) - 0.5).abs() < 1e-15);
+    // Thall's m_2, m_3 for valence 4 up to sign: edges 4, 0, −4, 0 and faces 1, −1, −1, 1.
+    let mask = catmull_clark::tangent_mask(4);
+    let expected = [[4.0, 1.0], [0.0, -1.0], [-4.0, -1.0], [0.0, 1.0]];
+    for (found, expected) in mask.iter().zip(expected) {
+        assert!((found[0] - expected[0]).abs() < 1e-14 && (found[1] - expected[1]).abs() < 1e-14);
+    }
+}
+
+/// The cosine tangent of a pyramid's apex, from the mask's numbers and Thall's regularised faces.
+#[test]
+fn tangents_equal_their_masks() {
+    for k in 3..=12u32 {
+        let mesh = scattered(pyramid(k), 9);
+        let topology = topology(&mesh);
+        let found = catmull_clark::limit_tangents(&mesh, &topology).unwrap()[k as usize];
+        // The star of the apex starts at its first corner, in face (0, 1, apex): neighbours 0, 1, ….
+        let point = |j: u32| mesh.positions[(j % k) as usize];
+        let apex = mesh.positions[k as usize];
+        let mut expected = DVec3::ZERO;
+        for (j, [edge, face]) in (0..k).zip(catmull_clark::tangent_mask(k as usize)) {
+            let opposite = (point(j) + point(j + 1) + apex) / 3.0;
+            expected += edge * point(j) + face * opposite;
+        }
+        assert!((found.cosine - expected).length() < 10.0 * ROUNDING);
+    }
+}
+
+#[test]
+fn refined_meshes_have_the_same_normals() {
+    for scheme in [
+        Refinement::CatmullClark,
+        Refinement::Loop,
+        Refinement::Sqrt3,
+    ] {
+        for mesh in meshes_for(scheme) {
+            let fine = scheme.refine_n(&mesh, 2).unwrap();
+            let (coarse, fine) = (normals(scheme, &mesh), normals(scheme, &fine));
+            for (v, normal) in coarse.iter().enumerate() {
+                assert!((normal.length() - 1.0).abs() < ROUNDING);
+                // Random stars may be nearly flat, which magnifies rounding.
+                assert!((*normal - fine[v]).length() < 1e-9, "{scheme}");
+            }
+        }
+    }
+}
+
+/// The sum of the cross products around a vertex: the normal that a viewer of the refined mesh sees.
+fn discrete_normal(mesh: &Mesh, v: usize) -> DVec3 {
+    let topology = topology(mesh);
+    let mut star = Vec::new();
+    topology.star(&mesh.faces, v, &mut star);
+    let center = mesh.positions[v];
+    let ring: Vec<DVec3> = star
+        .iter()
+        .map(|&c| {
+            let range = mesh.faces.range(topology.incidence.face_of(c));
+            let next = limitlab::mesh::topology::next_in(&range, c);
+            mesh.positions[mesh.faces.corners()[next as usize] as usize] - center
+        })
+        .collect();
+    let pairs = ring.iter().zip(ring.iter().cycle().skip(1));
+    pairs.map(|(a, b)| a.cross(*b)).sum::<DVec3>().normalize()
+}
+
+#[test]
+fn normals_are_those_of_a_finely_refined_mesh() {
+    for scheme in [
+        Refinement::CatmullClark,
+        Refinement::Loop,
+        Refinement::Sqrt3,
+    ] {
+        for k in [3, 4, 5, 7] {
+            let mesh = bipyramid(k);
+            let normals = normals(scheme, &mesh);
+            let levels = if scheme == Refinement::Sqrt3 { 9 } else { 6 };
+            let fine = scheme.refine_n(&mesh, levels).unwrap();
+            for (v, normal) in normals.iter().enumerate() {
+                let seen = discrete_normal(&fine, v);
+                assert!(
+                    (seen - *normal).length() < 0.01,
+                    "{scheme} {k} {v}: {seen} {normal}"
+                );
+                // Outward: the body is convex around the origin.
+                assert!(normal.dot(mesh.positions[v]) > 0.0);
+            }
+        }
+    }
+}
+
+#[test]
+fn doo_sabin_normals_are_those_of_a_finely_refined_mesh() {
+    for mesh in [prism(3), prism(5), pyramid(6), bipyramid(5), cube()] {
+        let topology = topology(&mesh);
+        let first = mesh.faces.len() + topology.edges();
+        for rule in [Rule::DooSabin, Rule::ZhengCai] {
+            let normals = doo_sabin::limit_normals(rule, &mesh, &topology).unwrap();
+            let once = doo_sabin::refine_by(rule, &mesh, &topology).unwrap();
+            let fine = Refinement::DooSabin.refine_n(&once, 5).unwrap();
+            let center: DVec3 = mesh.positions.iter().sum::<DVec3>() / mesh.len() as f64;
+            let limits = doo_sabin::limit_positions(rule, &mesh, &topology).unwrap();
+            for (v, normal) in normals.iter().enumerate() {
+                let face = fine.faces.face(first + v);
+                let ring: Vec<DVec3> = face
+                    .iter()
+                    .map(|&c| fine.positions[c as usize] - limits[v])
+                    .collect();
+                let pairs = ring.iter().zip(ring.iter().cycle().skip(1));
+                let seen = pairs.map(|(a, b)| a.cross(*b)).sum::<DVec3>().normalize();
+                assert!((seen - *normal).length() < 0.01);
+                assert!(normal.dot(limits[v] - center) > 0.0);
+                let face = doo_sabin::face_normals(&once)[first + v];
+                assert!((face - *normal).length() < ROUNDING);
+            }
+        }
+    }
+}
+
+/// A step halves both tangents of a face and turns nothing: the type-F face has the same normal.
+#[test]
+fn doo_sabin_face_normals_stay() {
+    for mesh in polygon_meshes() {
+        let fine = Refinement::DooSabin.refine_n(&mesh, 2).unwrap();
+        let (coarse, fine) = (
+            doo_sabin::face_normals(&mesh),
+            doo_sabin::face_normals(&fine),
+        );
+        for (normal, refined) in coarse.iter().zip(&fine) {
+            assert!((normal.length() - 1.0).abs() < ROUNDING);
+            assert!((*normal - *refined).length() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn normals_turn_with_the_mesh_and_do_not_see_shifts_and_scales() {
+    let turn = DMat3::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0);
+    for scheme in [
+        Refinement::CatmullClark,
+        Refinement::Loop,
+        Refinement::Sqrt3,
+        Refinement::DooSabin,
+    ] {
+        for mesh in meshes_for(scheme) {
+            let points = mesh
+                .positions
+                .iter()
+                .map(|p| 1e-6 * (turn * *p) + DVec3::splat(2e-6));
+            let turned = Mesh::new(points.collect(), mesh.faces.clone());
+            for (a, b) in normals(scheme, &mesh).iter().zip(normals(scheme, &turned)) {
+                assert!((turn * *a - b).length() < 1e-9, "{scheme}");
+            }
+        }
+    }
+}
+
+#[test]
+fn stars_without_a_plane_have_zero_normals() {
+    for scheme in [
+        Refinement::CatmullClark,
+        Refinement::Loop,
+        Refinement::Sqrt3,
+        Refinement::DooSabin,
+    ] {
+        let mut line = bipyramid(5);
+        for (v, p) in line.positions.iter_mut().enumerate() {
+            *p = DVec3::new(0.3, -0.2, 0.7) * (v as f64 - 2.2) + DVec3::ONE;
+        }
+        let mut point = bipyramid(4);
+        point.positions.fill(DVec3::new(0.1, 0.2, 0.3));
+        for mesh in [line, point] {
+            assert!(
+                normals(scheme, &mesh).iter().all(|n| *n == DVec3::ZERO),
+                "{scheme}"
+            );
+        }
+    }
+}

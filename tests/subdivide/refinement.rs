@@ -1,0 +1,367 @@
+//! The refinement steps: counts, topology, regular grids, affine maps, refused meshes, names.
+
+use glam::{DMat3, DVec3};
+use limitlab::mesh::{Faces, Mesh};
+use limitlab::subdivide::{Refinement, catmull_clark, doo_sabin, loop_scheme, sqrt3};
+
+use crate::ROUNDING;
+use crate::meshes::*;
+
+fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
+    match scheme {
+        Refinement::CatmullClark | Refinement::DooSabin => polygon_meshes(),
+        Refinement::Loop | Refinement::Sqrt3 | Refinement::Butterfly => triangle_meshes(),
+    }
+}
+
+#[test]
+fn test_meshes_are_as_irregular_as_claimed() {
+    let sizes: Vec<usize> = polygon_meshes()
+        .iter()
+        .flat_map(|m| m.faces.iter().map(<[u32]>::len).collect::<Vec<_>>())
+        .collect();
+    let valences: Vec<usize> = triangle_meshes()
+        .iter()
+        .flat_map(|m| {
+            let incidence = topology(m).incidence;
+            (0..m.len())
+                .map(move |v| incidence.face_count(v))
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    for k in 3..=12 {
+        assert!(sizes.contains(&k) && valences.contains(&k), "{k}");
+    }
+    for mesh in polygon_meshes() {
+        let euler = topology(&mesh).euler_characteristic(&mesh.faces);
+        assert_manifold(&mesh, euler);
+    }
+}
+
+#[test]
+fn counts_and_topology_after_each_step() {
+    for scheme in Refinement::ALL {
+        for mesh in meshes_for(scheme) {
+            let mut coarse = mesh;
+            for level in 1..=2 {
+                let old = topology(&coarse);
+                let (v, e, f) = (coarse.len(), old.edges(), coarse.faces.len());
+                let c = coarse.faces.corners().len();
+                let euler = old.euler_characteristic(&coarse.faces);
+                let fine = scheme.refine(&coarse, &old).unwrap();
+                let expected = match scheme {
+                    Refinement::CatmullClark => (v + e + f, c),
+                    Refinement::Loop | Refinement::Butterfly => (v + e, 4 * f),
+                    Refinement::DooSabin => (c, f + e + v),
+                    Refinement::Sqrt3 => (v + f, c),
+                };
+                assert_eq!((fine.len(), fine.faces.len()), expected, "{scheme} {level}");
+                assert_manifold(&fine, euler);
+                match scheme {
+                    Refinement::CatmullClark => assert_eq!(fine.faces.uniform_size(), Some(4)),
+                    Refinement::DooSabin => {
+                        let incidence = topology(&fine).incidence;
+                        assert!((0..fine.len()).all(|v| incidence.face_count(v) == 4));
+                    }
+                    _ => assert_eq!(fine.faces.uniform_size(), Some(3)),
+                }
+                coarse = fine;
+            }
+        }
+    }
+}
+
+#[test]
+fn valences_of_old_vertices_stay() {
+    for scheme in Refinement::ALL {
+        if scheme == Refinement::DooSabin {
+            continue;
+        }
+        for mesh in meshes_for(scheme) {
+            let fine = scheme.refine_n(&mesh, 1).unwrap();
+            let (old, new) = (topology(&mesh).incidence, topology(&fine).incidence);
+            for v in 0..mesh.len() {
+                assert_eq!(old.face_count(v), new.face_count(v), "{scheme}");
+            }
+        }
+    }
+}
+
+#[test]
+fn faces_are_numbered_as_documented() {
+    // The tetrahedron's base [2, 1, 0] is face 0; face 1 is [0, 1, 3], across half-edge 1 (from 1 to 0).
+    let mesh = tetrahedron();
+    let refine = |scheme: Refinement| scheme.refine_n(&mesh, 1).unwrap().faces;
+    assert_eq!(refine(Refinement::CatmullClark).face(1), [1, 4 + 1, 10, 4]);
+    assert_eq!(refine(Refinement::Loop).face(0), [2, 4, 4 + 2]);
+    assert_eq!(refine(Refinement::Loop).face(3), [4, 5, 6]);
+    assert_eq!(refine(Refinement::Butterfly), refine(Refinement::Loop));
+    assert_eq!(refine(Refinement::Sqrt3).face(1), [1, 4 + 1, 4]);
+    let doo_sabin = refine(Refinement::DooSabin);
+    assert_eq!(doo_sabin.face(1), [3, 4, 5]);
+    assert_eq!(doo_sabin.face(4 + 1), [2, 1, 4, 3]);
+    // The face of vertex 3 is made of its three corners, the last of faces 1 to 3.
+    let mut last = doo_sabin.face(4 + 6 + 3).to_vec();
+    last.sort_unstable();
+    assert_eq!(last, [5, 8, 11]);
+}
+
+#[test]
+fn affine_maps_commute_with_refinement() {
+    let matrix = DMat3::from_cols_array(&[1.1, 0.2, -0.7, 0.4, -0.9, 0.3, 0.6, 0.5, 1.3]);
+    let map = |p: &DVec3| matrix * *p + DVec3::new(3.0, -2.0, 1.0);
+    for scheme in Refinement::ALL {
+        for mesh in meshes_for(scheme) {
+            let mapped = Mesh::new(mesh.positions.iter().map(map).collect(), mesh.faces.clone());
+            let first = scheme.refine_n(&mesh, 2).unwrap();
+            let expected: Vec<DVec3> = first.positions.iter().map(map).collect();
+            let found = scheme.refine_n(&mapped, 2).unwrap();
+            assert!(distance(&found.positions, &expected) < ROUNDING, "{scheme}");
+        }
+    }
+}
+
+/// One step of uniform knot insertion along a cyclic sequence: masks for old points and for points between.
+fn insert_knots(data: &[DVec3], even: [f64; 3], odd: [f64; 2]) -> Vec<DVec3> {
+    let n = data.len();
+    (0..n)
+        .flat_map(|i| {
+            let (before, here, after) = (data[(i + n - 1) % n], data[i], data[(i + 1) % n]);
+            [
+                even[0] * before + even[1] * here + even[2] * after,
+                odd[0] * here + odd[1] * after,
+            ]
+        })
+        .collect()
+}
+
+/// [`insert_knots`] along both directions of a torus grid.
+fn insert_knots_on_torus(
+    mesh: &Mesh,
+    rows: usize,
+    columns: usize,
+    even: [f64; 3],
+    odd: [f64; 2],
+) -> Vec<Vec<DVec3>> {
+    let wide: Vec<Vec<DVec3>> = mesh
+        .positions
+        .chunks(columns)
+        .map(|row| insert_knots(row, even, odd))
+        .collect();
+    let mut fine = vec![vec![DVec3::ZERO; 2 * columns]; 2 * rows];
+    for j in 0..2 * columns {
+        let column: Vec<DVec3> = wide.iter().map(|row| row[j]).collect();
+        for (i, point) in insert_knots(&column, even, odd).into_iter().enumerate() {
+            fine[i][j] = point;
+        }
+    }
+    fine
+}
+
+#[test]
+fn catmull_clark_on_a_regular_grid_is_cubic_knot_insertion() {
+    let (rows, columns) = (5, 6);
+    let mesh = scattered(torus(5, 6), 3);
+    let fine = catmull_clark::refine(&mesh, &topology(&mesh)).unwrap();
+    let expected = insert_knots_on_torus(&mesh, rows, columns, [0.125, 0.75, 0.125], [0.5, 0.5]);
+    for i in 0..rows {
+        for j in 0..columns {
+            // The first corner's quad: (2i, 2j), next row, both, next column.
+            let quad = fine.faces.face(4 * (i * columns + j));
+            for (&v, (a, b)) in quad.iter().zip([(0, 0), (1, 0), (1, 1), (0, 1)]) {
+                let difference = fine.positions[v as usize] - expected[2 * i + a][2 * j + b];
+                assert!(difference.length() < ROUNDING);
+            }
+        }
+    }
+}
+
+#[test]
+fn doo_sabin_on_a_regular_grid_is_quadratic_knot_insertion() {
+    let (rows, columns) = (5, 6);
+    let mesh = scattered(torus(5, 6), 4);
+    let fine = doo_sabin::refine(&mesh, &topology(&mesh)).unwrap();
+    // Chaikin: (3 here + after)/4, then (here + 3 after)/4.
+    let expected = insert_knots_on_torus(&mesh, rows, columns, [0.0, 0.75, 0.25], [0.25, 0.75]);
+    for i in 0..rows {
+        for j in 0..columns {
+            let quad = fine.faces.face(i * columns + j);
+            for (&v, (a, b)) in quad.iter().zip([(0, 0), (1, 0), (1, 1), (0, 1)]) {
+                let difference = fine.positions[v as usize] - expected[2 * i + a][2 * j + b];
+                assert!(difference.length() < ROUNDING);
+            }
+        }
+    }
+}
+
+#[test]
+fn steps_equal_their_masks_evaluated_face_by_face() {
+    for mesh in polygon_meshes() {
+        let fine = catmull_clark::refine(&mesh, &topology(&mesh)).unwrap();
+        for v in 0..mesh.len() {
+            let star = star(&mesh, v);
+            let n = star.valence as f64;
+            let expected =
+                (n - 2.0) / n * mesh.positions[v] + (star.neighbors + star.centroids) / (n * n);
+            assert!((fine.positions[v] - expected).length() < ROUNDING);
+        }
+        for rule in [doo_sabin::Rule::DooSabin, doo_sabin::Rule::ZhengCai] {
+            let points = doo_sabin::corner_points(&mesh, rule);
+            for (f, face) in mesh.faces.iter().enumerate() {
+                let m = face.len();
+                let weights = rule.circulant(m);
+                for (i, c) in mesh.faces.range(f).enumerate() {
+                    let terms = face.iter().enumerate();
+                    let expected: DVec3 = terms
+                        .map(|(j, &v)| weights[(m + j - i) % m] * mesh.positions[v as usize])
+                        .sum();
+                    assert!((points[c] - expected).length() < ROUNDING);
+                }
+            }
+        }
+    }
+    for mesh in triangle_meshes() {
+        let looped = loop_scheme::refine(&mesh, &topology(&mesh)).unwrap();
+        let flipped = sqrt3::refine(&mesh, &topology(&mesh)).unwrap();
+        for v in 0..mesh.len() {
+            let star = star(&mesh, v);
+            for (fine, [a, b]) in [
+                (&looped, loop_scheme::vertex_mask(star.valence)),
+                (&flipped, sqrt3::vertex_mask(star.valence)),
+            ] {
+                let expected = a * mesh.positions[v] + b * star.neighbors;
+                assert!((fine.positions[v] - expected).length() < ROUNDING);
+            }
+        }
+        for (f, face) in mesh.faces.iter().enumerate() {
+            let points: Vec<DVec3> = face.iter().map(|&v| mesh.positions[v as usize]).collect();
+            let third = (points[0] + points[1] + points[2]) / 3.0;
+            assert!((flipped.positions[mesh.len() + f] - third).length() < ROUNDING);
+        }
+        // The middle triangle of face f holds the points of its edges; each is ⅜, ⅜, ⅛, ⅛.
+        for (f, face) in mesh.faces.iter().enumerate() {
+            for (i, &e) in looped.faces.face(4 * f + 3).iter().enumerate() {
+                let (v, w) = (face[i], face[(i + 1) % 3]);
+                let mut expected =
+                    0.375 * (mesh.positions[v as usize] + mesh.positions[w as usize]);
+                for other in mesh.faces.iter() {
+                    let forward = (0..3).find(|&k| (other[k], other[(k + 1) % 3]) == (v, w));
+                    let backward = (0..3).find(|&k| (other[k], other[(k + 1) % 3]) == (w, v));
+                    if let Some(k) = forward.or(backward) {
+                        expected += 0.125 * mesh.positions[other[(k + 2) % 3] as usize];
+                    }
+                }
+                assert!((looped.positions[e as usize] - expected).length() < ROUNDING);
+            }
+        }
+    }
+}
+
+#[test]
+fn published_weights() {
+    let near = |a: &[f64], b: &[f64]| {
+        a.len() == b.len() && a.iter().zip(b).all(|(x, y)| (x - y).abs() < 1e-14)
+    };
+    let doo_sabin = doo_sabin::Rule::DooSabin;
+    assert!(near(
+        &doo_sabin.circulant(4),
+        &[9. / 16., 3. / 16., 1. / 16., 3. / 16.]
+    ));
+    assert!(near(&doo_sabin.circulant(3), &[2. / 3., 1. / 6., 1. / 6.]));
+    assert!(near(&loop_scheme::vertex_mask(6), &[5. / 8., 1. / 16.]));
+    assert!(near(&loop_scheme::vertex_mask(3), &[7. / 16., 3. / 16.]));
+    assert!(near(&loop_scheme::limit_mask(6), &[0.5, 1. / 12.]));
+    assert!(near(&loop_scheme::limit_mask(3), &[0.4, 0.2]));
+    assert!(near(&sqrt3::vertex_mask(6), &[2. / 3., 1. / 18.]));
+    assert!(near(&sqrt3::vertex_mask(3), &[4. / 9., 5. / 27.]));
+    assert!(near(&sqrt3::limit_mask(6), &[0.5, 1. / 12.]));
+    assert!(near(
+        &catmull_clark::limit_mask(4),
+        &[4. / 9., 1. / 9., 1. / 36.]
+    ));
+    assert!(near(
+        &catmull_clark::limit_mask(3),
+        &[3. / 8., 1. / 6., 1. / 24.]
+    ));
+    for n in 3..40 {
+        let [a, b] = loop_scheme::limit_mask(n);
+        let [c, d] = sqrt3::limit_mask(n);
+        let [v, e, f] = catmull_clark::limit_mask(n);
+        let size = n as f64;
+        assert!(near(
+            &[a + size * b, c + size * d, v + size * (e + f)],
+            &[1.0; 3]
+        ));
+        let sums = [doo_sabin, doo_sabin::Rule::ZhengCai].map(|r| r.circulant(n).iter().sum());
+        assert!(near(&sums, &[1.0; 2]), "{sums:?}");
+    }
+}
+
+#[test]
+fn meshes_that_cannot_be_refined_are_refused_with_their_place() {
+    let message = |scheme: Refinement, mesh: &Mesh| {
+        let text = scheme
+            .refine(mesh, &topology(mesh))
+            .unwrap_err()
+            .to_string();
+        assert!(!text.contains('\n'));
+        text
+    };
+    let mut open = tetrahedron();
+    open.faces = Faces::from_lists(open.faces.iter().take(3).map(<[u32]>::to_vec));
+    let mut lonely = tetrahedron();
+    lonely.positions.push(DVec3::X);
+    let mut turned = tetrahedron();
+    turned.faces.corners_mut().swap(0, 1);
+    for scheme in Refinement::ALL {
+        assert!(message(scheme, &open).contains("3 boundary edges"));
+        assert!(message(scheme, &lonely).contains("vertex 4 belongs to no face"));
+        assert!(message(scheme, &turned).contains("in the same direction"));
+    }
+    for scheme in [Refinement::Loop, Refinement::Sqrt3, Refinement::Butterfly] {
+        let text = message(scheme, &pyramid(5));
+        assert!(text.contains("face 0 has 5 corners") && text.contains(scheme.name()));
+    }
+
+    let digon = Mesh::new(vec![DVec3::ZERO, DVec3::X], Faces::from_lists([[0, 1]]));
+    assert!(message(Refinement::CatmullClark, &digon).contains("face 0 has 2 corners"));
+
+    // Two tetrahedra that share vertex 3.
+    let mut faces = tetrahedron().faces;
+    for face in tetrahedron().faces.iter() {
+        faces.push(&[0, 1, 2].map(|i| if face[i] == 3 { 3 } else { face[i] + 4 }));
+    }
+    let pinched = scattered(Mesh::new(vec![DVec3::ZERO; 7], faces), 1);
+    for scheme in Refinement::ALL {
+        assert!(message(scheme, &pinched).contains("vertex 3 form more than one umbrella"));
+    }
+
+    let pillow = Mesh::new(
+        vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+        Faces::from_lists([[0, 1, 2], [0, 2, 1]]),
+    );
+    assert!(message(Refinement::Butterfly, &pillow).contains("vertex 0 has valence 2"));
+    assert!(Refinement::Loop.refine_n(&pillow, 1).is_ok());
+}
+
+#[test]
+fn refine_n_repeats_the_step() {
+    let mesh = stacked(5, 12);
+    for scheme in Refinement::ALL {
+        assert_eq!(scheme.refine_n(&mesh, 0).unwrap(), mesh);
+        let once = scheme.refine(&mesh, &topology(&mesh)).unwrap();
+        let twice = scheme.refine(&once, &topology(&once)).unwrap();
+        assert_eq!(scheme.refine_n(&mesh, 2).unwrap(), twice);
+    }
+}
+
+#[test]
+fn names_read_back_and_unknown_ones_list_all() {
+    for scheme in Refinement::ALL {
+        assert_eq!(scheme.to_string().parse::<Refinement>().unwrap(), scheme);
+    }
+    let text = "catmull".parse::<Refinement>().unwrap_err().to_string();
+    for scheme in Refinement::ALL {
+        assert!(text.contains(scheme.name()));
+    }
+}
