@@ -25,7 +25,7 @@ pub(crate) fn require_closed(mesh: &Mesh, topology: &Topology) -> Result<()> {
         return refuse(format!(
             "the edge of vertices {v} and {w} has {} face sides{}; subdivision needs a closed, oriented manifold",
             edge.sides,
-            if edge.misoriented {
+            if edge.is_misoriented() {
                 " in the same direction"
             } else {
                 ""
