@@ -47,6 +47,7 @@ fn main() -> ExitCode {
             arguments.meshes.push("torus:32x32".into());
             arguments.mesh.default_noise();
         }
+        arguments.output.prepare()?;
         run(&arguments)
     })
 }
@@ -74,7 +75,9 @@ fn run(arguments: &Arguments) -> Result<()> {
 
 fn compare(input: &Input, arguments: &Arguments) -> Result<Vec<Row>> {
     let system = input.system()?;
-    let order = arguments.order.order(&input.mesh, &input.topology.incidence);
+    let order = arguments
+        .order
+        .order(&input.mesh, &input.topology.incidence);
     let methods = match &arguments.method {
         Some(list) => list.0.clone(),
         None => Method::ALL.to_vec(),

@@ -75,7 +75,9 @@ fn run(arguments: &Arguments) -> Result<()> {
     let assemble_seconds = input.check_seconds + start.elapsed().as_secs_f64();
     let method = arguments.method.unwrap_or_else(|| automatic(&system));
     let start = Instant::now();
-    let order = arguments.order.order(&input.mesh, &input.topology.incidence);
+    let order = arguments
+        .order
+        .order(&input.mesh, &input.topology.incidence);
     let setup = standard_setup(&system, method, Some(&order), &|| spectrum(&system))?;
     let stop = arguments.stop.stop(&input.mesh);
     let progress = Progress::open("solving", arguments.common.quiet);

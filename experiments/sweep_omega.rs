@@ -68,6 +68,7 @@ fn main() -> ExitCode {
             arguments.meshes = BUILT_IN.map(String::from).to_vec();
             arguments.mesh.default_noise();
         }
+        arguments.output.prepare()?;
         run(&arguments)
     })
 }
@@ -109,7 +110,9 @@ fn grid(arguments: &Arguments, method: Method) -> Vec<f64> {
 
 fn sweep_one(input: &Input, arguments: &Arguments) -> Result<Sweep> {
     let system = input.system()?;
-    let order = arguments.order.order(&input.mesh, &input.topology.incidence);
+    let order = arguments
+        .order
+        .order(&input.mesh, &input.topology.incidence);
     let grids: Vec<(Method, Vec<f64>)> = arguments
         .method
         .0

@@ -9,7 +9,6 @@ use super::spectrum::{Spectrum, spectrum};
 use super::sweep::rounding_floor;
 use crate::assemble::LimitSystem;
 use crate::error::Result;
-use crate::solvers::jacobi::THALL_OMEGA;
 use crate::solvers::{Method, Setup, Solution, Stop, run};
 
 /// A method with its parameter in words: a line of a comparison.
@@ -127,10 +126,9 @@ pub fn entries<'a>(
             (_, Setup::Sor { omega, .. } | Setup::Ssor { omega, .. }) => {
                 format!("ω={}, {in_order}", short(omega))
             }
-            (
-                _,
-                Setup::Jacobi { omega } | Setup::Pia { omega } | Setup::PcgSsor { omega },
-            ) => format!("ω={}", short(omega)),
+            (_, Setup::Jacobi { omega } | Setup::Pia { omega } | Setup::PcgSsor { omega }) => {
+                format!("ω={}", short(omega))
+            }
             (_, Setup::Chebyshev { spectrum }) => {
                 let proven = system.bounds.lambda_min > 0.0;
                 interval(spectrum, if proven { "proven" } else { "estimated" })
@@ -138,9 +136,10 @@ pub fn entries<'a>(
             (_, Setup::Cg) => "preconditioned by H".into(),
             (_, Setup::PcgJacobi) => "diag(M)".into(),
             (_, Setup::PcgIc0) => "no fill".into(),
-            (_, Setup::PlainCg | Setup::Lu | Setup::Cholesky | Setup::SecondCholesky | Setup::Ldlt) => {
-                String::new()
-            }
+            (
+                _,
+                Setup::PlainCg | Setup::Lu | Setup::Cholesky | Setup::SecondCholesky | Setup::Ldlt,
+            ) => String::new(),
         };
         lines.push(Entry {
             method,
@@ -176,7 +175,10 @@ fn interval((min, max): (f64, f64), how: &str) -> String {
 
 /// Four significant digits without trailing zeros.
 fn short(x: f64) -> String {
-    let text = format!("{x:.*}", (3 - x.abs().log10().floor() as i32).clamp(0, 12) as usize);
+    let text = format!(
+        "{x:.*}",
+        (3 - x.abs().log10().floor() as i32).clamp(0, 12) as usize
+    );
     if text.contains('.') {
         text.trim_end_matches('0').trim_end_matches('.').into()
     } else {

@@ -22,12 +22,7 @@ pub struct Eigenvalues {
 /// If N exceeds [`LARGEST`], or the computation does not converge.
 pub fn eigenvalues(system: &LimitSystem) -> Result<Eigenvalues> {
     within_limit(system.len())?;
-    let jacobi_scale: Vec<f64> = system
-        .m
-        .diagonal()
-        .iter()
-        .map(|d| 1.0 / d.sqrt())
-        .collect();
+    let jacobi_scale: Vec<f64> = system.m.diagonal().iter().map(|d| 1.0 / d.sqrt()).collect();
     let a_scale: Vec<f64> = system.h.iter().map(|h| h.sqrt()).collect();
     Ok(Eigenvalues {
         a: symmetric(system, &a_scale)?,
@@ -54,10 +49,7 @@ fn symmetric(system: &LimitSystem, s: &[f64]) -> Result<Vec<f64>> {
 ///
 /// # Errors
 /// If N exceeds [`LARGEST`], or the computation does not converge.
-pub fn spectral_radius(
-    system: &LimitSystem,
-    mut step: impl FnMut(&mut [DVec3]),
-) -> Result<f64> {
+pub fn spectral_radius(system: &LimitSystem, mut step: impl FnMut(&mut [DVec3])) -> Result<f64> {
     let n = system.len();
     within_limit(n)?;
     let mut dense = Mat::<f64>::zeros(n, n);

@@ -52,7 +52,9 @@ pub fn predicted_rate(
                 symmetric_sweep(system, &points, omega, order, x);
             })?)
         }
-        Setup::Chebyshev { spectrum: (min, max) } => Some(Extremes { min, max }.krylov_rate()),
+        Setup::Chebyshev {
+            spectrum: (min, max),
+        } => Some(Extremes { min, max }.krylov_rate()),
         Setup::Cg => Some(spectrum.a.krylov_rate()),
         Setup::PcgJacobi => Some(spectrum.jacobi.krylov_rate()),
         Setup::PcgSsor { omega } => {

@@ -220,7 +220,12 @@ fn assemble_rows(
             } else {
                 let place = c as usize - range.start;
                 let face = &corners[range];
-                entries.extend(face[place + 1..].iter().copied().zip(block[1..].iter().copied()));
+                entries.extend(
+                    face[place + 1..]
+                        .iter()
+                        .copied()
+                        .zip(block[1..].iter().copied()),
+                );
                 entries.extend(
                     face[..place]
                         .iter()

@@ -112,7 +112,9 @@ impl MeshFlags {
         let mesh = loaded.mesh;
         let scheme = self.scheme.unwrap_or_else(|| {
             let scheme = Scheme::default_for(&mesh.faces);
-            common.remark(format_args!("{name}: scheme {scheme} (choose with --scheme)"));
+            common.remark(format_args!(
+                "{name}: scheme {scheme} (choose with --scheme)"
+            ));
             scheme
         });
         let label = match self.noise {
@@ -144,7 +146,10 @@ impl Input {
     /// A stem for file names: the program's `prefix`, the mesh's own name without folder and ending, the scheme.
     pub fn stem(&self, prefix: &str) -> String {
         let path = Path::new(&self.name);
-        let name = if ENDINGS.iter().any(|e| path.extension().is_some_and(|x| x.eq_ignore_ascii_case(e))) {
+        let name = if ENDINGS
+            .iter()
+            .any(|e| path.extension().is_some_and(|x| x.eq_ignore_ascii_case(e)))
+        {
             path.file_stem()
         } else {
             path.file_name()
@@ -152,7 +157,13 @@ impl Input {
         let name = name.unwrap_or_default().to_string_lossy();
         let plain: String = name
             .chars()
-            .map(|c| if c.is_alphanumeric() || c == '_' { c } else { '-' })
+            .map(|c| {
+                if c.is_alphanumeric() || c == '_' {
+                    c
+                } else {
+                    '-'
+                }
+            })
             .collect();
         format!("{prefix}-{plain}-{}", self.scheme)
     }

@@ -85,6 +85,16 @@ pub struct OutputFlags {
     pub json: bool,
 }
 
+impl OutputFlags {
+    /// Creates the folder: before the work, so that a place that cannot be written is told at once.
+    ///
+    /// # Errors
+    /// If the folder cannot be created.
+    pub fn prepare(&self) -> Result<()> {
+        crate::output::create_dir(&self.out)
+    }
+}
+
 /// A `value_parser`: a positive, finite number.
 pub fn positive(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
@@ -115,7 +125,10 @@ impl std::str::FromStr for Grid {
         // Both ends belong to the grid, though (b − a)/step may round below a whole number.
         let steps = ((to - from) / step + 1e-9).floor();
         if !(step > 0.0 && from <= to && from > 0.0 && steps < MOST_POINTS) {
-            return Err("a grid A:B:STEP needs 0 < A ≤ B, a positive STEP and fewer than 100000 points".into());
+            return Err(
+                "a grid A:B:STEP needs 0 < A ≤ B, a positive STEP and fewer than 100000 points"
+                    .into(),
+            );
         }
         // Rounded to what was typed: 0.05 + 15·0.05 is 0.8.
         Ok(Grid(
@@ -211,7 +224,9 @@ mod tests {
         assert_eq!(grid.0.len(), 24);
         assert_eq!((grid.0[0], grid.0[15], grid.0[23]), (0.05, 0.8, 1.2));
         assert_eq!("0.5:0.5:1".parse::<Grid>().expect("one point").0, [0.5]);
-        for bad in ["", "1", "1:2", "1:2:0", "2:1:0.1", "a:b:c", "0:1:0.1", "1:2:1e-9", "1:nan:1"] {
+        for bad in [
+            "", "1", "1:2", "1:2:0", "2:1:0.1", "a:b:c", "0:1:0.1", "1:2:1e-9", "1:nan:1",
+        ] {
             assert!(bad.parse::<Grid>().is_err(), "{bad}");
         }
     }

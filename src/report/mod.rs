@@ -4,7 +4,7 @@
 //! about. What it writes is the same, byte for byte, for the same input on the same machine.
 //!
 //! - [`table`]: a [`Table`] of typed columns and its three forms;
-//! - [`compare`]: a fresh table held against a committed CSV file, within each column's tolerance;
+//! - [`mod@compare`]: a fresh table held against a committed CSV file, within each column's tolerance;
 //! - [`figure`]: a grid of panels rendered to an [`Image`], drawn three times finer than it is written so that
 //!   every line is anti-aliased;
 //! - [`series`] and [`plot`]: line plots, scatter plots and histograms on linear or logarithmic axes, legend
@@ -31,6 +31,6 @@ pub use compare::compare;
 pub use figure::{Figure, Panel};
 pub use plot::LinePlot;
 pub use png::Image;
-pub use series::Series;
+pub use series::{Rule, Series, palette};
 pub use sparsity::SparsityPlot;
 pub use table::{Cell, Column, Table};

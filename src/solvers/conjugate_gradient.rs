@@ -164,15 +164,13 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
         let alpha = rho / curvature;
         // V ← V + α p, e ← e − α q
         let work = &self.work;
-        let totals = self.rows.pass(
-            &mut self.current,
-            &mut self.residual,
-            |i, v, e, tally| {
+        let totals = self
+            .rows
+            .pass(&mut self.current, &mut self.residual, |i, v, e, tally| {
                 *v += alpha * direction[i];
                 *e -= alpha * work[i];
                 tally.error(*e);
-            },
-        );
+            });
         self.rho = Some(rho);
         self.recursive = Some(totals.errors);
         Ok(())

@@ -24,12 +24,7 @@ impl<'a, S: System> Sor<'a, S> {
     ///
     /// # Panics
     /// If the order names a vertex that the system lacks.
-    pub fn new(
-        system: &'a S,
-        points: &'a [DVec3],
-        omega: f64,
-        order: Option<&'a [u32]>,
-    ) -> Self {
+    pub fn new(system: &'a S, points: &'a [DVec3], omega: f64, order: Option<&'a [u32]>) -> Self {
         Sor {
             system,
             points,
@@ -56,7 +51,13 @@ impl<S: System> Iterate for Sor<'_, S> {
                 order.iter().map(|&i| i as usize),
                 &mut self.current,
             ),
-            None => sweep(self.system, self.points, self.omega, 0..n, &mut self.current),
+            None => sweep(
+                self.system,
+                self.points,
+                self.omega,
+                0..n,
+                &mut self.current,
+            ),
         }
         Ok(())
     }

@@ -45,7 +45,9 @@ impl IncompleteCholesky {
                 } else {
                     return Err(Failure {
                         outcome: Outcome::Breakdown,
-                        detail: format!("incomplete Cholesky: pivot {rest:e} of vertex {i} is not positive"),
+                        detail: format!(
+                            "incomplete Cholesky: pivot {rest:e} of vertex {i} is not positive"
+                        ),
                     });
                 }
                 columns.push(j as u32);

@@ -272,10 +272,7 @@ mod tests {
     #[test]
     fn a_start_within_tolerance_needs_no_iteration() {
         let report = run(&|_| 0.0, 0.0);
-        assert_eq!(
-            (report.outcome, report.iterations),
-            (Outcome::Converged, 0)
-        );
+        assert_eq!((report.outcome, report.iterations), (Outcome::Converged, 0));
     }
 
     #[test]
@@ -287,7 +284,10 @@ mod tests {
 
     #[test]
     fn decay_that_turns_into_growth_is_divergence() {
-        let report = run(&|k| 0.7f64.powi(k as i32) + 1e-4 * 1.01f64.powi(k as i32), 1e-9);
+        let report = run(
+            &|k| 0.7f64.powi(k as i32) + 1e-4 * 1.01f64.powi(k as i32),
+            1e-9,
+        );
         assert_eq!(report.outcome, Outcome::Diverged);
     }
 
@@ -313,7 +313,16 @@ mod tests {
 
     #[test]
     fn not_a_number_is_divergence() {
-        let report = run(&|k| if k == 3 { f64::NAN } else { 1.0 / (k + 1) as f64 }, 1e-9);
+        let report = run(
+            &|k| {
+                if k == 3 {
+                    f64::NAN
+                } else {
+                    1.0 / (k + 1) as f64
+                }
+            },
+            1e-9,
+        );
         assert_eq!((report.outcome, report.iterations), (Outcome::Diverged, 3));
     }
 

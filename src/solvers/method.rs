@@ -137,17 +137,31 @@ pub enum Setup<'a> {
     /// M = LLᵀ by the second, independent library.
     SecondCholesky,
     Ldlt,
-    Jacobi { omega: f64 },
-    Sor { omega: f64, order: Option<&'a [u32]> },
-    Ssor { omega: f64, order: Option<&'a [u32]> },
-    Pia { omega: f64 },
-    Chebyshev { spectrum: (f64, f64) },
+    Jacobi {
+        omega: f64,
+    },
+    Sor {
+        omega: f64,
+        order: Option<&'a [u32]>,
+    },
+    Ssor {
+        omega: f64,
+        order: Option<&'a [u32]>,
+    },
+    Pia {
+        omega: f64,
+    },
+    Chebyshev {
+        spectrum: (f64, f64),
+    },
     /// Preconditioned by H.
     Cg,
     /// Not preconditioned: CG on M as it is.
     PlainCg,
     PcgJacobi,
-    PcgSsor { omega: f64 },
+    PcgSsor {
+        omega: f64,
+    },
     PcgIc0,
 }
 

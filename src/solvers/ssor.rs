@@ -24,12 +24,7 @@ impl<'a, S: System> Ssor<'a, S> {
     ///
     /// # Panics
     /// If the order names a vertex that the system lacks.
-    pub fn new(
-        system: &'a S,
-        points: &'a [DVec3],
-        omega: f64,
-        order: Option<&'a [u32]>,
-    ) -> Self {
+    pub fn new(system: &'a S, points: &'a [DVec3], omega: f64, order: Option<&'a [u32]>) -> Self {
         Ssor {
             system,
             points,

@@ -113,26 +113,22 @@ impl Rows {
         b: &mut [B],
         visit: impl Fn(usize, &mut A, &mut B, &mut Tally) + Sync,
     ) -> Totals {
-        let chunk = |(k, ((a, b), tally)): (usize, ((&mut [A], &mut [B]), &mut Tally))| {
-            *tally = Tally::default();
+        let chunk = |k: usize, a: &mut [A], b: &mut [B], tally: &mut Tally| {
             let mut local = Tally::default();
             for (offset, (a, b)) in a.iter_mut().zip(b).enumerate() {
                 visit(k * CHUNK + offset, a, b, &mut local);
             }
             *tally = local;
         };
-        if self.tallies.len() > 1 {
+        let tallies = &mut self.tallies;
+        if tallies.len() > 1 {
             a.par_chunks_mut(CHUNK)
                 .zip(b.par_chunks_mut(CHUNK))
-                .zip(&mut self.tallies)
+                .zip(tallies)
                 .enumerate()
-                .for_each(chunk);
-        } else {
-            a.chunks_mut(CHUNK)
-                .zip(b.chunks_mut(CHUNK))
-                .zip(&mut self.tallies)
-                .enumerate()
-                .for_each(chunk);
+                .for_each(|(k, ((a, b), tally))| chunk(k, a, b, tally));
+        } else if let Some(tally) = tallies.first_mut() {
+            chunk(0, a, b, tally);
         }
         let total = self
             .tallies

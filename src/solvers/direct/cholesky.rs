@@ -63,7 +63,8 @@ impl Cholesky {
         let mut values = vec![0.0; symbolic.len_val()];
         match kind {
             Kind::Llt => {
-                let need = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+                let need =
+                    symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
                 let mut memory = MemBuffer::try_new(need).map_err(|e| broken(&e))?;
                 symbolic
                     .factorize_numeric_llt(
@@ -83,7 +84,8 @@ impl Cholesky {
                     })?;
             }
             Kind::Ldlt => {
-                let need = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
+                let need =
+                    symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
                 let mut memory = MemBuffer::try_new(need).map_err(|e| broken(&e))?;
                 symbolic
                     .factorize_numeric_ldlt(
