@@ -14,7 +14,9 @@ fn collection() -> Option<PathBuf> {
     if root.is_dir() {
         return Some(root);
     }
-    writeln!(std::io::stderr(), "skipped: no {}", root.display()).unwrap();
+    // Not `eprintln!`, which the test runner swallows.
+    let mut stderr = std::io::stderr();
+    writeln!(stderr, "skipped: no {}", root.display()).unwrap();
     None
 }
 
