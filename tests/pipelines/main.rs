@@ -1,6 +1,8 @@
 //! The papers' whole methods held against exact identities, real refinement, and a second way to the same result.
 
+mod lin_luo;
 mod thall;
+mod zheng_cai;
 
 use glam::DVec3;
 use limitlab::mesh::{Mesh, Topology, builtin, noise};
