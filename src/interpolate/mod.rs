@@ -2,6 +2,7 @@
 //!
 //! | file | method |
 //! |---|---|
+//! | [`pia`] | progressive iterative interpolation as its authors ran it |
 //! | [`thall`] | Thall's iteration by local masks, his error metrics and attributes |
 //! | [`normals`] | given normals: Thall's rotation of 1-rings, for every primal scheme |
 //! | [`zheng_cai`] | Zheng & Cai's two phases: exact centroids, normals, shape handles |
@@ -15,6 +16,7 @@
 pub mod lin_luo;
 pub mod nasri;
 pub mod normals;
+pub mod pia;
 pub mod subset;
 pub mod surface;
 pub mod thall;
