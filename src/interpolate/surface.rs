@@ -62,7 +62,7 @@ pub fn refinement(scheme: Scheme) -> Refinement {
 /// # Panics
 /// If a list has not one entry a vertex, or `topology` is not that of `control`.
 pub fn surface(
-    control: &Mesh,
+    control: Mesh,
     topology: &Topology,
     scheme: Scheme,
     points: &[DVec3],
@@ -80,13 +80,13 @@ pub fn surface(
             if given.normals.is_some() || given.handles.is_some() {
                 return Err(too_few("normals and shape handles act on", 1));
             }
-            Surface::plain(control.clone())
+            Surface::plain(control)
         }
         Some(rule) => {
             let corrected =
                 rule == Rule::ZhengCai || given.normals.is_some() || given.handles.is_some();
             if corrected {
-                let first = FirstRefinement::new(control, topology, rule, points, given)?;
+                let first = FirstRefinement::new(&control, topology, rule, points, given)?;
                 Surface {
                     mesh: first.surface(request.levels)?,
                     normals: None,
@@ -94,7 +94,7 @@ pub fn surface(
                     not_flattened: first.not_flattened,
                 }
             } else {
-                Surface::plain(Refinement::DooSabin.refine_n(control, request.levels)?)
+                Surface::plain(Refinement::DooSabin.refine_n(&control, request.levels)?)
             }
         }
     };
@@ -131,7 +131,8 @@ pub fn surface(
 }
 
 impl Surface {
-    fn plain(mesh: Mesh) -> Self {
+    /// A mesh with nothing else to tell.
+    pub fn plain(mesh: Mesh) -> Self {
         Surface {
             mesh,
             normals: None,
@@ -141,7 +142,7 @@ impl Surface {
     }
 }
 
-fn primal(control: &Mesh, scheme: Refinement, request: &Request) -> Result<Surface> {
+fn primal(control: Mesh, scheme: Refinement, request: &Request) -> Result<Surface> {
     let given = &request.constraints;
     if given.handles.is_some() {
         return Err(Error::Computation(format!(
@@ -150,13 +151,15 @@ fn primal(control: &Mesh, scheme: Refinement, request: &Request) -> Result<Surfa
         )));
     }
     let Some(normals) = given.normals else {
-        return Ok(Surface::plain(scheme.refine_n(control, request.levels)?));
+        // A control mesh that stays is not copied: it may be as large as memory allows.
+        let stays = request.levels == 0;
+        return Ok(Surface::plain(if stays { control } else { scheme.refine_n(&control, request.levels)? }));
     };
     let needed = request.rotation.levels + 1;
     if request.levels < needed {
         return Err(too_few("given normals turn the rings of", needed));
     }
-    let rotated = rotate_rings(control, scheme, normals, request.rotation)?;
+    let rotated = rotate_rings(&control, scheme, normals, request.rotation)?;
     let further = request.levels - rotated.refinements;
     let mesh = if further == 0 {
         rotated.mesh
