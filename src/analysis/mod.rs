@@ -3,10 +3,12 @@
 
 pub mod comparison;
 pub mod dense;
+pub mod eigen;
 pub mod lanczos;
 pub mod predict;
 pub mod rate;
 pub mod spectrum;
 pub mod sweep;
+pub mod tridiagonal;
 
 pub use spectrum::{Extremes, Spectrum};
