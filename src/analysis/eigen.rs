@@ -30,6 +30,9 @@ const GUARDS: usize = 8;
 const AMPLIFICATION: f64 = 1e7;
 /// Degrees of a filter.
 const DEGREES: std::ops::RangeInclusive<usize> = 6..=240;
+/// The least distance of the damped part from the end of the spectrum, in parts of the whole, where the block does
+/// not resolve a cluster.
+const LEAST_SPREAD: f64 = 1e-3;
 /// Filters at most. The excess is a result: [`Eigenpairs::converged`] is false.
 const ROUNDS: usize = 60;
 /// Vectors of a block at most.
@@ -198,6 +201,16 @@ pub fn extreme(s: &Csr, request: &Request) -> Result<Eigenpairs> {
             });
         }
         round += 1;
+        // A multiple eigenvalue wider than the block, or one not yet resolved: a cut within it would damp what is
+        // wanted. Beyond it, whatever part of its space the block has taken is amplified as a whole.
+        let spread = (cut - ritz[0].0).abs();
+        let unresolved = ritz.iter().fold(0.0f64, |most, r| most.max(r.1));
+        let cut = if spread < unresolved {
+            let least = (10.0 * unresolved).max(LEAST_SPREAD * (far - ritz[0].0).abs());
+            ritz[0].0 + least.copysign(far - ritz[0].0)
+        } else {
+            cut
+        };
         iteration.filter(ritz[0].0, cut, far);
     }
 }

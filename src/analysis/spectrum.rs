@@ -2,7 +2,6 @@
 //! excite of them; spectral radii of in-place sweeps.
 
 use glam::DVec3;
-use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -390,70 +389,4 @@ pub fn scales(system: &LimitSystem, operator: Operator) -> Vec<f64> {
             .map(|(a, h)| (h / a).sqrt())
             .collect(),
     }
-}
-
-/// Steps of the power method before [`sweep_radius`] starts its Arnoldi process, and the size of that.
-const WARM_UP: usize = 30;
-const ARNOLDI: usize = 40;
-
-/// The spectral radius of the error matrix of a linear iteration that is not symmetric (Gauss-Seidel, SOR): dense
-/// for small systems, else the largest Ritz value of an Arnoldi process on the three coordinates together, from a
-/// seeded random start. `step` replaces V by the next iterate for P = 0. 70 steps, 40 vectors of 3N numbers.
-///
-/// # Errors
-/// If the dense computation does not converge.
-pub fn sweep_radius(system: &LimitSystem, mut step: impl FnMut(&mut [DVec3])) -> Result<f64> {
-    let n = system.len();
-    if n <= dense::LARGEST / 2 {
-        return dense::spectral_radius(system, step);
-    }
-    let mut rng = ChaCha8Rng::seed_from_u64(0x4172_6e6f);
-    let mut x: Vec<DVec3> = (0..n)
-        .map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0))))
-        .collect();
-    let inner = |a: &[DVec3], b: &[DVec3]| -> f64 { a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum() };
-    let normalize = |x: &mut [DVec3]| -> f64 {
-        let norm = inner(x, x).sqrt();
-        x.iter_mut().for_each(|v| *v /= norm);
-        norm
-    };
-    for _ in 0..WARM_UP {
-        step(&mut x);
-        normalize(&mut x);
-    }
-    let mut basis = vec![x];
-    let mut hessenberg = DMatrix::<f64>::zeros(ARNOLDI, ARNOLDI);
-    for k in 0..ARNOLDI {
-        let mut w = basis[k].clone();
-        step(&mut w);
-        // Gram-Schmidt twice: once is not enough where the space is nearly invariant.
-        for _ in 0..2 {
-            for (j, v) in basis.iter().enumerate() {
-                let c = inner(v, &w);
-                hessenberg[(j, k)] += c;
-                for (w, v) in w.iter_mut().zip(v) {
-                    *w -= c * *v;
-                }
-            }
-        }
-        if k + 1 == ARNOLDI {
-            break;
-        }
-        let norm = normalize(&mut w);
-        if norm <= 1e-14 {
-            let used = hessenberg.view((0, 0), (k + 1, k + 1)).into_owned();
-            return Ok(largest_modulus(used));
-        }
-        hessenberg[(k + 1, k)] = norm;
-        basis.push(w);
-    }
-    Ok(largest_modulus(hessenberg))
-}
-
-fn largest_modulus(matrix: DMatrix<f64>) -> f64 {
-    matrix
-        .complex_eigenvalues()
-        .iter()
-        .map(|z| z.re.hypot(z.im))
-        .fold(0.0, f64::max)
 }
