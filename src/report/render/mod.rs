@@ -83,7 +83,8 @@ pub struct Stroke {
 /// A polygon mesh to be seen.
 ///
 /// Triangles are drawn as they are, quads across the diagonal that turns neither half over (the shorter one if
-/// both do not), larger faces as fans from their first corner, which is right for convex ones.
+/// both do not), larger faces about their centroid, which is right where all of the face is seen from there. A quad
+/// painted with scalars is cut about its centroid too, so that no diagonal shows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     pub mesh: Mesh,

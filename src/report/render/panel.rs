@@ -1,9 +1,10 @@
 //! A picture in its figure: caption, image, colour bar.
 
-use super::super::canvas::{Anchor, CAP_HEIGHT, Canvas, Rect, text_width};
+use super::super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Rect, text_width};
 use super::super::figure::{
     self, FRAME_COLOUR, FRAME_WIDTH, LABEL_SIZE, Slot, TEXT_COLOUR, TICK_SIZE, TITLE_SIZE,
 };
+use super::super::png::Image;
 use super::scene::Scene;
 use super::{ColourScale, Picture, raster};
 use crate::Result;
@@ -19,8 +20,6 @@ const TICK_GAP: f64 = 3.0;
 const TICK_PITCH: f64 = 24.0;
 /// A bar longer than this tells no more.
 const LONGEST_BAR: f64 = 220.0;
-/// The number of colours that a bar shows.
-const BAR_STEPS: usize = 256;
 
 impl Picture {
     pub(in super::super) fn top(&self) -> f64 {
@@ -75,16 +74,18 @@ fn draw_bar(canvas: &Canvas<'_>, frame: Rect, scale: &ColourScale) -> Result<()>
         top: frame.centre().1 - length / 2.0,
         bottom: frame.centre().1 + length / 2.0,
     };
-    for step in 0..BAR_STEPS {
-        let at = |k: usize| bar.bottom - bar.height() * k as f64 / BAR_STEPS as f64;
-        let colour = scale.map.colour(step as f64 / (BAR_STEPS - 1) as f64);
-        let strip = Rect {
-            top: at(step + 1),
-            bottom: at(step),
-            ..bar
+    canvas.image(bar, |width, height, _| {
+        let row = |y: u32| {
+            let t = 1.0 - (f64::from(y) + 0.5) / f64::from(height);
+            let Colour(r, g, b) = scale.map.colour(t);
+            [r, g, b].repeat(width as usize)
         };
-        canvas.fill(strip, colour)?;
-    }
+        Ok(Image {
+            width,
+            height,
+            rgb: (0..height).flat_map(row).collect(),
+        })
+    })?;
     canvas.outline(bar, FRAME_WIDTH, FRAME_COLOUR)?;
     let mut right = bar.right + TICK_LENGTH;
     for tick in axis.ticks((length / TICK_PITCH) as usize) {

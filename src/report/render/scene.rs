@@ -151,22 +151,27 @@ impl Scene {
         let Some(paint) = &surface.paint else {
             return Ok(());
         };
+        let (cut, extra) = cut_about_centroids(mesh, matches!(paint, Paint::Scalars { .. }));
+        let centroids = (extra.par_iter())
+            .map(|&p| project(camera, p, &|| "the middle of a face".into()))
+            .collect::<Result<Vec<DVec4>>>()?;
         let first_vertex = self.vertices.len() as u32;
         let first_face = self.face_normals.len() as u32;
-        self.vertices.extend(projected.iter().map(snap));
-        let areas: Vec<DVec3> = mesh.faces.iter().map(|f| area_vector(&mesh.positions, f)).collect();
+        self.vertices.extend(projected.iter().chain(&centroids).map(snap));
+        let areas: Vec<DVec3> = (mesh.faces.iter())
+            .map(|f| area_vector(&mesh.positions, f))
+            .collect();
         let unit = |v: &DVec3| camera.turned(*v).normalize_or_zero();
         let is_flat = match &surface.shading {
-            Shading::Flat => {
-                self.normals.resize(self.vertices.len(), DVec3::ZERO);
-                true
-            }
+            Shading::Flat => true,
             Shading::Smooth => {
+                self.normals.resize(first_vertex as usize, DVec3::ZERO);
                 let sums = vertex_normals(mesh, &areas);
                 self.normals.extend(sums.iter().map(unit));
                 false
             }
             Shading::Normals(normals) => {
+                self.normals.resize(first_vertex as usize, DVec3::ZERO);
                 self.normals.extend(normals.iter().map(unit));
                 false
             }
@@ -196,21 +201,45 @@ impl Scene {
             is_flat,
             dye,
         });
+        let mut next_centroid = mesh.len() as u32;
         for (f, face) in mesh.faces.iter().enumerate() {
-            let mut add = |a: usize, b: usize, c: usize| {
+            let mut add = |corners: [u32; 3]| {
                 self.triangles.push(Triangle {
-                    corners: [a, b, c].map(|i| first_vertex + face[i]),
+                    corners: corners.map(|v| first_vertex + v),
                     face: first_face + f as u32,
                     material,
                 });
             };
-            if face.len() == 4 && !cuts_first_diagonal(&mesh.positions, face, areas[f]) {
-                add(1, 2, 3);
-                add(1, 3, 0);
-            } else {
-                for i in 2..face.len() {
-                    add(0, i - 1, i);
+            if cut(face) {
+                for (&a, &b) in face.iter().zip(face.iter().cycle().skip(1)) {
+                    add([next_centroid, a, b]);
                 }
+                next_centroid += 1;
+                continue;
+            }
+            match *face {
+                [a, b, c] => add([a, b, c]),
+                [a, b, c, d] if cuts_first_diagonal(&mesh.positions, face, areas[f]) => {
+                    add([a, b, c]);
+                    add([a, c, d]);
+                }
+                [a, b, c, d] => {
+                    add([b, c, d]);
+                    add([b, d, a]);
+                }
+                _ => {}
+            }
+        }
+        // Normals and places in the middle of a face are the means of its corners.
+        for face in mesh.faces.iter().filter(|face| cut(face)) {
+            let corners = || face.iter().map(|&v| (first_vertex + v) as usize);
+            if !is_flat {
+                let sum: DVec3 = corners().map(|v| self.normals[v]).sum();
+                self.normals.push(sum.normalize_or_zero());
+            }
+            if matches!(paint, Paint::Scalars { .. }) {
+                let sum: f32 = corners().map(|v| self.places[v]).sum();
+                self.places.push(sum / face.len() as f32);
             }
         }
         self.face_normals.extend(areas.iter().map(unit));
@@ -337,6 +366,19 @@ fn everything(picture: &Picture) -> Vec<DVec3> {
         all.extend(vectors.tails.iter().zip(&vectors.vectors).map(|(&t, &v)| t + v));
     }
     all
+}
+
+/// Which faces are cut about their centroids, and these.
+fn cut_about_centroids(mesh: &Mesh, is_painted: bool) -> (impl Fn(&[u32]) -> bool, Vec<DVec3>) {
+    let cut = move |face: &[u32]| face.len() > if is_painted { 3 } else { 4 };
+    let centroids = (mesh.faces.iter())
+        .filter(|face| cut(face))
+        .map(|face| {
+            let sum: DVec3 = face.iter().map(|&v| mesh.positions[v as usize]).sum();
+            sum / face.len() as f64
+        })
+        .collect();
+    (cut, centroids)
 }
 
 /// ½ Σ v_i × v_{i+1} about the first corner: the area of the face's shadow in every direction (Newell).

@@ -14,9 +14,9 @@ use crate::report::canvas::Colour;
 const KEY: DVec3 = DVec3::new(-0.52, 0.60, 0.61);
 const FILL: DVec3 = DVec3::new(0.70, -0.35, 0.62);
 
-const AMBIENT: f64 = 0.30;
-const KEY_STRENGTH: f64 = 0.66;
-const FILL_STRENGTH: f64 = 0.17;
+const AMBIENT: f64 = 0.36;
+const KEY_STRENGTH: f64 = 0.74;
+const FILL_STRENGTH: f64 = 0.20;
 const HIGHLIGHT: f64 = 0.26;
 const SHININESS: i32 = 48;
 
@@ -27,8 +27,8 @@ const RIM_DARKEST: f64 = 0.55;
 /// A painted surface keeps at least this part of its colour, so that the colour bar can be read off it.
 const PAINT_DARKEST: f64 = 0.62;
 
-/// Reflected strips of light over half a turn.
-const STRIPS: f64 = 13.0;
+/// Strips of light, all horizontal, from straight below to straight above.
+const STRIPS: f64 = 19.0;
 
 /// The colour under light, of a place whose unit normal `n` is turned to the eye's side.
 pub(super) fn shade(n: DVec3, colour: Colour, finish: Finish, is_scale: bool) -> [u8; 3] {
@@ -51,10 +51,10 @@ pub(super) fn shade(n: DVec3, colour: Colour, finish: Finish, is_scale: bool) ->
             )
         }
         Finish::ReflectionLines => {
-            // The line of sight reflected, and its turn about the horizontal axis.
+            // How steeply the reflected line of sight rises.
             let reflected = 2.0 * n.z * n - DVec3::Z;
-            let turn = reflected.y.atan2(reflected.z) / PI;
-            let is_bright = (STRIPS * turn).rem_euclid(2.0) < 1.0;
+            let rise = reflected.y.clamp(-1.0, 1.0).asin() / PI;
+            let is_bright = (STRIPS * rise).rem_euclid(2.0) < 1.0;
             (if is_bright { 1.08 } else { 0.28 } * rim, 0.0)
         }
     };
@@ -101,7 +101,7 @@ mod tests {
             let (y, z) = degrees.to_radians().sin_cos();
             shade(DVec3::new(0.0, y, z), GREY, Finish::ReflectionLines, false)[0] > 100
         };
-        // The reflection turns twice as fast as the normal: a strip is 180/13/2 degrees wide.
+        // The reflection turns twice as fast as the normal: a strip is 180/STRIPS/2 degrees wide.
         let width = 90.0 / STRIPS;
         assert!(at(0.5 * width) && !at(1.5 * width) && at(2.5 * width));
         assert!(!at(-0.5 * width) && at(-1.5 * width));
