@@ -33,7 +33,9 @@ pub use compare::compare;
 pub use figure::{Figure, Panel};
 pub use plot::LinePlot;
 pub use png::Image;
-pub use render::{ColourMap, ColourScale, Finish, Paint, Picture, Points, Stroke, Surface, Vectors, View};
+pub use render::{
+    ColourMap, ColourScale, Finish, Paint, Picture, Points, Stroke, Surface, Vectors, View,
+};
 pub use series::{Rule, Series, palette};
 pub use sparsity::SparsityPlot;
 pub use table::{Cell, Column, Table};

@@ -56,27 +56,15 @@ impl Image {
     /// # Errors
     /// Those of `out`, and a width or height of 0.
     pub fn write_png(&self, out: &mut dyn Write) -> io::Result<()> {
-        // Drawings are runs of one colour, which deflate sees best unfiltered; shaded surfaces are not.
-        let drawing = self.encoded(png::Filter::NoFilter)?;
-        let shaded = self.encoded(png::Filter::Adaptive)?;
-        out.write_all(if shaded.len() < drawing.len() {
-            &shaded
-        } else {
-            &drawing
-        })
-    }
-
-    fn encoded(&self, filter: png::Filter) -> io::Result<Vec<u8>> {
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
+        let mut encoder = png::Encoder::new(out, self.width, self.height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(png::Compression::High);
-        encoder.set_filter(filter);
+        // Drawings are runs of one colour, which deflate sees best unfiltered.
+        encoder.set_filter(png::Filter::NoFilter);
         let mut writer = encoder.write_header()?;
         writer.write_image_data(&self.rgb)?;
-        writer.finish()?;
-        Ok(bytes)
+        Ok(writer.finish()?)
     }
 
     /// Writes the PNG file at `path`.

@@ -74,11 +74,7 @@ fn surface(first: &Mesh) -> Result<Surface> {
 fn panels(view: View, framed: &[DVec3], shown: Vec<(&str, Surface)>) -> Vec<Picture> {
     shown
         .into_iter()
-        .map(|(caption, surface)| {
-            Picture::new(caption, view)
-                .surface(surface)
-                .frame(framed)
-        })
+        .map(|(caption, surface)| Picture::new(caption, view).surface(surface).frame(framed))
         .collect()
 }
 
@@ -101,7 +97,7 @@ pub fn approximation(album: &mut Album) -> Result<()> {
     for at in [2, 5] {
         panels[at].points.push(Points {
             positions: subject.mesh.positions.clone(),
-            radius: 1.5,
+            radius: 1.0,
             colour: POINT,
         });
     }
@@ -112,7 +108,7 @@ pub fn approximation(album: &mut Album) -> Result<()> {
         iterations: Some(found.iterations),
         error: Some(found.error),
     };
-    album.add(&line, &sheet("", 3, (190, 190), panels))
+    album.add(&line, &sheet("", 3, (135, 140), panels))
 }
 
 /// Fig. 4: Zheng and Cai's method and Nasri's on one mesh.
@@ -136,7 +132,10 @@ pub fn against_nasri(album: &mut Album) -> Result<()> {
         iterations: Some(nasri.iterations),
         error: Some(nasri.error),
     };
-    album.add(&line, &sheet("", 3, (190, 190), panels(view, &framed, shown)))
+    album.add(
+        &line,
+        &sheet("", 3, (140, 130), panels(view, &framed, shown)),
+    )
 }
 
 /// Fig. 5: a large mesh.
@@ -157,5 +156,8 @@ pub fn large(album: &mut Album) -> Result<()> {
         iterations: Some(found.iterations),
         error: Some(found.error),
     };
-    album.add(&line, &sheet("", 3, (190, 190), panels(view, &framed, shown)))
+    album.add(
+        &line,
+        &sheet("", 3, (150, 160), panels(view, &framed, shown)),
+    )
 }

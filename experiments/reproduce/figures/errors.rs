@@ -10,7 +10,7 @@ use limitlab::mesh::{Topology, builtin};
 use limitlab::report::{ColourScale, Picture, Surface};
 use limitlab::solvers::{Setup, System};
 
-use super::{Album, EDGE, FINE_EDGE, Line, control, sheet, view};
+use super::{Album, FINE_EDGE, Line, control, sheet, view};
 use crate::context::Subject;
 
 /// Iterates of the maps.
@@ -29,12 +29,15 @@ pub fn maps(album: &mut Album) -> Result<()> {
         let (iterate, error) = control(&subject, &system, Setup::Pia { omega: 1.0 }, k);
         last = error;
         let errors = (0..system.len())
-            .map(|v| (subject.mesh.positions[v] - system.row(v, &iterate.positions)).length() / size)
+            .map(|v| {
+                (subject.mesh.positions[v] - system.row(v, &iterate.positions)).length() / size
+            })
             .collect();
         let surface = Surface::smooth(subject.mesh.clone())
             .scalars(errors, scale.clone())
             .edges(FINE_EDGE);
-        let mut picture = Picture::new(format!("{k} updates: at most {:.1e}", error / size), view).surface(surface);
+        let mut picture = Picture::new(format!("{k} updates: at most {:.1e}", error / size), view)
+            .surface(surface);
         if i % 3 == 2 {
             picture = picture.colour_bar(scale.clone());
         }
@@ -48,7 +51,7 @@ pub fn maps(album: &mut Album) -> Result<()> {
         iterations: SHOWN.last().copied(),
         error: Some(last),
     };
-    album.add(&line, &sheet("", 3, (190, 190), panels))
+    album.add(&line, &sheet("", 3, (135, 140), panels))
 }
 
 /// The eigenvectors of Catmull-Clark's matrix that PIA is slowest to remove.
@@ -78,7 +81,7 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
         let mut picture = Picture::new(caption, view).surface(
             Surface::flat(subject.mesh.clone())
                 .scalars(mode, scale.clone())
-                .edges(EDGE),
+                .edges(FINE_EDGE),
         );
         if i % 2 == 1 {
             picture = picture.colour_bar(scale.clone());
@@ -93,7 +96,7 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet("", 2, (230, 200), panels))
+    album.add(&line, &sheet("", 2, (160, 140), panels))
 }
 
 /// Steps of the power iteration; it ends before where it has converged.
@@ -107,19 +110,31 @@ const STEPS: usize = 200_000;
 fn slowest(system: &LimitSystem, name: &str) -> Result<(f64, Vec<f64>)> {
     let n = system.len();
     // Multiples of the golden ratio: no symmetry of the mesh is one of the start.
-    let mut x: Vec<f64> = (1..=n).map(|i| (i as f64 * 0.618_033_988_749_895).fract() - 0.5).collect();
+    let mut x: Vec<f64> = (1..=n)
+        .map(|i| (i as f64 * 0.618_033_988_749_895).fract() - 0.5)
+        .collect();
     let mut residual = f64::INFINITY;
     for _ in 0..STEPS {
-        let mut next: Vec<f64> = (0..n).map(|i| x[i] - system.a.row_times_scalar(i, &x)).collect();
-        let largest = next.iter().copied().fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
+        let mut next: Vec<f64> = (0..n)
+            .map(|i| x[i] - system.a.row_times_scalar(i, &x))
+            .collect();
+        let largest = next
+            .iter()
+            .copied()
+            .fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
         next.iter_mut().for_each(|v| *v /= largest);
-        residual = (x.iter().zip(&next)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        residual = (x.iter().zip(&next))
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
         x = next;
         if residual < 1e-9 {
             break;
         }
     }
-    let at = (0..n).fold(0, |best, i| if x[i].abs() > x[best].abs() { i } else { best });
+    let at = (0..n).fold(
+        0,
+        |best, i| if x[i].abs() > x[best].abs() { i } else { best },
+    );
     let lambda = system.a.row_times_scalar(at, &x) / x[at];
     let known = spectrum(system)?.a.min;
     if (lambda - known).abs() > 1e-6 {
@@ -133,5 +148,9 @@ fn slowest(system: &LimitSystem, name: &str) -> Result<(f64, Vec<f64>)> {
 
 /// Three digits; rounding is 0.
 fn significant(x: f64) -> String {
-    if x.abs() < 1e-9 { "0".into() } else { format!("{x:.3}") }
+    if x.abs() < 1e-9 {
+        "0".into()
+    } else {
+        format!("{x:.3}")
+    }
 }

@@ -41,7 +41,7 @@ const PRINTED: [Printed; 5] = [
         azimuth: 30.0,
         elevation: 12.0,
         shown: 1.0,
-        size: (230, 230),
+        size: (190, 190),
     },
     Printed {
         name: "pia-4-bird",
@@ -54,7 +54,7 @@ const PRINTED: [Printed; 5] = [
         azimuth: 60.0,
         elevation: 12.0,
         shown: 1.0,
-        size: (230, 230),
+        size: (190, 190),
     },
     Printed {
         name: "pia-5-hand",
@@ -67,7 +67,7 @@ const PRINTED: [Printed; 5] = [
         azimuth: 20.0,
         elevation: 12.0,
         shown: 1.0,
-        size: (230, 230),
+        size: (190, 190),
     },
     Printed {
         name: "pia-6-boy",
@@ -80,7 +80,7 @@ const PRINTED: [Printed; 5] = [
         azimuth: 60.0,
         elevation: 12.0,
         shown: 0.22,
-        size: (230, 230),
+        size: (190, 190),
     },
     Printed {
         name: "pia-7-mushroom",
@@ -93,7 +93,7 @@ const PRINTED: [Printed; 5] = [
         azimuth: 60.0,
         elevation: 20.0,
         shown: 1.0,
-        size: (230, 230),
+        size: (190, 150),
     },
 ];
 
@@ -109,7 +109,12 @@ pub fn pia(album: &mut Album) -> Result<()> {
     for printed in &PRINTED {
         let subject = album.subject(printed.file, printed.otherwise)?;
         let system = subject.system(printed.scheme)?;
-        let (cage_mesh, error) = control(&subject, &system, Setup::Pia { omega: 1.0 }, printed.updates);
+        let (cage_mesh, error) = control(
+            &subject,
+            &system,
+            Setup::Pia { omega: 1.0 },
+            printed.updates,
+        );
         let surface = limit_surface(refinement(printed.scheme), &cage_mesh)?;
         let view = view(printed.up, printed.azimuth, printed.elevation);
         let height = |p: &DVec3| p.dot(printed.up);
@@ -124,12 +129,18 @@ pub fn pia(album: &mut Album) -> Result<()> {
             .copied()
             .collect();
         let panels = vec![
-            Picture::new(format!("(a) the mesh, {} vertices", subject.mesh.len()), view)
-                .surface(cage(&subject.mesh, GIVEN))
-                .frame(&framed),
-            Picture::new(format!("(b) the surface after {} updates", printed.updates), view)
-                .surface(surface)
-                .frame(&framed),
+            Picture::new(
+                format!("(a) the mesh, {} vertices", subject.mesh.len()),
+                view,
+            )
+            .surface(cage(&subject.mesh, GIVEN))
+            .frame(&framed),
+            Picture::new(
+                format!("(b) the surface after {} updates", printed.updates),
+                view,
+            )
+            .surface(surface)
+            .frame(&framed),
         ];
         let line = Line {
             name: printed.name,
@@ -154,7 +165,11 @@ pub fn thall_series(album: &mut Album) -> Result<()> {
     let view = view(DVec3::Y, 60.0, 12.0);
     let mut panels = Vec::new();
     let mut last = 0.0;
-    let shown = if album.context.quick { &SERIES[..3] } else { &SERIES[..] };
+    let shown = if album.context.quick {
+        &SERIES[..3]
+    } else {
+        &SERIES[..]
+    };
     for &k in shown {
         let (cage_mesh, error) = control(&subject, &system, Setup::THALL, k);
         last = error;
@@ -163,7 +178,7 @@ pub fn thall_series(album: &mut Album) -> Result<()> {
             .surface(limit_surface(Refinement::CatmullClark, &cage_mesh)?)
             .points(Points {
                 positions: subject.mesh.positions.clone(),
-                radius: 1.3,
+                radius: 0.9,
                 colour: POINT,
             })
             .frame(&subject.mesh.positions);
@@ -176,5 +191,5 @@ pub fn thall_series(album: &mut Album) -> Result<()> {
         iterations: shown.last().copied(),
         error: Some(last),
     };
-    album.add(&line, &sheet("", 3, (190, 190), panels))
+    album.add(&line, &sheet("", 3, (130, 137), panels))
 }

@@ -115,7 +115,8 @@ impl<'a> Album<'a> {
             line.iterations.into(),
             line.error.map(|e| 100.0 * e / size).into(),
         ]);
-        self.context.figure(&format!("{}--{}", ALL.id, line.name), figure)
+        self.context
+            .figure(&format!("{}--{}", ALL.id, line.name), figure)
     }
 }
 

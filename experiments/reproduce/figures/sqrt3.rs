@@ -54,7 +54,7 @@ pub fn against_butterfly(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet("", 3, (190, 190), panels))
+    album.add(&line, &sheet("", 3, (170, 165), panels))
 }
 
 /// Fig. 6: a bunny under the interpolatory √3 scheme, step by step.
@@ -65,7 +65,8 @@ pub fn bunny(album: &mut Album) -> Result<()> {
     let view = view(DVec3::Y, 0.0, 10.0);
     let panels = vec![
         Picture::new("(a) the mesh", view).surface(cage(mesh, GIVEN)),
-        Picture::new("(b) after one step", view).surface(cage(&refined(mesh, &alpha, 1)?, super::CONTROL)),
+        Picture::new("(b) after one step", view)
+            .surface(cage(&refined(mesh, &alpha, 1)?, super::CONTROL)),
         Picture::new("(c) after four steps", view).surface(surface(mesh, &alpha)?),
     ];
     let line = Line {
@@ -75,7 +76,7 @@ pub fn bunny(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet("", 3, (190, 190), panels))
+    album.add(&line, &sheet("", 3, (150, 150), panels))
 }
 
 const MODEL: (&str, &str) = ("closed/tripod_24v.off", "star:5");
@@ -89,7 +90,8 @@ pub fn parameters(album: &mut Album) -> Result<()> {
     let every = |step: usize| -> Vec<usize> { (0..mesh.len()).step_by(step).collect() };
     let mut panels = vec![Picture::new("control mesh", view).surface(cage(mesh, GIVEN))];
     for alpha in [1.0, 0.8, 0.5] {
-        panels.push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
+        panels
+            .push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
     }
     for (caption, chosen) in [
         ("through every 4th vertex", every(4)),
@@ -101,7 +103,7 @@ pub fn parameters(album: &mut Album) -> Result<()> {
         }
         let points = Points {
             positions: chosen.iter().map(|&v| mesh.positions[v]).collect(),
-            radius: 1.5,
+            radius: 1.1,
             colour: POINT,
         };
         panels.push(
@@ -111,7 +113,8 @@ pub fn parameters(album: &mut Album) -> Result<()> {
         );
     }
     for alpha in [0.0, 0.2] {
-        panels.push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
+        panels
+            .push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
     }
     let framed: Vec<DVec3> = (panels.iter())
         .flat_map(|p| p.surfaces.iter().flat_map(|s| &s.mesh.positions))
@@ -128,7 +131,7 @@ pub fn parameters(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet("", 4, (150, 150), panels))
+    album.add(&line, &sheet("", 4, (115, 115), panels))
 }
 
 /// How smooth the surfaces are: reflection lines for α = 0, ½, 1.
@@ -148,5 +151,5 @@ pub fn reflections(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet("", 3, (190, 190), panels))
+    album.add(&line, &sheet("", 3, (170, 165), panels))
 }

@@ -116,7 +116,11 @@ impl Camera {
     /// # Errors
     /// No points, one that is not finite, a direction of view without length, an angle out of its range.
     pub fn framing(view: &View, points: &[DVec3], (width, height): (u32, u32)) -> Result<Self> {
-        let refuse = |what: String| Err(Error::Computation(format!("cannot place the camera: {what}")));
+        let refuse = |what: String| {
+            Err(Error::Computation(format!(
+                "cannot place the camera: {what}"
+            )))
+        };
         let back = view.toward_eye.normalize_or_zero();
         let up = view.up.reject_from(back).normalize_or_zero();
         if !back.is_normalized() || !up.is_normalized() {
@@ -139,7 +143,9 @@ impl Camera {
                 (angle / 2.0).to_radians().tan()
             }
             Projection::Perspective { angle } => {
-                return refuse(format!("a perspective of {angle} degrees; it must lie between 0 and 180"));
+                return refuse(format!(
+                    "a perspective of {angle} degrees; it must lie between 0 and 180"
+                ));
             }
         };
         // Tangents of the half angles within the margin.
@@ -169,10 +175,7 @@ impl Camera {
             farthest = farthest.min(z);
         }
         let centre = ((bounds[0] - bounds[1]) / 2.0, (bounds[2] - bounds[3]) / 2.0);
-        let half = (
-            (bounds[0] + bounds[1]) / 2.0,
-            (bounds[2] + bounds[3]) / 2.0,
-        );
+        let half = ((bounds[0] + bounds[1]) / 2.0, (bounds[2] + bounds[3]) / 2.0);
         // A single point, or points along one line of sight, have no size of their own.
         let size = |extent: f64| if extent > 0.0 { extent } else { 1.0 };
         let deep = size(nearest - farthest);
@@ -297,7 +300,10 @@ mod tests {
         }
         assert!(toward("oblique").min_element() > 0.0);
         let error = View::named("nowhere").unwrap_err().to_string();
-        assert!(error.contains("front, back") && !error.contains('\n'), "{error}");
+        assert!(
+            error.contains("front, back") && !error.contains('\n'),
+            "{error}"
+        );
         // Blender's way: z upward, the front at −y, the right at +x.
         let front = View::around(DVec3::Z, 0.0, 0.0).toward_eye;
         assert!((front - DVec3::NEG_Y).length() < 1e-12);
@@ -308,18 +314,25 @@ mod tests {
     fn perspective_divides_by_the_distance() {
         // A square of side 2 at z = 0, the eye on the z axis, 90° over 200 pixels: within the margin the half
         // height 1 is seen under tan = 0.94, so the eye is at 1/0.94 and a unit there is 100·0.94 pixels.
-        let square = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec3::new(x, y, 0.0));
+        let square = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+            .map(|(x, y)| DVec3::new(x, y, 0.0));
         let view = View::named("front").unwrap().perspective(90.0);
         let camera = Camera::framing(&view, &square, (200, 200)).unwrap();
         let shown = 1.0 - 2.0 * MARGIN;
         let corner = camera.project(square[2]).unwrap();
-        assert!((corner.x - (100.0 + 100.0 * shown)).abs() < 1e-9, "{corner:?}");
+        assert!(
+            (corner.x - (100.0 + 100.0 * shown)).abs() < 1e-9,
+            "{corner:?}"
+        );
         assert!((corner.weight - shown).abs() < 1e-12);
         // Twice as far, half as large.
         let far = camera.project(DVec3::new(1.0, 0.0, -1.0 / shown)).unwrap();
         assert!((far.x - (100.0 + 50.0 * shown)).abs() < 1e-9, "{far:?}");
         assert!(far.depth > corner.depth);
-        assert_eq!(camera.project(DVec3::new(0.0, 0.0, 1.0 / shown + 1e-9)), None);
+        assert_eq!(
+            camera.project(DVec3::new(0.0, 0.0, 1.0 / shown + 1e-9)),
+            None
+        );
         // The step of depth for a step of length, against a difference quotient.
         let step = 1e-6;
         let nearer = camera.project(DVec3::new(0.0, 0.0, step)).unwrap();

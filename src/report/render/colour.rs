@@ -173,18 +173,29 @@ mod tests {
     #[test]
     fn sequential_steps_look_equal_and_get_lighter() {
         let table = ColourMap::Sequential.table();
-        assert_eq!((table[0], table[STEPS - 1]), (Colour(68, 1, 84), Colour(253, 231, 37)));
+        assert_eq!(
+            (table[0], table[STEPS - 1]),
+            (Colour(68, 1, 84), Colour(253, 231, 37))
+        );
         // Over sixteenths of the map, wide enough that rounding to whole bytes does not count.
-        let colours: Vec<[f64; 3]> = (0..=16).map(|i| lab(ColourMap::Sequential.colour(f64::from(i) / 16.0))).collect();
+        let colours: Vec<[f64; 3]> = (0..=16)
+            .map(|i| lab(ColourMap::Sequential.colour(f64::from(i) / 16.0)))
+            .collect();
         let steps: Vec<f64> = colours
             .windows(2)
             .map(|w| {
                 assert!(w[1][0] > w[0][0] + 0.02, "lighter by a visible step");
-                (0..3).map(|k| (w[1][k] - w[0][k]).powi(2)).sum::<f64>().sqrt()
+                (0..3)
+                    .map(|k| (w[1][k] - w[0][k]).powi(2))
+                    .sum::<f64>()
+                    .sqrt()
             })
             .collect();
         let mean = steps.iter().sum::<f64>() / steps.len() as f64;
-        assert!(steps.iter().all(|s| (0.6..1.6).contains(&(s / mean))), "{steps:?}");
+        assert!(
+            steps.iter().all(|s| (0.6..1.6).contains(&(s / mean))),
+            "{steps:?}"
+        );
     }
 
     #[test]

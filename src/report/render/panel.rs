@@ -58,8 +58,18 @@ impl Picture {
         // A caption that is longer than its picture is wide is made smaller.
         let room = frame.width() + 2.0 * GAP;
         let size = TITLE_SIZE * (room / text_width(&self.caption, TITLE_SIZE)?.max(1.0)).min(1.0);
-        let place = (frame.centre().0, frame.top - figure::title_room(&self.caption) + 2.0 + TITLE_SIZE);
-        canvas.text(&self.caption, place, size, Anchor::Middle, false, TEXT_COLOUR)
+        let place = (
+            frame.centre().0,
+            frame.top - figure::title_room(&self.caption) + 2.0 + TITLE_SIZE,
+        );
+        canvas.text(
+            &self.caption,
+            place,
+            size,
+            Anchor::Middle,
+            false,
+            TEXT_COLOUR,
+        )
     }
 }
 
@@ -98,11 +108,15 @@ fn draw_bar(canvas: &Canvas<'_>, frame: Rect, scale: &ColourScale) -> Result<()>
             bottom: y + FRAME_WIDTH / 2.0,
         };
         canvas.fill(mark, FRAME_COLOUR)?;
-        let place = (bar.right + TICK_LENGTH + TICK_GAP, y + CAP_HEIGHT / 2.0 * TICK_SIZE);
+        let place = (
+            bar.right + TICK_LENGTH + TICK_GAP,
+            y + CAP_HEIGHT / 2.0 * TICK_SIZE,
+        );
         canvas.text(label, place, TICK_SIZE, Anchor::Start, false, TEXT_COLOUR)?;
         right = right.max(place.0 + text_width(label, TICK_SIZE)?);
     }
-    let size = LABEL_SIZE * (frame.height() / text_width(&scale.label, LABEL_SIZE)?.max(1.0)).min(1.0);
+    let size =
+        LABEL_SIZE * (frame.height() / text_width(&scale.label, LABEL_SIZE)?.max(1.0)).min(1.0);
     let place = (right + 6.0 + CAP_HEIGHT * LABEL_SIZE, bar.centre().1);
     canvas.text(&scale.label, place, size, Anchor::Middle, true, TEXT_COLOUR)
 }

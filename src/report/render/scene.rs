@@ -118,7 +118,10 @@ impl Scene {
         let lists = lists.chain(picture.vectors.iter().flat_map(|v| [&v.tails, &v.vectors]));
         for list in lists {
             if let Some(i) = list.iter().position(|p| !p.is_finite()) {
-                return Err(cannot_draw(&format!("point or vector {i} is not finite: {}", list[i])));
+                return Err(cannot_draw(&format!(
+                    "point or vector {i} is not finite: {}",
+                    list[i]
+                )));
             }
         }
         let camera = match &picture.framed {
@@ -157,7 +160,8 @@ impl Scene {
             .collect::<Result<Vec<DVec4>>>()?;
         let first_vertex = self.vertices.len() as u32;
         let first_face = self.face_normals.len() as u32;
-        self.vertices.extend(projected.iter().chain(&centroids).map(snap));
+        self.vertices
+            .extend(projected.iter().chain(&centroids).map(snap));
         let areas: Vec<DVec3> = (mesh.faces.iter())
             .map(|f| area_vector(&mesh.positions, f))
             .collect();
@@ -333,14 +337,23 @@ fn check(surface: &Surface) -> std::result::Result<(), String> {
         ));
     }
     if let Shading::Normals(normals) = &surface.shading {
-        assert!(normals.len() == positions.len(), "one normal for each vertex");
+        assert!(
+            normals.len() == positions.len(),
+            "one normal for each vertex"
+        );
         if let Some(v) = normals.iter().position(|n| !n.is_finite()) {
-            return Err(format!("the normal of vertex {v} is not finite: {}", normals[v]));
+            return Err(format!(
+                "the normal of vertex {v} is not finite: {}",
+                normals[v]
+            ));
         }
     }
     match &surface.paint {
         Some(Paint::Scalars { values, .. }) => {
-            assert!(values.len() == positions.len(), "one number for each vertex");
+            assert!(
+                values.len() == positions.len(),
+                "one number for each vertex"
+            );
             if let Some(v) = values.iter().position(|x| x.is_nan()) {
                 return Err(format!("the number of vertex {v} is not one (NaN)"));
             }
@@ -363,7 +376,13 @@ fn everything(picture: &Picture) -> Vec<DVec3> {
     }
     for vectors in &picture.vectors {
         all.extend_from_slice(&vectors.tails);
-        all.extend(vectors.tails.iter().zip(&vectors.vectors).map(|(&t, &v)| t + v));
+        all.extend(
+            vectors
+                .tails
+                .iter()
+                .zip(&vectors.vectors)
+                .map(|(&t, &v)| t + v),
+        );
     }
     all
 }
@@ -425,8 +444,14 @@ const HEAD_LENGTH: f64 = 4.5;
 
 /// Arrows as small meshes: a tube and a cone each.
 fn arrows(vectors: &Vectors, camera: &Camera, pixels: f64) -> Result<Vec<Surface>> {
-    assert!(vectors.tails.len() == vectors.vectors.len(), "one vector for each tail");
-    let (mut tubes, mut cones) = (Mesh::new(Vec::new(), Faces::default()), Mesh::new(Vec::new(), Faces::default()));
+    assert!(
+        vectors.tails.len() == vectors.vectors.len(),
+        "one vector for each tail"
+    );
+    let (mut tubes, mut cones) = (
+        Mesh::new(Vec::new(), Faces::default()),
+        Mesh::new(Vec::new(), Faces::default()),
+    );
     for (i, (&tail, &vector)) in vectors.tails.iter().zip(&vectors.vectors).enumerate() {
         let Some(axis) = vector.try_normalize() else {
             continue;
@@ -443,14 +468,18 @@ fn arrows(vectors: &Vectors, camera: &Camera, pixels: f64) -> Result<Vec<Surface
             })
         };
         let base = tubes.positions.len() as u32;
-        tubes.positions.extend(ring(tail, width / 2.0).chain(ring(neck, width / 2.0)));
+        tubes
+            .positions
+            .extend(ring(tail, width / 2.0).chain(ring(neck, width / 2.0)));
         let cone = cones.positions.len() as u32;
         cones.positions.extend(ring(neck, HEAD_RADIUS * width));
         cones.positions.push(tail + vector);
         let sides = SIDES as u32;
         for k in 0..sides {
             let next = (k + 1) % sides;
-            tubes.faces.push(&[base + k, base + next, base + sides + next, base + sides + k]);
+            tubes
+                .faces
+                .push(&[base + k, base + next, base + sides + next, base + sides + k]);
             cones.faces.push(&[cone + k, cone + next, cone + sides]);
         }
         let base_of_cone: Vec<u32> = (0..sides).rev().map(|k| cone + k).collect();

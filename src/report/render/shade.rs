@@ -75,12 +75,19 @@ mod tests {
     fn what_faces_the_key_light_is_brightest() {
         let at = |n: DVec3| shade(n.normalize(), GREY, Finish::Matte, false)[0];
         let lit = at(KEY);
-        for n in [DVec3::Z, DVec3::new(0.5, -0.5, 0.7), DVec3::new(0.9, 0.0, 0.1)] {
+        for n in [
+            DVec3::Z,
+            DVec3::new(0.5, -0.5, 0.7),
+            DVec3::new(0.9, 0.0, 0.1),
+        ] {
             assert!(at(n) < lit, "{n}");
         }
         // A ripple of two degrees on what faces the eye shows in whole steps of grey.
         let tilt = 2.0_f64.to_radians();
-        let (up, down) = (at(DVec3::new(0.0, tilt, 1.0)), at(DVec3::new(0.0, -tilt, 1.0)));
+        let (up, down) = (
+            at(DVec3::new(0.0, tilt, 1.0)),
+            at(DVec3::new(0.0, -tilt, 1.0)),
+        );
         assert!(up >= down + 3, "{up} {down}");
     }
 
