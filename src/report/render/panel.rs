@@ -56,8 +56,8 @@ impl Picture {
             draw_bar(canvas, frame, scale)?;
         }
         // A caption that is longer than its picture is wide is made smaller.
-        let room = frame.width() + 2.0 * GAP;
-        let size = TITLE_SIZE * (room / text_width(&self.caption, TITLE_SIZE)?.max(1.0)).min(1.0);
+        let size =
+            TITLE_SIZE * (frame.width() / text_width(&self.caption, TITLE_SIZE)?.max(1.0)).min(1.0);
         let place = (
             frame.centre().0,
             frame.top - figure::title_room(&self.caption) + 2.0 + TITLE_SIZE,
