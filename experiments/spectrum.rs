@@ -110,10 +110,18 @@ impl Findings {
             ),
         ];
         for (method, omega, radius) in &self.sweeps {
-            rows.push((method.name(), format!("ω={omega}, file order"), radius.value));
+            rows.push((
+                method.name(),
+                format!("ω={omega}, file order"),
+                radius.value,
+            ));
         }
         for (name, ends) in [("chebyshev", a), ("cg", a), ("pcg-jacobi", jacobi)] {
-            let rate = if ends.min > 0.0 { ends.krylov_rate() } else { 1.0 };
+            let rate = if ends.min > 0.0 {
+                ends.krylov_rate()
+            } else {
+                1.0
+            };
             rows.push((name, "(√κ−1)/(√κ+1)".into(), rate));
         }
         rows
@@ -128,7 +136,10 @@ fn run(arguments: &Arguments) -> Result<()> {
         };
         let findings = analyse(&input, arguments)?;
         let out = &arguments.output.out;
-        let tables = [eigenvalue_table(&input, &findings), radius_table(&input, &findings)];
+        let tables = [
+            eigenvalue_table(&input, &findings),
+            radius_table(&input, &findings),
+        ];
         for table in &tables {
             table.write(out)?;
             if !arguments.output.json {
@@ -138,7 +149,9 @@ fn run(arguments: &Arguments) -> Result<()> {
         if let Some(full) = &findings.full {
             full_table(&input, full).write(out)?;
             let png = out.join(format!("{}.png", input.stem("spectrum-histogram")));
-            histogram(&input, full, &findings.promise).render()?.save(&png)?;
+            histogram(&input, full, &findings.promise)
+                .render()?
+                .save(&png)?;
         }
         if !findings.modes.is_empty() {
             mode_table(&input, &findings.modes).write(out)?;
@@ -253,7 +266,11 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
                  bipartite graph, the null vectors are their ±1 colourings, and the points {} a part that no control \
                  points reach.",
                 found.verdict.singular[0].first_vertex,
-                if found.verdict.excited { "have" } else { "do not have" }
+                if found.verdict.excited {
+                    "have"
+                } else {
+                    "do not have"
+                }
             )
         } else {
             "non-singular: no component with all valences 3 and a bipartite graph, or a scheme that never is.".into()
@@ -280,7 +297,10 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
     ));
     table.note(format!(
         "Iterations that suffice by proof for this tolerance from V = P: PIA {}, W-PIA {}, Thall {}, Chebyshev {}.",
-        found.counts.pia, found.counts.w_pia, found.counts.thall, found.counts.chebyshev
+        promised(found.counts.pia),
+        promised(found.counts.w_pia),
+        promised(found.counts.thall),
+        promised(found.counts.chebyshev)
     ));
     let b = &found.system.bounds;
     let e = &found.ends;
@@ -288,8 +308,18 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
     for (k, (name, estimate, bound, excited)) in [
         ("lambda_min", e.lambda_min, b.lambda_min, data(0, true)),
         ("lambda_max", e.lambda_max, b.lambda_max, data(0, false)),
-        ("jacobi_lambda_min", e.jacobi_lambda_min, b.jacobi_lambda_min, data(1, true)),
-        ("jacobi_lambda_max", e.jacobi_lambda_max, b.jacobi_lambda_max, data(1, false)),
+        (
+            "jacobi_lambda_min",
+            e.jacobi_lambda_min,
+            b.jacobi_lambda_min,
+            data(1, true),
+        ),
+        (
+            "jacobi_lambda_max",
+            e.jacobi_lambda_max,
+            b.jacobi_lambda_max,
+            data(1, false),
+        ),
     ]
     .into_iter()
     .enumerate()
@@ -306,6 +336,14 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
         ]);
     }
     table
+}
+
+fn promised(count: f64) -> String {
+    if count.is_finite() {
+        count.to_string()
+    } else {
+        "unknown (the bound for λ_min is 0)".into()
+    }
 }
 
 fn radius_table(input: &Input, found: &Findings) -> Table {
@@ -433,7 +471,12 @@ fn json(input: &Input, found: &Findings) -> Value {
         "kernel_excited": found.verdict.excited,
     });
     if let Value::Object(map) = &mut object {
-        let names = ["lambda_min", "lambda_max", "jacobi_lambda_min", "jacobi_lambda_max"];
+        let names = [
+            "lambda_min",
+            "lambda_max",
+            "jacobi_lambda_min",
+            "jacobi_lambda_max",
+        ];
         let proofs: Map<String, Value> = names
             .into_iter()
             .zip(&found.certificates)
@@ -444,12 +487,18 @@ fn json(input: &Input, found: &Findings) -> Value {
         }
         if found.verdict.is_singular() {
             let all = Method::ALL.iter().map(|&m| {
-                (m.name().to_owned(), Value::from(found.verdict.prediction(m).name()))
+                (
+                    m.name().to_owned(),
+                    Value::from(found.verdict.prediction(m).name()),
+                )
             });
             map.insert("predictions".into(), Value::Object(all.collect()));
         }
         if let Some(full) = &found.full {
-            map.insert("eigenvalues".into(), json!({ "a": full.a, "jacobi": full.jacobi }));
+            map.insert(
+                "eigenvalues".into(),
+                json!({ "a": full.a, "jacobi": full.jacobi }),
+            );
         }
         if !found.modes.is_empty() {
             let values: Vec<Value> = found
