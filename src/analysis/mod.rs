@@ -13,6 +13,7 @@ pub mod radius;
 pub mod rate;
 pub mod singularity;
 pub mod spectrum;
+pub mod splitting;
 pub mod sweep;
 pub mod tridiagonal;
 pub mod valence_study;
