@@ -14,8 +14,11 @@ use limitlab::Result;
 use limitlab::analysis::comparison::{automatic, standard_setup};
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::Scheme;
-use limitlab::cli::{self, CommonFlags, Input, MeshFlags, Progress, StopFlags, constraints, number};
+use limitlab::cli::{
+    self, CommonFlags, Input, MeshFlags, Progress, StopFlags, constraints, number,
+};
 use limitlab::error::Error;
+use limitlab::interpolate::halstead::{self, Energies, Fairness, Weights, fit};
 use limitlab::interpolate::lin_luo;
 use limitlab::interpolate::normals::Rotation;
 use limitlab::interpolate::subset::Restriction;
@@ -23,7 +26,6 @@ use limitlab::interpolate::surface::{Request, Surface, surface};
 use limitlab::interpolate::zheng_cai::{self, Constraints, PhaseOne, Sweep};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, io};
-use limitlab::solvers::system::Rows;
 use limitlab::solvers::{Errors, Method, Outcome, Solution, Step, run_watched};
 use limitlab::subdivide::doo_sabin::{Rule, limit_positions};
 
@@ -40,11 +42,12 @@ struct Arguments {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
-    /// pcg-ssor, pcg-ic0, or two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); auto is chebyshev with
-    /// proven bounds where there are any, else cg
+    /// pcg-ssor, pcg-ic0; two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); halstead (the fairest
+    /// surface, with --scheme catmull-clark: a control mesh two refinements down). auto is chebyshev with proven
+    /// bounds where there are any, else cg
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice)]
     method: Choice,
-    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, random or random:SEED
+    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
     /// Print one JSON object on standard output, and nothing else there
@@ -103,6 +106,12 @@ struct ShapeFlags {
     /// --method two-phase stops at a largest update of this part of the bounding box's diagonal
     #[arg(long, value_name = "T", default_value_t = 0.003, value_parser = cli::positive)]
     eps: f64,
+    /// Weight of the thin-plate energy in --method halstead
+    #[arg(long, value_name = "W", default_value_t = 1.0)]
+    thin_plate: f64,
+    /// Weight of the membrane energy in --method halstead, positive
+    #[arg(long, value_name = "W", default_value_t = 1.0, value_parser = cli::positive)]
+    membrane: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,12 +119,14 @@ enum Choice {
     Auto,
     Solver(Method),
     TwoPhase,
+    Halstead,
 }
 
 fn choice(text: &str) -> Result<Choice> {
     match text {
         "auto" => Ok(Choice::Auto),
         "two-phase" => Ok(Choice::TwoPhase),
+        "halstead" => Ok(Choice::Halstead),
         _ => text.parse().map(Choice::Solver),
     }
 }
@@ -148,6 +159,19 @@ fn main() -> ExitCode {
     {
         conflict("--method two-phase belongs to --scheme zheng-cai");
     }
+    if arguments.method == Choice::Halstead {
+        if *arguments.mesh.scheme.get_or_insert(Scheme::CatmullClark) != Scheme::CatmullClark {
+            conflict("--method halstead belongs to --scheme catmull-clark");
+        }
+        if arguments.shape.vertices.is_some() || arguments.shape.shape_handle.is_some() {
+            conflict("--method halstead interpolates all vertices and has no shape handles");
+        }
+        if arguments.shape.subdivide == 1 {
+            conflict(
+                "--method halstead gives a mesh two refinements down: use --subdivide 2 or more, or leave it out",
+            );
+        }
+    }
     cli::exit(|| {
         arguments.common.apply()?;
         run(&arguments)
@@ -166,6 +190,9 @@ fn run(arguments: &Arguments) -> Result<()> {
     };
     let mut result = match &wishes.alpha {
         Some(alpha) => unified(arguments, &input, alpha).map_err(named)?,
+        None if arguments.method == Choice::Halstead => {
+            fairest(arguments, &input, &wishes).map_err(named)?
+        }
         None => {
             let control = control_mesh(arguments, &input, &wishes)?;
             refine(arguments, &input, &wishes, control).map_err(named)?
@@ -259,6 +286,7 @@ struct Finished {
     status: &'static str,
     errors: Errors,
     tolerance: f64,
+    fairness: Option<Energies>,
     seconds: Seconds,
 }
 
@@ -279,8 +307,12 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
         _ => automatic(solved),
     };
     let start = Instant::now();
-    let order = arguments.order.order(&input.mesh, &input.topology.incidence);
-    let order = part.as_ref().map_or_else(|| order.clone(), |p| p.order(&order));
+    let order = arguments
+        .order
+        .order(&input.mesh, &input.topology.incidence);
+    let order = part
+        .as_ref()
+        .map_or_else(|| order.clone(), |p| p.order(&order));
     let setup = standard_setup(solved, method, Some(&order), &|| spectrum(solved))?;
     let stop = arguments.stop.stop(&input.mesh);
     let progress = Progress::open("solving", arguments.common.quiet);
@@ -315,7 +347,9 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
 /// Zheng & Cai's phase one by its own rule.
 fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
     let start = Instant::now();
-    let order = arguments.order.order(&input.mesh, &input.topology.incidence);
+    let order = arguments
+        .order
+        .order(&input.mesh, &input.topology.incidence);
     let phase = PhaseOne {
         sweep: Sweep::GaussSeidel(Some(&order)),
         max_iterations: arguments.shape.ite_max,
@@ -329,7 +363,11 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
         errors: auxiliary_errors(input, marks, &found.mesh)?,
         points: found.mesh.positions,
         iterations: found.updates.len(),
-        status: if found.passed { "converged" } else { "max-iterations" },
+        status: if found.passed {
+            "converged"
+        } else {
+            "max-iterations"
+        },
         tolerance: arguments.shape.eps * mesh.diagonal(),
         seconds: Seconds {
             assemble: input.check_seconds,
@@ -342,14 +380,15 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
 /// How far the limit points of an auxiliary mesh are from those interpolated.
 fn auxiliary_errors(input: &Input, marks: Option<&[bool]>, auxiliary: &Mesh) -> Result<Errors> {
     let limits = limit_positions(Rule::ZhengCai, auxiliary, &input.topology)?;
-    let points = &input.mesh.positions;
-    let mut nothing = vec![(); points.len()];
-    let totals = Rows::new(points.len()).pass_one(&mut nothing, |v, (), tally| {
-        if marks.is_none_or(|m| m[v]) {
-            tally.error(points[v] - limits[v]);
-        }
-    });
-    Ok(totals.errors)
+    let pairs = input.mesh.positions.iter().zip(&limits).enumerate();
+    let distances: Vec<f64> = pairs
+        .filter(|(v, _)| marks.is_none_or(|m| m[*v]))
+        .map(|(_, (p, q))| p.distance(*q))
+        .collect();
+    Ok(Errors {
+        max: distances.iter().copied().fold(0.0, f64::max),
+        mean: distances.iter().sum::<f64>() / distances.len() as f64,
+    })
 }
 
 fn refine(
@@ -383,7 +422,47 @@ fn refine(
         status: control.status,
         errors: control.errors,
         tolerance: control.tolerance,
+        fairness: None,
         seconds,
+    })
+}
+
+/// The fairest control mesh, and its surface.
+fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Finished> {
+    let start = Instant::now();
+    let fairness = Fairness::new(&input.mesh)?;
+    let assemble = input.check_seconds + start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let flags = &arguments.shape;
+    let weights = Weights {
+        thin_plate: flags.thin_plate,
+        membrane: flags.membrane,
+    };
+    let points = &input.mesh.positions;
+    let found = fit(&fairness, points, wishes.normals.as_deref(), weights)?;
+    let solve = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let request = Request {
+        levels: usize::from(flags.subdivide).saturating_sub(halstead::LEVELS),
+        limit: flags.limit,
+        normals: flags.write_normals,
+        ..Request::default()
+    };
+    let surface = surface(found.mesh, &fairness.topology, input.scheme, &[], &request)?;
+    Ok(Finished {
+        method: "halstead",
+        surface,
+        iterations: 1,
+        status: "converged",
+        errors: found.errors,
+        tolerance: 0.0,
+        fairness: Some(found.energies),
+        seconds: Seconds {
+            assemble,
+            solve,
+            subdivide: start.elapsed().as_secs_f64(),
+            ..Seconds::default()
+        },
     })
 }
 
@@ -409,8 +488,12 @@ fn unified(arguments: &Arguments, input: &Input, alpha: &[f64]) -> Result<Finish
         surface: Surface::plain(mesh),
         iterations: 0,
         status: "converged",
-        errors: Errors { max: 0.0, mean: 0.0 },
+        errors: Errors {
+            max: 0.0,
+            mean: 0.0,
+        },
         tolerance: 0.0,
+        fairness: None,
         seconds: Seconds {
             assemble: input.check_seconds,
             subdivide: start.elapsed().as_secs_f64(),
@@ -422,7 +505,13 @@ fn unified(arguments: &Arguments, input: &Input, alpha: &[f64]) -> Result<Finish
 /// Nothing that is no number reaches a file.
 fn require_finite(input: &Input, surface: &Surface) -> Result<()> {
     let normals = surface.normals.iter().flatten();
-    match surface.mesh.positions.iter().chain(normals).position(|p| !p.is_finite()) {
+    match surface
+        .mesh
+        .positions
+        .iter()
+        .chain(normals)
+        .position(|p| !p.is_finite())
+    {
         None => Ok(()),
         Some(v) => Err(Error::mesh(
             &input.name,
@@ -435,7 +524,12 @@ fn require_finite(input: &Input, surface: &Surface) -> Result<()> {
 }
 
 fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished) -> Result<()> {
-    let Finished { surface, errors, seconds, .. } = result;
+    let Finished {
+        surface,
+        errors,
+        seconds,
+        ..
+    } = result;
     let common = &arguments.common;
     if !surface.not_flattened.is_empty() {
         common.remark(format_args!(
@@ -445,7 +539,12 @@ fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished
             surface.not_flattened[0]
         ));
     }
-    let without = surface.normals.iter().flatten().filter(|n| **n == DVec3::ZERO).count();
+    let without = surface
+        .normals
+        .iter()
+        .flatten()
+        .filter(|n| **n == DVec3::ZERO)
+        .count();
     if without > 0 {
         common.remark(format_args!(
             "{}: the surface has no normal at {without} vertices; (0, 0, 0) is written",
@@ -488,6 +587,10 @@ fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished
         "normals": wishes.normals.as_ref().map_or(Value::Null, |n| json!({
             "given": given(n),
             "set": surface.normals_set,
+        })),
+        "fairness": result.fairness.map_or(Value::Null, |e| json!({
+            "thin_plate": number(e.thin_plate),
+            "membrane": number(e.membrane),
         })),
         "seconds": {
             "read": number(input.read_seconds),
