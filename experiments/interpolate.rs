@@ -47,7 +47,7 @@ struct Arguments {
     /// bounds where there are any, else cg
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice)]
     method: Choice,
-    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, random or random:SEED
+    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
     /// Print one JSON object on standard output, and nothing else there
