@@ -294,6 +294,12 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
     if arguments.method == Choice::TwoPhase {
         return two_phase(arguments, input, wishes);
     }
+    if input.mesh.diagonal() == 0.0 && arguments.stop.tol_absolute.is_none() {
+        return Err(Error::mesh(
+            &input.name,
+            "all points coincide, so no tolerance can be relative to their extent: give --tol-absolute",
+        ));
+    }
     let start = Instant::now();
     let system = input.system()?;
     let part = match &wishes.interpolated {
