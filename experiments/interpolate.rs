@@ -29,7 +29,8 @@ struct Arguments {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
-    /// pcg-ssor or pcg-ic0; auto is chebyshev with proven bounds where there are any, else cg
+    /// pcg-ssor or pcg-ic0; auto is chebyshev with proven bounds where there are any, else cg, and ldlt where that makes
+    /// no progress
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice)]
     method: Choice,
     /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, random or random:SEED
@@ -73,19 +74,30 @@ fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     let system = input.system()?;
     let assemble_seconds = input.check_seconds + start.elapsed().as_secs_f64();
-    let method = arguments.method.unwrap_or_else(|| automatic(&system));
     let start = Instant::now();
     let order = arguments
         .order
         .order(&input.mesh, &input.topology.incidence);
-    let setup = standard_setup(&system, method, Some(&order), &|| spectrum(&system))?;
     let stop = arguments.stop.stop(&input.mesh);
     let progress = Progress::open("solving", arguments.common.quiet);
-    let solution = run_watched(&system, &input.mesh.positions, setup, &stop, &mut |step| {
-        progress.step();
-        progress.message(format!("{method}: max error {:.2e}", step.errors.max));
-        ControlFlow::Continue(())
-    });
+    let solve = |method: Method| -> Result<Solution> {
+        let setup = standard_setup(&system, method, Some(&order), &|| spectrum(&system))?;
+        let points = &input.mesh.positions;
+        Ok(run_watched(&system, points, setup, &stop, &mut |step| {
+            progress.step();
+            progress.message(format!("{method}: max error {:.2e}", step.errors.max));
+            ControlFlow::Continue(())
+        }))
+    };
+    let mut method = arguments.method.unwrap_or_else(|| automatic(&system));
+    let mut solution = solve(method)?;
+    let outcome = solution.report.outcome;
+    if arguments.method.is_none() && matches!(outcome, Outcome::Stagnated | Outcome::Diverged) {
+        // A factorization tells a nearly singular matrix, on which iterations may make no progress for long, from a
+        // singular one.
+        method = Method::Ldlt;
+        solution = solve(method)?;
+    }
     drop(progress);
     let solve_seconds = start.elapsed().as_secs_f64();
     check(&input, method, &solution, stop.tolerance)?;
@@ -142,7 +154,8 @@ fn check(input: &Input, method: Method, solution: &Solution, tolerance: f64) -> 
         Outcome::Diverged => "the iteration diverged; try --method auto",
         Outcome::MaxIterations => "the iterations ran out; raise --max-iter, or try --method auto",
         Outcome::Stagnated => {
-            "the error no longer shrinks: the tolerance is below rounding, or no control mesh exists; raise --tol"
+            "the error no longer shrinks: raise --tol if it is below rounding; else the matrix is nearly singular, or no \
+             control mesh exists: --method ldlt tells which"
         }
         Outcome::Breakdown | Outcome::Stopped => "the method broke down; try another --method",
     };

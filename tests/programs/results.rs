@@ -190,6 +190,28 @@ fn every_method_gives_the_same_control_mesh() {
     }
 }
 
+/// λ_min ≈ 0.82/k²: conjugate gradients make no progress for hundreds of iterations, a factorization is sure.
+#[test]
+fn a_nearly_singular_system_is_solved_by_the_automatic_choice() {
+    let folder = tempdir().unwrap();
+    let arguments = [
+        "prism:1001",
+        "--noise",
+        "0.1",
+        "-o",
+        "v.obj",
+        "--json",
+        "--quiet",
+    ];
+    let output = run(INTERPOLATE, folder.path(), arguments);
+    assert_done(&output, "prism:1001");
+    assert_eq!(json(&output)["method"], "ldlt");
+    let mesh = noisy("prism:1001");
+    let control = io::read(&folder.path().join("v.obj")).unwrap().mesh;
+    let error = residual(Scheme::CatmullClark, &mesh, &control);
+    assert!(error <= 1.001e-10 * mesh.diagonal(), "{error:e}");
+}
+
 #[test]
 fn as_interior_serves_loop_and_sqrt3() {
     let Some(root) = collection() else { return };
