@@ -62,7 +62,7 @@ fn run(context: &mut Context) -> Result<()> {
     context.table(table)?;
     let mut figure = Figure::row(panels);
     figure.columns = 2;
-    figure.height *= 2;
+    (figure.width, figure.height) = (560, 600);
     context.figure(
         PATTERNS.id,
         &figure.title(format!("{} under catmull-clark", subject.name)),
