@@ -44,7 +44,7 @@ struct Arguments {
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
     /// pcg-ssor, pcg-ic0; two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); halstead (the fairest
     /// surface, with --scheme catmull-clark: a control mesh two refinements down). auto is chebyshev with proven
-    /// bounds where there are any, else cg
+    /// bounds where there are any, else cg, and ldlt where that makes no progress
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice)]
     method: Choice,
     /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
@@ -308,7 +308,7 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
     };
     let solved = part.as_ref().map_or(&system, |p| &p.system);
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
-    let method = match arguments.method {
+    let mut method = match arguments.method {
         Choice::Solver(method) => method,
         _ => automatic(solved),
     };
@@ -319,19 +319,30 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
     let order = part
         .as_ref()
         .map_or_else(|| order.clone(), |p| p.order(&order));
-    let setup = standard_setup(solved, method, Some(&order), &|| spectrum(solved))?;
     let stop = arguments.stop.stop(&input.mesh);
     let progress = Progress::open("solving", arguments.common.quiet);
-    let watch = &mut |step: &Step| {
-        progress.step();
-        progress.message(format!("{method}: max error {:.2e}", step.errors.max));
-        ControlFlow::Continue(())
+    let solve = |method: Method| -> Result<Solution> {
+        let setup = standard_setup(solved, method, Some(&order), &|| spectrum(solved))?;
+        let watch = &mut |step: &Step| {
+            progress.step();
+            progress.message(format!("{method}: max error {:.2e}", step.errors.max));
+            ControlFlow::Continue(())
+        };
+        let points = &input.mesh.positions;
+        Ok(match &part {
+            Some(part) => part.solve(&system, points, setup, &stop, watch),
+            None => run_watched(&system, points, setup, &stop, watch),
+        })
     };
-    let points = &input.mesh.positions;
-    let solution = match &part {
-        Some(part) => part.solve(&system, points, setup, &stop, watch),
-        None => run_watched(&system, points, setup, &stop, watch),
-    };
+    let mut solution = solve(method)?;
+    let outcome = solution.report.outcome;
+    if arguments.method == Choice::Auto && matches!(outcome, Outcome::Stagnated | Outcome::Diverged)
+    {
+        // A factorization tells a nearly singular matrix, on which iterations may make no progress for long, from a
+        // singular one.
+        method = Method::Ldlt;
+        solution = solve(method)?;
+    }
     drop(progress);
     check(input, method, &solution, stop.tolerance)?;
     Ok(Control {
@@ -621,7 +632,8 @@ fn check(input: &Input, method: Method, solution: &Solution, tolerance: f64) -> 
         Outcome::Diverged => "the iteration diverged; try --method auto",
         Outcome::MaxIterations => "the iterations ran out; raise --max-iter, or try --method auto",
         Outcome::Stagnated => {
-            "the error no longer shrinks: the tolerance is below rounding, or no control mesh exists; raise --tol"
+            "the error no longer shrinks: raise --tol if it is below rounding; else the matrix is nearly singular, or no \
+             control mesh exists: --method ldlt tells which"
         }
         Outcome::Breakdown | Outcome::Stopped => "the method broke down; try another --method",
     };
