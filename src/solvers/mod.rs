@@ -9,9 +9,11 @@ pub mod incomplete_cholesky;
 pub mod iteration;
 pub mod jacobi;
 pub mod method;
+pub mod mixed;
 pub mod pia;
 pub mod ssor;
 pub mod system;
+pub mod wavefront;
 
 pub use iteration::{Errors, Iterate, Outcome, Report, Step, Stop, solve};
 pub use method::{Method, Setup, Solution, run, run_watched};
