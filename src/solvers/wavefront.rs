@@ -53,6 +53,18 @@ impl<'a> Wavefront<'a> {
         Wavefront { operator, band }
     }
 
+    /// Bands of a given length; `None` for iterations one after the other.
+    ///
+    /// # Panics
+    /// If rows reach further than a band.
+    pub fn in_bands(operator: &'a Operator, band: Option<usize>) -> Self {
+        assert!(
+            band.is_none_or(|band| operator.reach().is_some_and(|reach| reach <= band)),
+            "rows reach no further than a band"
+        );
+        Wavefront { operator, band }
+    }
+
     /// `count` ≥ 1 iterations for eigenvalues within the interval of `recurrence`, from x = 0. The first of them is
     /// a multiple of `r` and must be in `x` already: `x = τ₀ r` with the recurrence's first coefficient. The last
     /// iterate is returned in `x`; `other` is overwritten.
