@@ -1,43 +1,57 @@
-//! The control mesh whose limit surface passes through the vertices of a mesh: `interpolate MESH -o OUT`.
+//! The control mesh, or the surface, that passes through the vertices of a mesh: `interpolate MESH -o OUT`.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use clap::Parser;
-use serde_json::json;
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory, Parser};
+use glam::DVec3;
+use serde_json::{Value, json};
 
 use limitlab::Result;
 use limitlab::analysis::comparison::{automatic, standard_setup};
 use limitlab::analysis::spectrum::spectrum;
-use limitlab::cli::{self, CommonFlags, Input, MeshFlags, Progress, StopFlags, number};
+use limitlab::assemble::Scheme;
+use limitlab::cli::{self, CommonFlags, Input, MeshFlags, Progress, StopFlags, constraints, number};
 use limitlab::error::Error;
+use limitlab::interpolate::lin_luo;
+use limitlab::interpolate::normals::Rotation;
+use limitlab::interpolate::subset::Restriction;
+use limitlab::interpolate::surface::{Request, Surface, surface};
+use limitlab::interpolate::zheng_cai::{self, Constraints, PhaseOne, Sweep};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, io};
-use limitlab::solvers::{Method, Outcome, Solution, run_watched};
+use limitlab::solvers::system::Rows;
+use limitlab::solvers::{Errors, Method, Outcome, Solution, Step, run_watched};
+use limitlab::subdivide::doo_sabin::{Rule, limit_positions};
 
-/// Computes the control mesh V with A V = P: the vertices P of the mesh become points of the limit surface. The
-/// faces stay, vertex for vertex, so that the result can replace the mesh in any subdivision tool.
+/// Computes the control mesh V with A V = P: the vertices P of the mesh become points of the limit surface. Unless
+/// refined by --subdivide, the faces stay, vertex for vertex, so that the result can replace the mesh in any
+/// subdivision tool.
 #[derive(Parser)]
 #[command(name = "interpolate", version)]
 struct Arguments {
     /// A mesh file (.obj, .off, .ply) or a built-in name
     #[arg(value_name = "MESH")]
     input: String,
-    /// The control mesh to write (.obj, .off, .ply)
+    /// The mesh to write (.obj, .off, .ply): the control mesh, or the surface with --subdivide or --limit
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
-    /// pcg-ssor or pcg-ic0; auto is chebyshev with proven bounds where there are any, else cg
+    /// pcg-ssor, pcg-ic0, or two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); auto is chebyshev with
+    /// proven bounds where there are any, else cg
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice)]
     method: Choice,
-    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence or random[:SEED]
+    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, random or random:SEED
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
     /// Print one JSON object on standard output, and nothing else there
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    shape: ShapeFlags,
     #[command(flatten)]
     mesh: MeshFlags,
     #[command(flatten)]
@@ -46,19 +60,94 @@ struct Arguments {
     common: CommonFlags,
 }
 
-/// `--method`: a name, or `None` for `auto`.
-type Choice = Option<Method>;
+/// What is asked of the surface.
+#[derive(Args)]
+struct ShapeFlags {
+    /// Refine the control mesh K times by the scheme and write the surface
+    #[arg(long, value_name = "K", default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=12))]
+    subdivide: u8,
+    /// Push the vertices that are written to their limit points
+    #[arg(long)]
+    limit: bool,
+    /// Write the unit normals of the limit surface with the vertices; zero where it has none
+    #[arg(long)]
+    write_normals: bool,
+    /// Interpolate these vertices only: numbers and ranges A..B, separated by commas, or a file of them; the other
+    /// control points stay where they are
+    #[arg(long, value_name = "LIST|FILE")]
+    vertices: Option<String>,
+    /// Normals of the surface at given points: a file with lines `vertex nx ny nz`, or a mesh file with normals
+    /// (.off, .ply). Loop, √3 and Catmull-Clark turn rings of the mesh refined twice or more, Doo-Sabin tilts faces
+    #[arg(long, value_name = "FILE")]
+    normals: Option<PathBuf>,
+    /// Turn rings only where the normal is off by more than this angle in degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = degrees, requires = "normals")]
+    normal_threshold: f64,
+    /// Stop turning this angle in degrees before the given normal
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = degrees, requires = "normals")]
+    normal_tolerance: f64,
+    /// Spread the turn over this many levels
+    #[arg(long, value_name = "L", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8), requires = "normals")]
+    normal_levels: u8,
+    /// Scale the faces of interpolated vertices about their points after the first refinement: a positive number,
+    /// or a file with lines `vertex number` (schemes zheng-cai and nasri)
+    #[arg(long, value_name = "S|FILE")]
+    shape_handle: Option<String>,
+    /// Lin & Luo's unified √3 scheme, no system solved: α from 0 (approximating) over 1 (interpolating) to 2, a number
+    /// or a file with lines `vertex number` (others 0); with --vertices, those have α = 1
+    #[arg(long, value_name = "A|FILE", conflicts_with_all = ["normals", "shape_handle"])]
+    alpha: Option<String>,
+    /// Sweeps of --method two-phase at most
+    #[arg(long, value_name = "K", default_value_t = 5)]
+    ite_max: usize,
+    /// --method two-phase stops at a largest update of this part of the bounding box's diagonal
+    #[arg(long, value_name = "T", default_value_t = 0.003, value_parser = cli::positive)]
+    eps: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Choice {
+    Auto,
+    Solver(Method),
+    TwoPhase,
+}
 
 fn choice(text: &str) -> Result<Choice> {
-    if text == "auto" {
-        Ok(None)
-    } else {
-        text.parse().map(Some)
+    match text {
+        "auto" => Ok(Choice::Auto),
+        "two-phase" => Ok(Choice::TwoPhase),
+        _ => text.parse().map(Choice::Solver),
     }
 }
 
+fn degrees(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if (0.0..=180.0).contains(&x) => Ok(x),
+        _ => Err("an angle from 0 to 180 is needed".into()),
+    }
+}
+
+/// Ends with status 2, as clap does: flags that contradict each other.
+fn conflict(what: &str) -> ! {
+    let mut command = Arguments::command();
+    command.error(ErrorKind::ArgumentConflict, what).exit()
+}
+
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let mut arguments = Arguments::parse();
+    if arguments.shape.alpha.is_some() {
+        if *arguments.mesh.scheme.get_or_insert(Scheme::Sqrt3) != Scheme::Sqrt3 {
+            conflict("--alpha belongs to the unified √3 scheme: use it with --scheme sqrt3");
+        }
+        if arguments.method != Choice::Auto {
+            conflict("--alpha solves no system: leave --method out");
+        }
+    }
+    if arguments.method == Choice::TwoPhase
+        && *arguments.mesh.scheme.get_or_insert(Scheme::ZhengCai) != Scheme::ZhengCai
+    {
+        conflict("--method two-phase belongs to --scheme zheng-cai");
+    }
     cli::exit(|| {
         arguments.common.apply()?;
         run(&arguments)
@@ -70,64 +159,345 @@ fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     };
     io::check_name(&arguments.output)?;
+    let wishes = Wishes::read(&arguments.shape, &input)?;
+    let named = |e: Error| match e {
+        Error::Computation(what) | Error::Mesh { what, .. } => Error::mesh(&input.name, what),
+        other => other,
+    };
+    let mut result = match &wishes.alpha {
+        Some(alpha) => unified(arguments, &input, alpha).map_err(named)?,
+        None => {
+            let control = control_mesh(arguments, &input, &wishes)?;
+            refine(arguments, &input, &wishes, control).map_err(named)?
+        }
+    };
+    require_finite(&input, &result.surface)?;
+
+    let start = Instant::now();
+    let normals = result.surface.normals.as_deref();
+    io::write(&arguments.output, &result.surface.mesh, normals)?;
+    result.seconds.write = start.elapsed().as_secs_f64();
+    tell(arguments, &input, &wishes, &result)
+}
+
+/// The flags about single vertices, one entry a vertex each.
+struct Wishes {
+    interpolated: Option<Vec<bool>>,
+    normals: Option<Vec<Option<DVec3>>>,
+    handles: Option<Vec<f64>>,
+    alpha: Option<Vec<f64>>,
+}
+
+impl Wishes {
+    fn read(flags: &ShapeFlags, input: &Input) -> Result<Self> {
+        let n = input.mesh.len();
+        let marks = flags.vertices.as_deref();
+        let interpolated = marks.map(|t| constraints::vertex_marks(t, n)).transpose()?;
+        let is_interpolated = |v: usize| interpolated.as_ref().is_none_or(|m| m[v]);
+        let file = flags.normals.as_deref();
+        let mut normals = file.map(|p| constraints::normals(p, n)).transpose()?;
+        if let Some(normals) = normals.as_mut().filter(|n| n.iter().all(Option::is_some)) {
+            // A file with a normal for every vertex means those that are interpolated.
+            for (v, normal) in normals.iter_mut().enumerate() {
+                *normal = normal.filter(|_| is_interpolated(v));
+            }
+        }
+        let text = flags.shape_handle.as_deref();
+        let mut handles = text.map(|t| constraints::numbers(t, n, 1.0)).transpose()?;
+        if text.is_some_and(|t| t.parse::<f64>().is_ok()) {
+            for (v, handle) in handles.iter_mut().flatten().enumerate() {
+                *handle = if is_interpolated(v) { *handle } else { 1.0 };
+            }
+        }
+        let text = flags.alpha.as_deref();
+        let mut alpha = text.map(|t| constraints::numbers(t, n, 0.0)).transpose()?;
+        for (v, a) in alpha.iter_mut().flatten().enumerate() {
+            if interpolated.as_ref().is_some_and(|m| m[v]) {
+                *a = 1.0;
+            }
+        }
+        Ok(Wishes {
+            interpolated,
+            normals,
+            handles,
+            alpha,
+        })
+    }
+
+    fn constraints(&self) -> Constraints<'_> {
+        Constraints {
+            interpolated: self.interpolated.as_deref(),
+            normals: self.normals.as_deref(),
+            handles: self.handles.as_deref(),
+        }
+    }
+}
+
+#[derive(Default)]
+struct Seconds {
+    assemble: f64,
+    solve: f64,
+    subdivide: f64,
+    write: f64,
+}
+
+/// Control points and how they came about.
+struct Control {
+    method: &'static str,
+    points: Vec<DVec3>,
+    iterations: usize,
+    status: &'static str,
+    errors: Errors,
+    tolerance: f64,
+    seconds: Seconds,
+}
+
+struct Finished {
+    method: &'static str,
+    surface: Surface,
+    iterations: usize,
+    status: &'static str,
+    errors: Errors,
+    tolerance: f64,
+    seconds: Seconds,
+}
+
+fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
+    if arguments.method == Choice::TwoPhase {
+        return two_phase(arguments, input, wishes);
+    }
     let start = Instant::now();
     let system = input.system()?;
-    let assemble_seconds = input.check_seconds + start.elapsed().as_secs_f64();
-    let method = arguments.method.unwrap_or_else(|| automatic(&system));
+    let part = match &wishes.interpolated {
+        Some(marks) => Some(Restriction::new(&system, marks)?),
+        None => None,
+    };
+    let solved = part.as_ref().map_or(&system, |p| &p.system);
+    let assemble = input.check_seconds + start.elapsed().as_secs_f64();
+    let method = match arguments.method {
+        Choice::Solver(method) => method,
+        _ => automatic(solved),
+    };
     let start = Instant::now();
-    let order = arguments
-        .order
-        .order(&input.mesh, &input.topology.incidence);
-    let setup = standard_setup(&system, method, Some(&order), &|| spectrum(&system))?;
+    let order = arguments.order.order(&input.mesh, &input.topology.incidence);
+    let order = part.as_ref().map_or_else(|| order.clone(), |p| p.order(&order));
+    let setup = standard_setup(solved, method, Some(&order), &|| spectrum(solved))?;
     let stop = arguments.stop.stop(&input.mesh);
     let progress = Progress::open("solving", arguments.common.quiet);
-    let solution = run_watched(&system, &input.mesh.positions, setup, &stop, &mut |step| {
+    let watch = &mut |step: &Step| {
         progress.step();
         progress.message(format!("{method}: max error {:.2e}", step.errors.max));
         ControlFlow::Continue(())
-    });
+    };
+    let points = &input.mesh.positions;
+    let solution = match &part {
+        Some(part) => part.solve(&system, points, setup, &stop, watch),
+        None => run_watched(&system, points, setup, &stop, watch),
+    };
     drop(progress);
-    let solve_seconds = start.elapsed().as_secs_f64();
-    check(&input, method, &solution, stop.tolerance)?;
+    check(input, method, &solution, stop.tolerance)?;
+    Ok(Control {
+        method: method.name(),
+        points: solution.points,
+        // The start on a subset is what one PIA step makes of V = P.
+        iterations: solution.report.iterations + usize::from(part.is_some()),
+        status: solution.report.outcome.name(),
+        errors: solution.report.last(),
+        tolerance: stop.tolerance,
+        seconds: Seconds {
+            assemble,
+            solve: start.elapsed().as_secs_f64(),
+            ..Seconds::default()
+        },
+    })
+}
 
+/// Zheng & Cai's phase one by its own rule.
+fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
     let start = Instant::now();
-    let control = Mesh::new(solution.points, input.mesh.faces.clone());
-    io::write(&arguments.output, &control, None)?;
-    let write_seconds = start.elapsed().as_secs_f64();
+    let order = arguments.order.order(&input.mesh, &input.topology.incidence);
+    let phase = PhaseOne {
+        sweep: Sweep::GaussSeidel(Some(&order)),
+        max_iterations: arguments.shape.ite_max,
+        eps: arguments.shape.eps,
+    };
+    let (mesh, topology) = (&input.mesh, &input.topology);
+    let marks = wishes.interpolated.as_deref();
+    let found = zheng_cai::auxiliary(mesh, topology, marks, &phase)?;
+    Ok(Control {
+        method: "two-phase",
+        errors: auxiliary_errors(input, marks, &found.mesh)?,
+        points: found.mesh.positions,
+        iterations: found.updates.len(),
+        status: if found.passed { "converged" } else { "max-iterations" },
+        tolerance: arguments.shape.eps * mesh.diagonal(),
+        seconds: Seconds {
+            assemble: input.check_seconds,
+            solve: start.elapsed().as_secs_f64(),
+            ..Seconds::default()
+        },
+    })
+}
 
-    let report = &solution.report;
-    let last = report.last();
-    arguments.common.remark(format_args!(
-        "{}: {} by {method}, {} iterations, max error {:.3e}, mean {:.3e} (mesh units)",
+/// How far the limit points of an auxiliary mesh are from those interpolated.
+fn auxiliary_errors(input: &Input, marks: Option<&[bool]>, auxiliary: &Mesh) -> Result<Errors> {
+    let limits = limit_positions(Rule::ZhengCai, auxiliary, &input.topology)?;
+    let points = &input.mesh.positions;
+    let mut nothing = vec![(); points.len()];
+    let totals = Rows::new(points.len()).pass_one(&mut nothing, |v, (), tally| {
+        if marks.is_none_or(|m| m[v]) {
+            tally.error(points[v] - limits[v]);
+        }
+    });
+    Ok(totals.errors)
+}
+
+fn refine(
+    arguments: &Arguments,
+    input: &Input,
+    wishes: &Wishes,
+    control: Control,
+) -> Result<Finished> {
+    let start = Instant::now();
+    let flags = &arguments.shape;
+    let mesh = Mesh::new(control.points, input.mesh.faces.clone());
+    let request = Request {
+        levels: flags.subdivide.into(),
+        limit: flags.limit,
+        normals: flags.write_normals,
+        constraints: wishes.constraints(),
+        rotation: Rotation {
+            threshold: flags.normal_threshold.to_radians(),
+            tolerance: flags.normal_tolerance.to_radians(),
+            levels: flags.normal_levels.into(),
+        },
+    };
+    let points = &input.mesh.positions;
+    let surface = surface(mesh, &input.topology, input.scheme, points, &request)?;
+    let mut seconds = control.seconds;
+    seconds.subdivide = start.elapsed().as_secs_f64();
+    Ok(Finished {
+        method: control.method,
+        surface,
+        iterations: control.iterations,
+        status: control.status,
+        errors: control.errors,
+        tolerance: control.tolerance,
+        seconds,
+    })
+}
+
+/// The unified √3 surface. Its errors are the distances of the vertices with α = 1, which stay: 0.
+fn unified(arguments: &Arguments, input: &Input, alpha: &[f64]) -> Result<Finished> {
+    let flags = &arguments.shape;
+    if flags.limit || flags.write_normals {
+        return Err(Error::Computation(
+            "the limit points and normals of the unified √3 scheme have no mask here: refine further with --subdivide \
+             instead of --limit and --write-normals"
+                .into(),
+        ));
+    }
+    if flags.subdivide == 0 {
+        return Err(Error::Computation(
+            "the unified √3 scheme leaves the control mesh as it is: ask for the surface with --subdivide".into(),
+        ));
+    }
+    let start = Instant::now();
+    let (mesh, _) = lin_luo::surface::refine_n(&input.mesh, alpha, flags.subdivide.into())?;
+    Ok(Finished {
+        method: "lin-luo",
+        surface: Surface::plain(mesh),
+        iterations: 0,
+        status: "converged",
+        errors: Errors { max: 0.0, mean: 0.0 },
+        tolerance: 0.0,
+        seconds: Seconds {
+            assemble: input.check_seconds,
+            subdivide: start.elapsed().as_secs_f64(),
+            ..Seconds::default()
+        },
+    })
+}
+
+/// Nothing that is no number reaches a file.
+fn require_finite(input: &Input, surface: &Surface) -> Result<()> {
+    let normals = surface.normals.iter().flatten();
+    match surface.mesh.positions.iter().chain(normals).position(|p| !p.is_finite()) {
+        None => Ok(()),
+        Some(v) => Err(Error::mesh(
+            &input.name,
+            format!(
+                "vertex {} of the result is not finite: the points are too large for doubles; scale the mesh down",
+                v % surface.mesh.len()
+            ),
+        )),
+    }
+}
+
+fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished) -> Result<()> {
+    let Finished { surface, errors, seconds, .. } = result;
+    let common = &arguments.common;
+    if !surface.not_flattened.is_empty() {
+        common.remark(format_args!(
+            "{}: the faces of {} vertices have no average normal and were moved, not flattened (first: vertex {})",
+            input.name,
+            surface.not_flattened.len(),
+            surface.not_flattened[0]
+        ));
+    }
+    let without = surface.normals.iter().flatten().filter(|n| **n == DVec3::ZERO).count();
+    if without > 0 {
+        common.remark(format_args!(
+            "{}: the surface has no normal at {without} vertices; (0, 0, 0) is written",
+            input.name
+        ));
+    }
+    common.remark(format_args!(
+        "{}: {} by {}, {} iterations, max error {:.3e}, mean {:.3e} (mesh units)",
         arguments.output.display(),
         input.scheme,
-        report.iterations,
-        last.max,
-        last.mean
+        result.method,
+        result.iterations,
+        errors.max,
+        errors.mean
     ));
-    arguments.common.remark(format_args!(
-        "seconds: read {:.3}, assemble {assemble_seconds:.3}, solve {solve_seconds:.3}, write {write_seconds:.3}",
-        input.read_seconds
+    common.remark(format_args!(
+        "seconds: read {:.3}, assemble {:.3}, solve {:.3}, subdivide {:.3}, write {:.3}",
+        input.read_seconds, seconds.assemble, seconds.solve, seconds.subdivide, seconds.write
     ));
-    if arguments.json {
-        let object = input.json(json!({
-            "method": method.name(),
-            "iterations": report.iterations,
-            "status": report.outcome.name(),
-            "max_error": number(last.max),
-            "mean_error": number(last.mean),
-            "tolerance": number(stop.tolerance),
-            "output": arguments.output.display().to_string(),
-            "seconds": {
-                "read": number(input.read_seconds),
-                "assemble": number(assemble_seconds),
-                "solve": number(solve_seconds),
-                "write": number(write_seconds),
-            },
-        }));
-        cli::print(&format!("{object:#}"))?;
+    if !arguments.json {
+        return Ok(());
     }
-    Ok(())
+    let marked = |marks: &Vec<bool>| marks.iter().filter(|&&m| m).count();
+    let given = |normals: &Vec<Option<DVec3>>| normals.iter().flatten().count();
+    let object = input.json(json!({
+        "method": result.method,
+        "iterations": result.iterations,
+        "status": result.status,
+        "max_error": number(errors.max),
+        "mean_error": number(errors.mean),
+        "tolerance": number(result.tolerance),
+        "output": arguments.output.display().to_string(),
+        "interpolated": wishes.interpolated.as_ref().map_or(input.mesh.len(), marked),
+        "subdivide": arguments.shape.subdivide,
+        "limit": arguments.shape.limit,
+        "surface": {
+            "vertices": surface.mesh.len(),
+            "faces": surface.mesh.faces.len(),
+        },
+        "normals": wishes.normals.as_ref().map_or(Value::Null, |n| json!({
+            "given": given(n),
+            "set": surface.normals_set,
+        })),
+        "seconds": {
+            "read": number(input.read_seconds),
+            "assemble": number(seconds.assemble),
+            "solve": number(seconds.solve),
+            "subdivide": number(seconds.subdivide),
+            "write": number(seconds.write),
+        },
+    }));
+    cli::print(&format!("{object:#}"))
 }
 
 /// A run that did not converge gives no control mesh.

@@ -20,3 +20,8 @@ pub mod solvers;
 pub mod subdivide;
 
 pub use error::{Error, Result};
+
+/// The README's example runs as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

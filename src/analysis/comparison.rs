@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::predict::predicted_rate;
 use super::rate::observed_rate;
-use super::spectrum::{Spectrum, spectrum};
+use super::spectrum::Spectrum;
 use super::sweep::rounding_floor;
 use crate::assemble::LimitSystem;
 use crate::error::Result;
@@ -15,6 +15,8 @@ use crate::solvers::{Method, Setup, Solution, Stop, run};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry<'a> {
     pub method: Method,
+    /// Which of the method's lines it is, without numbers.
+    pub variant: &'static str,
     pub parameter: String,
     pub setup: Setup<'a>,
 }
@@ -23,6 +25,7 @@ pub struct Entry<'a> {
 #[derive(Clone, Debug)]
 pub struct Row {
     pub method: Method,
+    pub variant: &'static str,
     pub parameter: String,
     pub solution: Solution,
     /// Factor per iteration fitted to the history's tail; `None` for direct methods and short histories.
@@ -36,9 +39,11 @@ pub struct Row {
 pub const SOR_OMEGA: f64 = 1.1;
 /// ω of `ssor` and of the preconditioner `pcg-ssor`, where the symmetric sweep is little sensitive to it.
 pub const SSOR_OMEGA: f64 = 1.0;
-/// Chebyshev intervals start at this at the lowest: below, the matrix is near singular, and the modes beneath are
-/// left out.
-const LOWEST: f64 = 1e-6;
+/// An estimated λ_min below this is taken for 0: the matrix is singular for all that iterations can tell.
+const VANISHING: f64 = 1e-9;
+/// Where a Chebyshev interval starts if λ_min vanishes: modes beneath are left nearly as they are, which is right
+/// where the data do not excite them. Tuned on singular meshes: lower costs iterations, higher leaves out modes.
+const LOWEST: f64 = 1e-3;
 /// The part of an estimated λ_min that a Chebyshev interval starts from: Ritz values lie above the eigenvalue.
 const SAFETY: f64 = 0.98;
 
@@ -86,8 +91,13 @@ pub fn standard_setup<'a>(
 }
 
 fn estimated_chebyshev(spectrum: &Spectrum) -> Setup<'static> {
+    let lowest = if spectrum.a.min < VANISHING {
+        LOWEST
+    } else {
+        SAFETY * spectrum.a.min
+    };
     Setup::Chebyshev {
-        spectrum: ((SAFETY * spectrum.a.min).max(LOWEST), 1.0),
+        spectrum: (lowest, 1.0),
     }
 }
 
@@ -113,64 +123,63 @@ pub fn entries<'a>(
     order: Option<&'a [u32]>,
     order_name: &str,
 ) -> Result<Vec<Entry<'a>>> {
+    let proven = system.bounds.lambda_min > 0.0;
+    let entry = |method, variant, setup| Entry {
+        method,
+        variant,
+        parameter: parameter(variant, setup, order_name),
+        setup,
+    };
     let mut lines = Vec::new();
     for &method in methods {
-        let setup = standard_setup(system, method, order, &|| Ok(*spectrum))?;
-        let in_order = format!("{order_name} order");
-        let parameter = match (method, setup) {
-            (Method::Lu | Method::Cholesky | Method::Ldlt, _) => "faer".into(),
-            (Method::GaussSeidel, _) => in_order,
-            (Method::Jacobi | Method::WPia, Setup::Jacobi { omega } | Setup::Pia { omega }) => {
-                format!("ω={} (optimal)", short(omega))
-            }
-            (_, Setup::Sor { omega, .. } | Setup::Ssor { omega, .. }) => {
-                format!("ω={}, {in_order}", short(omega))
-            }
-            (_, Setup::Jacobi { omega } | Setup::Pia { omega } | Setup::PcgSsor { omega }) => {
-                format!("ω={}", short(omega))
-            }
-            (_, Setup::Chebyshev { spectrum }) => {
-                let proven = system.bounds.lambda_min > 0.0;
-                interval(spectrum, if proven { "proven" } else { "estimated" })
-            }
-            (_, Setup::Cg) => "preconditioned by H".into(),
-            (_, Setup::PcgJacobi) => "diag(M)".into(),
-            (_, Setup::PcgIc0) => "no fill".into(),
-            (
-                _,
-                Setup::PlainCg | Setup::Lu | Setup::Cholesky | Setup::SecondCholesky | Setup::Ldlt,
-            ) => String::new(),
+        let variant = match method {
+            Method::Lu | Method::Cholesky | Method::Ldlt => "faer",
+            Method::Jacobi | Method::WPia => "optimal",
+            Method::Chebyshev if proven => "proven",
+            Method::Chebyshev => "estimated",
+            Method::Cg => "preconditioned by H",
+            Method::PcgJacobi => "diag(M)",
+            Method::PcgIc0 => "no fill",
+            _ => "",
         };
-        lines.push(Entry {
-            method,
-            parameter,
-            setup,
-        });
+        let setup = standard_setup(system, method, order, &|| Ok(*spectrum))?;
+        lines.push(entry(method, variant, setup));
     }
     for &method in methods {
-        let (parameter, setup) = match method {
-            Method::Cholesky => ("nalgebra-sparse".into(), Setup::SecondCholesky),
-            Method::Cg => ("on M itself".into(), Setup::PlainCg),
-            Method::Chebyshev if system.bounds.lambda_min > 0.0 => {
-                let setup = estimated_chebyshev(spectrum);
-                let Setup::Chebyshev { spectrum } = setup else {
-                    continue;
-                };
-                (interval(spectrum, "estimated"), setup)
+        match method {
+            Method::Cholesky => {
+                lines.push(entry(method, "nalgebra-sparse", Setup::SecondCholesky));
             }
-            _ => continue,
-        };
-        lines.push(Entry {
-            method,
-            parameter,
-            setup,
-        });
+            Method::Cg => lines.push(entry(method, "on M itself", Setup::PlainCg)),
+            Method::Chebyshev if proven => {
+                lines.push(entry(method, "estimated", estimated_chebyshev(spectrum)));
+            }
+            _ => {}
+        }
     }
     Ok(lines)
 }
 
-fn interval((min, max): (f64, f64), how: &str) -> String {
-    format!("λ ∈ [{}, {}] ({how})", short(min), short(max))
+/// The numbers of a set-up, the order it sweeps in, and its variant, in words.
+fn parameter(variant: &str, setup: Setup, order_name: &str) -> String {
+    let order = format!("{order_name} order");
+    let mut words = match setup {
+        Setup::Jacobi { omega } | Setup::Pia { omega } | Setup::PcgSsor { omega } => {
+            vec![format!("ω={}", short(omega))]
+        }
+        Setup::Sor { omega: 1.0, .. } => vec![order],
+        Setup::Sor { omega, .. } | Setup::Ssor { omega, .. } => {
+            vec![format!("ω={}", short(omega)), order]
+        }
+        Setup::Chebyshev {
+            spectrum: (min, max),
+        } => vec![format!("λ ∈ [{}, {}]", short(min), short(max))],
+        _ => Vec::new(),
+    };
+    if !variant.is_empty() {
+        words.push(variant.into());
+    }
+    words.join(", ")
 }
 
 /// Four significant digits without trailing zeros.
@@ -215,6 +224,7 @@ pub fn compare(
             done();
             Ok(Row {
                 method: entry.method,
+                variant: entry.variant,
                 parameter: entry.parameter.clone(),
                 solution,
                 observed_rate,
@@ -222,31 +232,4 @@ pub fn compare(
             })
         })
         .collect()
-}
-
-/// [`spectrum`], [`entries`] and [`compare`] in one.
-///
-/// # Errors
-/// As these.
-///
-/// # Panics
-/// As [`compare`].
-pub fn compare_methods(
-    system: &LimitSystem,
-    points: &[DVec3],
-    methods: &[Method],
-    stop: &Stop,
-    diagonal: f64,
-) -> Result<Vec<Row>> {
-    let spectrum = spectrum(system)?;
-    let lines = entries(system, &spectrum, methods, None, "file")?;
-    compare(
-        system,
-        &spectrum,
-        points,
-        &lines,
-        stop,
-        diagonal,
-        &mut || {},
-    )
 }

@@ -7,6 +7,7 @@ pub mod lanczos;
 pub mod predict;
 pub mod rate;
 pub mod spectrum;
+pub mod splitting;
 pub mod sweep;
 
 pub use spectrum::{Extremes, Spectrum};

@@ -42,8 +42,12 @@ impl Extremes {
         self.max / self.min
     }
 
-    /// The factor per iteration of Chebyshev iteration and conjugate gradients: (√κ − 1)/(√κ + 1).
+    /// The factor per iteration of Chebyshev iteration and conjugate gradients: (√κ − 1)/(√κ + 1); 1 for a
+    /// singular matrix, whose smallest eigenvalue rounding may make negative.
     pub fn krylov_rate(self) -> f64 {
+        if self.min <= 0.0 {
+            return 1.0;
+        }
         let root = self.condition().sqrt();
         (root - 1.0) / (root + 1.0)
     }

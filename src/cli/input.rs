@@ -55,6 +55,12 @@ pub const STAND_IN_NOISE: Noise = Noise {
 /// Endings that mark a MESH argument as a file.
 const ENDINGS: [&str; 3] = ["obj", "off", "ply"];
 
+/// Whether a name ends as mesh files do.
+pub(super) fn has_mesh_ending(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|e| ENDINGS.iter().any(|known| e.eq_ignore_ascii_case(known)))
+}
+
 impl MeshFlags {
     /// Gives built-in meshes that stand in for real ones their noise, unless the user chose another.
     pub fn default_noise(&mut self) {
@@ -67,10 +73,7 @@ impl MeshFlags {
     /// As the readers; an unknown name lists the built-in ones.
     pub fn load(&self, name: &str) -> Result<Loaded> {
         let path = Path::new(name);
-        let ending = path
-            .extension()
-            .is_some_and(|e| ENDINGS.iter().any(|known| e.eq_ignore_ascii_case(known)));
-        if ending || path.exists() {
+        if has_mesh_ending(path) || path.exists() {
             return io::read(path);
         }
         Ok(Loaded {
@@ -146,10 +149,7 @@ impl Input {
     /// A stem for file names: the program's `prefix`, the mesh's own name without folder and ending, the scheme.
     pub fn stem(&self, prefix: &str) -> String {
         let path = Path::new(&self.name);
-        let name = if ENDINGS
-            .iter()
-            .any(|e| path.extension().is_some_and(|x| x.eq_ignore_ascii_case(e)))
-        {
+        let name = if has_mesh_ending(path) {
             path.file_stem()
         } else {
             path.file_name()

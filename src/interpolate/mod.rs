@@ -1,1 +1,23 @@
-//! (room)
+//! The papers' whole methods: from given points, normals and handles to a surface.
+//!
+//! | file | method |
+//! |---|---|
+//! | [`pia`] | progressive iterative interpolation as its authors ran it |
+//! | [`thall`] | Thall's iteration by local masks, his error metrics and attributes |
+//! | [`normals`] | given normals: Thall's rotation of 1-rings, for every primal scheme |
+//! | [`zheng_cai`] | Zheng & Cai's two phases: exact centroids, normals, shape handles |
+//! | [`nasri`] | Nasri's method, beside it |
+//! | [`lin_luo`] | Lin & Luo's unified schemes for curves and √3 surfaces |
+//! | [`surface`] | from a control mesh to the surface: levels, limit points, normals |
+//! | [`subset`] | some vertices only, for every scheme and solver |
+//!
+//! This room builds on meshes, subdivision, assembly, solvers and analysis, and knows no plotting.
+
+pub mod lin_luo;
+pub mod nasri;
+pub mod normals;
+pub mod pia;
+pub mod subset;
+pub mod surface;
+pub mod thall;
+pub mod zheng_cai;

@@ -28,7 +28,8 @@ pub(super) fn remarks(mesh: &Mesh) -> Vec<String> {
     }
     let flat = zero_area_faces(mesh);
     if let Some(&f) = flat.first() {
-        remarks.push(format!("{} (first: face {f})", flat.len()));
+        let faces = counted(flat.len(), "zero-area face");
+        remarks.push(format!("{faces} (first: face {f})"));
     }
     remarks
 }

@@ -376,3 +376,204 @@ impl<'a> Search<'a> {
         start
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::builtin;
+    use crate::mesh::generate::{permute_vertices, random_polygons, union};
+
+    const ALL: [Order; 7] = [
+        Order::File,
+        Order::Reverse,
+        Order::Bfs,
+        Order::Rcm,
+        Order::Morton,
+        Order::Valence,
+        Order::Random(8),
+    ];
+
+    fn ordered(order: Order, mesh: &Mesh) -> Vec<u32> {
+        order.order(mesh, &Incidence::new(&mesh.faces, mesh.len()))
+    }
+
+    fn shuffled(mesh: &Mesh) -> Mesh {
+        permute_vertices(mesh, &ordered(Order::Random(3), mesh))
+    }
+
+    #[test]
+    fn every_order_is_a_permutation_and_always_the_same() {
+        for seed in 0..60 {
+            let mut mesh = random_polygons(seed);
+            // Isolated vertices too.
+            mesh.positions.push(DVec3::ONE);
+            mesh.positions.insert(0, DVec3::ZERO);
+            for order in ALL {
+                let o = ordered(order, &mesh);
+                let places = inverse(&o);
+                assert_eq!(o.len(), mesh.len());
+                assert!((0..o.len()).all(|k| places[o[k] as usize] == k as u32));
+                assert_eq!(o, ordered(order, &mesh));
+            }
+        }
+        let empty = Mesh::new(Vec::new(), Faces::default());
+        for order in ALL {
+            assert!(ordered(order, &empty).is_empty());
+        }
+    }
+
+    #[test]
+    fn names_are_read_as_they_are_written() {
+        for order in ALL {
+            assert_eq!(order.to_string().parse::<Order>().unwrap(), order);
+        }
+        assert_eq!("random".parse::<Order>().unwrap(), Order::Random(1));
+        for bad in ["", "RCM", "random:", "random:x", "random:1:2", "bfs:3"] {
+            assert!(bad.parse::<Order>().is_err(), "{bad}");
+        }
+    }
+
+    /// Levels of the vertices by distance from the first in its component, by brute force over face sharing.
+    fn levels(mesh: &Mesh, start: u32) -> Vec<Option<u32>> {
+        let mut level = vec![None; mesh.len()];
+        level[start as usize] = Some(0);
+        for distance in 0.. {
+            let mut grown = false;
+            for face in mesh.faces.iter() {
+                if face.iter().any(|&v| level[v as usize] == Some(distance)) {
+                    for &v in face {
+                        if level[v as usize].is_none() {
+                            level[v as usize] = Some(distance + 1);
+                            grown = true;
+                        }
+                    }
+                }
+            }
+            if !grown {
+                break;
+            }
+        }
+        level
+    }
+
+    #[test]
+    fn breadth_first_orders_go_level_by_level() {
+        for seed in 0..20 {
+            let mesh = random_polygons(seed);
+            for order in [Order::Bfs, Order::Rcm] {
+                let mut o = ordered(order, &mesh);
+                if order == Order::Rcm {
+                    o.reverse();
+                }
+                let mut rest = &o[..];
+                while let Some(&start) = rest.first() {
+                    let level = levels(&mesh, start);
+                    let size = level.iter().flatten().count();
+                    // The component comes in one piece, nearer vertices first.
+                    let (component, others) = rest.split_at(size);
+                    let found: Vec<_> = component
+                        .iter()
+                        .map(|&v| level[v as usize].unwrap())
+                        .collect();
+                    assert!(found.is_sorted(), "{order}");
+                    rest = others;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn locality_is_that_of_the_grid() {
+        // Row by row on an n × m torus: the greatest step leads from the first row to the last, diagonally.
+        let (n, m) = (9, 7);
+        let mesh = builtin::torus(n, m);
+        let file = locality(&mesh.faces, &ordered(Order::File, &mesh));
+        assert_eq!(file.bandwidth as usize, n * m - 1);
+        // Along the rows m − 1 steps of 1 and one of m − 1; across n − 1 of m and one of (n − 1) m.
+        let along = 2.0 * (m - 1) as f64 / m as f64;
+        let across = 2.0 * ((n - 1) * m) as f64 / n as f64;
+        assert!((file.mean_distance - (along + across) / 2.0).abs() < 1e-12);
+        let reverse = locality(&mesh.faces, &ordered(Order::Reverse, &mesh));
+        assert_eq!(reverse, file);
+        let empty = locality(&Faces::default(), &[0, 1]);
+        assert_eq!((empty.bandwidth, empty.mean_distance), (0, 0.0));
+    }
+
+    #[test]
+    fn reverse_cuthill_mckee_is_as_narrow_as_the_one_of_sprs() {
+        for (mesh, name) in [
+            (builtin::torus(60, 9), "torus"),
+            (builtin::tri_torus(40, 12), "triangle torus"),
+            (builtin::irregular_tri(2000, 1), "irregular triangles"),
+            (builtin::irregular_poly(2000, 1), "irregular polygons"),
+            (builtin::irregular_quad(2000, 1), "irregular quads"),
+            (builtin::quad_sphere(4), "quad sphere"),
+            (
+                union(&[builtin::icosphere(2), builtin::torus(12, 5)]),
+                "two components",
+            ),
+        ] {
+            let mesh = shuffled(&mesh);
+            let mut pattern = sprs::TriMat::new((mesh.len(), mesh.len()));
+            for face in mesh.faces.iter() {
+                for &v in face {
+                    for &w in face {
+                        pattern.add_triplet(v as usize, w as usize, 1.0);
+                    }
+                }
+            }
+            let matrix: sprs::CsMat<f64> = pattern.to_csr();
+            let theirs = sprs::linalg::ordering::reverse_cuthill_mckee(matrix.view());
+            let theirs: Vec<u32> = theirs.perm.vec().iter().map(|&v| v as u32).collect();
+            let theirs = locality(&mesh.faces, &theirs).bandwidth;
+            let ours = locality(&mesh.faces, &ordered(Order::Rcm, &mesh)).bandwidth;
+            let shuffled = locality(&mesh.faces, &ordered(Order::File, &mesh)).bandwidth;
+            assert!(
+                f64::from(ours) <= 1.1 * f64::from(theirs),
+                "{name}: {ours}, sprs {theirs}"
+            );
+            assert!(4 * ours < shuffled, "{name}: {ours}, shuffled {shuffled}");
+        }
+    }
+
+    #[test]
+    fn reverse_cuthill_mckee_finds_the_band_of_a_long_tube() {
+        // From a vertex of the n × m torus, n ≫ m, each level after the first few has two rows of m vertices,
+        // and neighbours are at most two levels' fill apart: bandwidth below 4m + O(1), above 2m.
+        let (n, m) = (200, 6);
+        let mesh = shuffled(&builtin::torus(n, m));
+        let band = locality(&mesh.faces, &ordered(Order::Rcm, &mesh)).bandwidth as usize;
+        assert!((2 * m..=4 * m + 2).contains(&band), "{band}");
+    }
+
+    #[test]
+    fn morton_interleaves_the_bits() {
+        for x in [0, 1, 2, 0x15_5555, 0x1f_ffff, 0x12_3456] {
+            let plain: u64 = (0..21).map(|bit| (x >> bit & 1) << (3 * bit)).sum();
+            assert_eq!(spread(x), plain);
+        }
+        // The corners of a cube, by their signs as bits: z is the highest.
+        assert_eq!(
+            ordered(Order::Morton, &builtin::cube()),
+            [0, 1, 2, 3, 4, 5, 6, 7]
+        );
+        // Far better than chance, as it should be.
+        let mesh = shuffled(&builtin::quad_sphere(5));
+        let [random, morton] = [Order::File, Order::Morton]
+            .map(|o| locality(&mesh.faces, &ordered(o, &mesh)).mean_distance);
+        assert!(morton < random / 10.0);
+        // All in one point, and one that is not finite.
+        let flat = Mesh::new(vec![DVec3::ONE, DVec3::NAN, DVec3::ONE], Faces::default());
+        assert_eq!(ordered(Order::Morton, &flat), [0, 1, 2]);
+    }
+
+    #[test]
+    fn valence_ascends_and_ties_keep_the_order_of_the_file() {
+        let mesh = builtin::star(9);
+        let o = ordered(Order::Valence, &mesh);
+        let four: Vec<u32> = (0..9).collect();
+        assert_eq!(o[..9], four);
+        assert_eq!(o[mesh.len() - 2..], [9, 10]);
+        assert!(o[9..mesh.len() - 2].is_sorted());
+    }
+}

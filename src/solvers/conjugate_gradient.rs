@@ -49,16 +49,18 @@ pub struct ConjugateGradient<'a, S> {
     direction: Vec<DVec3>,
     /// A·direction, then the preconditioned residual.
     work: Vec<DVec3>,
-    /// ⟨H⁻¹e, z⟩ of the last direction update; `None` asks for a fresh start.
+    /// ⟨H⁻¹e, z⟩ of the last direction update; `None` asks for a fresh start of the directions.
     rho: Option<f64>,
     recursive: Option<Errors>,
-    trusted: f64,
+    /// An estimate of how far rounding has taken the recurrence from the true residual since the last product:
+    /// each update of V by d leaves a few ε‖d‖₂, as ‖A‖_∞ = 1. Large where V grows: on singular systems.
+    drift: f64,
     rows: Rows,
 }
 
-/// Beyond this loss against the last true residual, the recurrence is checked by a product: rounding makes the
-/// two drift apart by about ε times the largest residual seen. Derived: 10⁻¹⁰ leaves six digits.
-const DRIFT: f64 = 1e-10;
+/// The recurrence is replaced by a product where its estimated drift from the true residual exceeds this part of the
+/// error: then the first digit of the error still holds.
+const DRIFT: f64 = 0.1;
 
 impl<'a, S: System> ConjugateGradient<'a, S> {
     /// Starts from V = P.
@@ -74,13 +76,14 @@ impl<'a, S: System> ConjugateGradient<'a, S> {
             work: vec![DVec3::ZERO; n],
             rho: None,
             recursive: None,
-            trusted: f64::INFINITY,
+            drift: 0.0,
             rows: Rows::new(n),
         }
     }
 
-    /// Evaluates e = P − A V by a product.
+    /// Evaluates e = P − A V by a product; the recurrence goes on from there.
     fn evaluate(&mut self) -> Errors {
+        self.drift = 0.0;
         let totals = self.rows.residual(
             self.system,
             self.points,
@@ -95,14 +98,18 @@ impl<'a, S: System> ConjugateGradient<'a, S> {
 impl<S: System> Iterate for ConjugateGradient<'_, S> {
     fn errors(&mut self) -> Errors {
         match self.recursive {
-            Some(errors) if errors.max > DRIFT * self.trusted => errors,
-            _ => {
-                let errors = self.evaluate();
-                self.trusted = errors.max;
-                self.rho = None;
-                errors
-            }
+            Some(errors) if self.drift <= DRIFT * errors.max => errors,
+            _ => self.evaluate(),
         }
+    }
+
+    /// By a product. If the recurrence had lost touch, the search directions start afresh.
+    fn confirm(&mut self, errors: Errors) -> Errors {
+        let truth = self.evaluate();
+        if (truth.max - errors.max).abs() > 0.1 * errors.max {
+            self.rho = None;
+        }
+        truth
     }
 
     fn advance(&mut self) -> Result<(), Failure> {
@@ -168,12 +175,15 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
         let totals = self
             .rows
             .pass(&mut self.current, &mut self.residual, |i, v, e, tally| {
-                *v += alpha * direction[i];
+                let d = alpha * direction[i];
+                *v += d;
                 *e -= alpha * work[i];
                 tally.error(*e);
+                tally.dot(d.length_squared());
             });
         self.rho = Some(rho);
         self.recursive = Some(totals.errors);
+        self.drift += 4.0 * f64::EPSILON * totals.dot.sqrt();
         Ok(())
     }
 

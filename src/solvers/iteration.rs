@@ -102,9 +102,15 @@ pub struct Failure {
 
 /// One method at work on one system: it knows the errors of its current iterate and can replace it by the next.
 pub trait Iterate {
-    /// The errors of the current iterate, by the true residual. Called once an iterate, before
+    /// The errors of the current iterate. Called once an iterate, before
     /// [`advance`](Self::advance), so that a method may prepare the update in the same pass.
     fn errors(&mut self) -> Errors;
+
+    /// Checks `errors`, what [`errors`](Self::errors) said of the current iterate, before a decision rests on them.
+    /// Only a method that gets them by a recurrence has anything to do: evaluate them by a product.
+    fn confirm(&mut self, errors: Errors) -> Errors {
+        errors
+    }
 
     /// Replaces the current iterate by the next one.
     ///
@@ -140,8 +146,11 @@ pub fn solve(
     let mut history: Vec<Errors> = Vec::new();
     let mut rules = Rules::default();
     loop {
-        let errors = method.errors();
+        let mut errors = method.errors();
         let iteration = history.len();
+        if errors.max <= stop.tolerance || iteration >= stop.max_iterations {
+            errors = method.confirm(errors);
+        }
         history.push(errors);
         let step = Step {
             iteration,

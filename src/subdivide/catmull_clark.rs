@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::star::{
-    Circle, Tangents, centroid, edge_numbers, for_each_star, require_closed, require_room, sides,
+    Circle, Tangents, centroid, edge_numbers, for_each_star, require_closed, require_room, sides, twin,
 };
 use crate::Result;
 use crate::mesh::topology::{next_in, prev_in};
@@ -30,38 +30,83 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_room(mesh, 4)?;
     let old = &mesh.positions;
     let (vertices, edges, faces) = (mesh.len(), topology.edges(), mesh.faces.len());
-    let corners = mesh.faces.corners().len();
     let edge = edge_numbers(mesh, topology);
     let mut positions = vec![DVec3::ZERO; vertices + edges + faces];
     let (vertex_points, others) = positions.split_at_mut(vertices);
     let (edge_points, face_points) = others.split_at_mut(edges);
-    let mut quads = Vec::with_capacity(4 * corners);
     for (f, face) in mesh.faces.iter().enumerate() {
-        let range = mesh.faces.range(f);
         let center = centroid(old, face);
         face_points[f] = center;
-        let face_vertex = (vertices + edges + f) as u32;
-        let mut entering = edge[range.end - 1];
-        for (&leaving, (v, w)) in edge[range].iter().zip(sides(face)) {
+        for (&leaving, (v, w)) in edge[mesh.faces.range(f)].iter().zip(sides(face)) {
             // Each half-edge brings its own quarter share of the edge point, and one neighbour and one face
             // to the vertex that it leaves.
             edge_points[leaving as usize] += 0.25 * (old[v] + center);
             vertex_points[v] += old[w] + center;
-            quads.extend([
-                v as u32,
-                vertices as u32 + leaving,
-                face_vertex,
-                vertices as u32 + entering,
-            ]);
-            entering = leaving;
         }
     }
     for (v, point) in vertex_points.iter_mut().enumerate() {
         let n = topology.incidence.face_count(v) as f64;
         *point = (n - 2.0) / n * old[v] + *point / (n * n);
     }
-    let offsets = (0..=corners as u32).map(|f| 4 * f).collect();
-    Ok(Mesh::new(positions, Faces::from_parts(offsets, quads)))
+    Ok(Mesh::new(positions, split(mesh, topology, &edge)))
+}
+
+/// One step by Thall's in-place rule (Eq. 20 and 22): first the points of faces and edges, then each old vertex
+/// from its new neighbours alone, ((n²−3n) v + Σ_j (4 e'_j − f'_j))/n², written over its old place. The result is
+/// that of [`refine`] up to rounding, numbered alike; the only array of points is that of the result. (The
+/// middle line of the printed Eq. 22 has −(1/n²)v for −(1/n)v; its last line, used here, is right.)
+///
+/// # Errors
+/// As [`refine`].
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn refine_in_place(mut mesh: Mesh, topology: &Topology) -> Result<Mesh> {
+    require_closed(&mesh, topology)?;
+    require_room(&mesh, 4)?;
+    let edge = edge_numbers(&mesh, topology);
+    let (vertices, edges) = (mesh.len(), topology.edges());
+    let corners = mesh.faces.corners();
+    let mut points = std::mem::take(&mut mesh.positions);
+    points.resize(vertices + edges + mesh.faces.len(), DVec3::ZERO);
+    let face_point = |c: u32| vertices + edges + topology.incidence.face_of(c);
+    for (f, face) in mesh.faces.iter().enumerate() {
+        points[vertices + edges + f] = centroid(&points, face);
+    }
+    for (e, c) in topology.edge_sides().enumerate() {
+        let t = twin(topology, c);
+        let ends = points[corners[c as usize] as usize] + points[corners[t as usize] as usize];
+        points[vertices + e] = 0.25 * (ends + points[face_point(c)] + points[face_point(t)]);
+    }
+    for v in 0..vertices {
+        let star = topology.incidence.corners_at(v);
+        let n = star.len() as f64;
+        let neighbors: DVec3 = star
+            .iter()
+            .map(|&c| 4.0 * points[vertices + edge[c as usize] as usize] - points[face_point(c)])
+            .sum();
+        points[v] = ((n * n - 3.0 * n) * points[v] + neighbors) / (n * n);
+    }
+    let faces = split(&mesh, topology, &edge);
+    Ok(Mesh::new(points, faces))
+}
+
+/// The faces of the refined mesh: (vertex, edge leaving it, face, edge entering it) for each old corner.
+fn split(mesh: &Mesh, topology: &Topology, edge: &[u32]) -> Faces {
+    let vertices = topology.incidence.vertices() as u32;
+    let first_face = vertices + topology.edges() as u32;
+    let corners = mesh.faces.corners();
+    let mut quads = Vec::with_capacity(4 * corners.len());
+    for f in 0..mesh.faces.len() {
+        let range = mesh.faces.range(f);
+        let mut entering = edge[range.end - 1];
+        for (&v, &leaving) in corners[range.clone()].iter().zip(&edge[range]) {
+            quads.extend([v, vertices + leaving, first_face + f as u32, vertices + entering]);
+            entering = leaving;
+        }
+    }
+    let offsets = (0..=corners.len() as u32).map(|f| 4 * f).collect();
+    Faces::from_parts(offsets, quads)
 }
 
 /// The limit mask of a vertex of valence `n` among quads: the weight of the vertex, of each edge neighbour, of

@@ -40,6 +40,8 @@ pub mod unified_sqrt3;
 use std::fmt;
 use std::str::FromStr;
 
+use glam::DVec3;
+
 use crate::mesh::{Mesh, Topology};
 use crate::{Error, Result};
 
@@ -108,6 +110,51 @@ impl Refinement {
             refined = self.refine(&refined, &topology)?;
         }
         Ok(refined)
+    }
+
+    /// The limit points of all vertices; under Doo-Sabin the centroids of their type-V faces, under Butterfly
+    /// the vertices themselves.
+    ///
+    /// # Errors
+    /// As [`refine`](Self::refine).
+    ///
+    /// # Panics
+    /// If `topology` is not that of `mesh`.
+    pub fn limit_positions(self, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+        match self {
+            Refinement::CatmullClark => catmull_clark::limit_positions(mesh, topology),
+            Refinement::Loop => loop_scheme::limit_positions(mesh, topology),
+            Refinement::DooSabin => {
+                doo_sabin::limit_positions(doo_sabin::Rule::DooSabin, mesh, topology)
+            }
+            Refinement::Sqrt3 => sqrt3::limit_positions(mesh, topology),
+            Refinement::Butterfly => {
+                star::require_triangles(mesh, topology, "butterfly")?;
+                Ok(mesh.positions.clone())
+            }
+        }
+    }
+
+    /// The unit normals of the limit surface at the [`limit_positions`](Self::limit_positions); zero where
+    /// [`Tangents::normal`] is.
+    ///
+    /// # Errors
+    /// As [`refine`](Self::refine); Butterfly has no mask for them here.
+    ///
+    /// # Panics
+    /// If `topology` is not that of `mesh`.
+    pub fn limit_normals(self, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+        match self {
+            Refinement::CatmullClark => catmull_clark::limit_normals(mesh, topology),
+            Refinement::Loop => loop_scheme::limit_normals(mesh, topology),
+            Refinement::DooSabin => {
+                doo_sabin::limit_normals(doo_sabin::Rule::DooSabin, mesh, topology)
+            }
+            Refinement::Sqrt3 => sqrt3::limit_normals(mesh, topology),
+            Refinement::Butterfly => Err(Error::Unknown(
+                "butterfly has no tangent masks here: use loop, sqrt3, catmull-clark or doo-sabin".into(),
+            )),
+        }
     }
 }
 

@@ -365,3 +365,15 @@ fn names_read_back_and_unknown_ones_list_all() {
         assert!(text.contains(scheme.name()));
     }
 }
+
+/// Thall Eq. 22: the old vertices from their new neighbours alone.
+#[test]
+fn catmull_clark_in_place_is_the_usual_step() {
+    for mesh in polygon_meshes() {
+        let topology = topology(&mesh);
+        let usual = catmull_clark::refine(&mesh, &topology).unwrap();
+        let in_place = catmull_clark::refine_in_place(mesh, &topology).unwrap();
+        assert_eq!(in_place.faces, usual.faces);
+        assert!(distance(&in_place.positions, &usual.positions) < ROUNDING);
+    }
+}

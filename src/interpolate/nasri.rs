@@ -1,0 +1,37 @@
+//! Nasri's interpolation with Doo-Sabin surfaces (1987): the control mesh whose type-V faces, after one ordinary
+//! step, have the given points as centroids. What Zheng & Cai compare with. The surface is plain Doo-Sabin subdivision
+//! of the control mesh; [`FirstRefinement`](super::zheng_cai::FirstRefinement) with the ordinary rule adds exact
+//! centroids, normals and shape handles.
+
+use std::ops::ControlFlow;
+
+use super::subset::Restriction;
+use crate::Result;
+use crate::assemble::{LimitSystem, Scheme};
+use crate::mesh::{Mesh, Topology};
+use crate::solvers::{Setup, Solution, Stop, run};
+
+/// Solves Nasri's system for the control points: all vertices, or those marked in `interpolated` with V_j = I_j at
+/// the others (a principal submatrix, whose eigenvalues stay in [¼, 1], so it is soluble on every mesh).
+///
+/// # Errors
+/// A mesh that is not closed; no vertex marked.
+///
+/// # Panics
+/// If `interpolated` has not one entry a vertex, or `topology` is not that of `mesh`.
+pub fn control_points(
+    mesh: &Mesh,
+    topology: &Topology,
+    interpolated: Option<&[bool]>,
+    setup: Setup,
+    stop: &Stop,
+) -> Result<Solution> {
+    let system = LimitSystem::new(mesh, topology, Scheme::Nasri)?;
+    let points = &mesh.positions;
+    Ok(match interpolated {
+        None => run(&system, points, setup, stop),
+        Some(marks) => Restriction::new(&system, marks)?.solve(&system, points, setup, stop, &mut |_| {
+            ControlFlow::Continue(())
+        }),
+    })
+}

@@ -1,0 +1,405 @@
+//! Zheng & Cai's two-phase interpolation with Doo-Sabin surfaces (2005), and Nasri's method (1987) beside it.
+//!
+//! Phase one moves the vertices of the mesh until the type-V faces of its first refinement, W = (V + c_F)/2, have
+//! their centroids near the given points (Eq. 7). Phase two corrects the first refinement so that the centroids are
+//! exact, the faces planar, and the normals the given ones (Eq. 17). Doo-Sabin then keeps centroids and tangent
+//! planes at every level.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::normals::unit_normals;
+use super::subset::nothing;
+use crate::mesh::{Mesh, Topology};
+use crate::subdivide::Refinement;
+use crate::subdivide::doo_sabin::{Rule, refine_by};
+use crate::{Error, Result};
+
+/// How phase one updates the vertices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sweep<'a> {
+    /// In place, in the order given, or in file order.
+    GaussSeidel(Option<&'a [u32]>),
+    /// All at once.
+    Jacobi,
+}
+
+/// When phase one ends, and how it goes on until then.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhaseOne<'a> {
+    pub sweep: Sweep<'a>,
+    /// The paper's ITE_MAX.
+    pub max_iterations: usize,
+    /// The paper's EPS: the largest update of the last sweep is at most this part of the diagonal of the bounding
+    /// box of the given points.
+    pub eps: f64,
+}
+
+impl Default for PhaseOne<'_> {
+    /// The settings of §3.4 and §3.5: Gauss-Seidel in file order, five sweeps at most, 0.3 %.
+    fn default() -> Self {
+        PhaseOne {
+            sweep: Sweep::GaussSeidel(None),
+            max_iterations: 5,
+            eps: 0.003,
+        }
+    }
+}
+
+/// What is asked of single vertices; one entry a vertex in each list.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Constraints<'a> {
+    /// Which vertices are interpolated; all unless told.
+    pub interpolated: Option<&'a [bool]>,
+    /// Normals of the surface at interpolated points, of any length; n and −n are the same.
+    pub normals: Option<&'a [Option<DVec3>]>,
+    /// Shape handles s > 0: the type-V face is scaled by s about its centroid; larger is flatter. 1 where not told.
+    pub handles: Option<&'a [f64]>,
+}
+
+impl Constraints<'_> {
+    pub(super) fn is_interpolated(&self, v: usize) -> bool {
+        self.interpolated.is_none_or(|marks| marks[v])
+    }
+
+    /// Lists of the right length, at least one interpolated vertex, positive handles, normals and handles at
+    /// interpolated vertices only.
+    fn check(&self, vertices: usize) -> Result<()> {
+        let lengths = [
+            self.interpolated.map(<[_]>::len),
+            self.normals.map(<[_]>::len),
+            self.handles.map(<[_]>::len),
+        ];
+        assert!(
+            lengths.iter().flatten().all(|&n| n == vertices),
+            "one entry a vertex"
+        );
+        if !(0..vertices).any(|v| self.is_interpolated(v)) {
+            return Err(nothing());
+        }
+        let refuse = |v: usize, what: String| {
+            Err(Error::mesh("constraints", format!("vertex {v}: {what}")))
+        };
+        for v in 0..vertices {
+            let free = !self.is_interpolated(v);
+            if free && self.normals.is_some_and(|n| n[v].is_some()) {
+                return refuse(v, "a normal is given where no point is interpolated: interpolate the vertex, or leave the normal out".into());
+            }
+            let Some(s) = self.handles.map(|h| h[v]) else {
+                continue;
+            };
+            if !(s > 0.0 && s.is_finite()) {
+                return refuse(v, format!("the shape handle {s} is no positive number: 1 leaves the shape as it is"));
+            }
+            if free && s != 1.0 {
+                return refuse(v, "a shape handle is given where no point is interpolated: interpolate the vertex, or leave the handle at 1".into());
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The auxiliary mesh of phase one.
+#[derive(Clone, Debug)]
+pub struct Auxiliary {
+    pub mesh: Mesh,
+    /// The largest update of each sweep, in the units of the mesh.
+    pub updates: Vec<f64>,
+    /// Whether the last of them was within the tolerance.
+    pub passed: bool,
+}
+
+/// Phase one: sweeps of Eq. 7 from V = I, without a matrix. With S_F the sum of a face's corners, kept up to date
+/// as vertices move, an update is V += (2mI − mV − Σ_F S_F/|F|)/(m + Σ_F 1/|F|): O(1) a corner whatever the face
+/// sizes. Vertices that are not interpolated keep V = I. The system is strictly diagonally dominant, so both sweeps
+/// converge on every mesh; [`Scheme::ZhengCai`](crate::assemble::Scheme::ZhengCai) is the same system for all
+/// other solvers.
+///
+/// # Errors
+/// No vertex is interpolated.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`, `interpolated` has not one entry a vertex, or an order names a vertex that
+/// the mesh lacks.
+pub fn auxiliary(
+    mesh: &Mesh,
+    topology: &Topology,
+    interpolated: Option<&[bool]>,
+    phase: &PhaseOne,
+) -> Result<Auxiliary> {
+    let constraints = Constraints {
+        interpolated,
+        ..Constraints::default()
+    };
+    constraints.check(mesh.len())?;
+    let tolerance = phase.eps * mesh.diagonal();
+    let mut system = LocalSystem::new(mesh, topology);
+    let mut next = match phase.sweep {
+        Sweep::Jacobi => mesh.positions.clone(),
+        Sweep::GaussSeidel(_) => Vec::new(),
+    };
+    let mut updates = Vec::new();
+    let mut passed = false;
+    while updates.len() < phase.max_iterations && !passed {
+        system.sum_faces();
+        let moves = |v: &usize| constraints.is_interpolated(*v);
+        let largest = match phase.sweep {
+            Sweep::GaussSeidel(Some(order)) => {
+                system.sweep(order.iter().map(|&v| v as usize).filter(moves))
+            }
+            Sweep::GaussSeidel(None) => system.sweep((0..mesh.len()).filter(moves)),
+            Sweep::Jacobi => {
+                let fixed = &system;
+                let squared = next
+                    .par_iter_mut()
+                    .enumerate()
+                    .with_min_len(1024)
+                    .filter(|(v, _)| moves(v))
+                    .map(|(v, next)| {
+                        let update = fixed.update(v);
+                        *next = fixed.points[v] + update;
+                        update.length_squared()
+                    })
+                    .reduce(|| 0.0, f64::max);
+                system.points.copy_from_slice(&next);
+                squared.sqrt()
+            }
+        };
+        updates.push(largest);
+        passed = largest <= tolerance;
+    }
+    Ok(Auxiliary {
+        mesh: Mesh::new(system.points, mesh.faces.clone()),
+        updates,
+        passed,
+    })
+}
+
+/// Eq. 6 as sums over faces.
+struct LocalSystem<'a> {
+    mesh: &'a Mesh,
+    topology: &'a Topology,
+    points: Vec<DVec3>,
+    /// S_F: the sum of the corners of each face.
+    sums: Vec<DVec3>,
+}
+
+impl<'a> LocalSystem<'a> {
+    fn new(mesh: &'a Mesh, topology: &'a Topology) -> Self {
+        LocalSystem {
+            mesh,
+            topology,
+            points: mesh.positions.clone(),
+            sums: vec![DVec3::ZERO; mesh.faces.len()],
+        }
+    }
+
+    /// Anew in every sweep, so that rounding does not add up.
+    fn sum_faces(&mut self) {
+        let (faces, points) = (&self.mesh.faces, &self.points);
+        self.sums
+            .par_iter_mut()
+            .enumerate()
+            .with_min_len(1024)
+            .for_each(|(f, sum)| *sum = faces.face(f).iter().map(|&v| points[v as usize]).sum());
+    }
+
+    /// How far Eq. 7 moves `v`.
+    #[inline]
+    fn update(&self, v: usize) -> DVec3 {
+        let star = self.topology.incidence.corners_at(v);
+        let m = star.len() as f64;
+        let (mut means, mut weight) = (DVec3::ZERO, m);
+        for &c in star {
+            let f = self.topology.incidence.face_of(c);
+            let share = 1.0 / self.mesh.faces.range(f).len() as f64;
+            means += share * self.sums[f];
+            weight += share;
+        }
+        (2.0 * m * self.mesh.positions[v] - m * self.points[v] - means) / weight
+    }
+
+    /// Moves the vertices in turn; the length of the largest update.
+    fn sweep(&mut self, order: impl Iterator<Item = usize>) -> f64 {
+        let mut largest: f64 = 0.0;
+        for v in order {
+            let update = self.update(v);
+            self.points[v] += update;
+            for &c in self.topology.incidence.corners_at(v) {
+                self.sums[self.topology.incidence.face_of(c)] += update;
+            }
+            largest = largest.max(update.length_squared());
+        }
+        largest.sqrt()
+    }
+}
+
+/// The first refined mesh with its corrected type-V faces: a Doo-Sabin mesh whose limit surface passes through the
+/// interpolated points.
+#[derive(Clone, Debug)]
+pub struct FirstRefinement {
+    pub mesh: Mesh,
+    /// The type-V face of vertex v is face `first_vertex_face + v`.
+    pub first_vertex_face: usize,
+    /// Interpolated vertices whose type-V face has no average normal (its corners lie in a line or a point, or its
+    /// vector area vanishes): their centroid is exact, but the face was only moved, not flattened.
+    pub not_flattened: Vec<u32>,
+}
+
+impl FirstRefinement {
+    /// Refines `auxiliary` once by `rule` and corrects the type-V face of every interpolated vertex (§3.3, §4):
+    /// W_k += ((W_c − W_k)·n) n + (I − W_c), then W_k ← I + s(W_k − I). n is the given normal or the average one
+    /// of Eq. 10. Afterwards the centroid is I and the face lies in a plane perpendicular to n, so the limit surface
+    /// passes through I with the normal ±n. Of all such corrections this is the smallest (Eq. 9).
+    ///
+    /// Type-V faces share no vertices, so each is corrected on its own; time and memory are those of the
+    /// refinement.
+    ///
+    /// # Errors
+    /// A mesh that is not closed; constraints that contradict each other or make no sense; a normal in whose plane
+    /// the face would have no area. All with the vertex.
+    ///
+    /// # Panics
+    /// If `points` or a list of constraints has not one entry a vertex, or `topology` is not that of `auxiliary`.
+    pub fn new(
+        auxiliary: &Mesh,
+        topology: &Topology,
+        rule: Rule,
+        points: &[DVec3],
+        constraints: &Constraints,
+    ) -> Result<Self> {
+        assert_eq!(points.len(), auxiliary.len(), "one point a vertex");
+        constraints.check(points.len())?;
+        let normals = constraints.normals.map(unit_normals).transpose()?;
+        let mut mesh = refine_by(rule, auxiliary, topology)?;
+        let first_vertex_face = auxiliary.faces.len() + topology.edges();
+        let mut not_flattened = Vec::new();
+        let mut ring = Vec::new();
+        for (v, &point) in points.iter().enumerate() {
+            if !constraints.is_interpolated(v) {
+                continue;
+            }
+            let face = mesh.faces.face(first_vertex_face + v);
+            ring.clear();
+            ring.extend(face.iter().map(|&c| mesh.positions[c as usize]));
+            let center = ring.iter().sum::<DVec3>() / ring.len() as f64;
+            ring.iter_mut().for_each(|w| *w -= center);
+            let normal = match normals.as_ref().and_then(|n| n[v]) {
+                Some(n) => {
+                    require_area(v, &ring, n)?;
+                    Some(n)
+                }
+                None => average_normal(&ring),
+            };
+            if normal.is_none() {
+                not_flattened.push(v as u32);
+            }
+            let scale = constraints.handles.map_or(1.0, |s| s[v]);
+            for (&c, &w) in face.iter().zip(&ring) {
+                let flat = normal.map_or(w, |n| w - w.dot(n) * n);
+                mesh.positions[c as usize] = point + scale * flat;
+            }
+        }
+        Ok(FirstRefinement {
+            mesh,
+            first_vertex_face,
+            not_flattened,
+        })
+    }
+
+    /// The mesh at `level`: 1 is the first refinement itself, each further one a Doo-Sabin step. The type-V face of
+    /// a vertex keeps its number, its centroid and, if it is flat, its plane.
+    ///
+    /// # Errors
+    /// As [`Refinement::refine`].
+    ///
+    /// # Panics
+    /// If `level` is 0.
+    pub fn surface(&self, level: usize) -> Result<Mesh> {
+        assert!(level > 0, "level 1 is the first refinement");
+        // A step puts type-F faces first, in the order of the old faces: face numbers stay.
+        Refinement::DooSabin.refine_n(&self.mesh, level - 1)
+    }
+}
+
+/// What phase one and two make together.
+#[derive(Clone, Debug)]
+pub struct TwoPhase {
+    pub auxiliary: Auxiliary,
+    pub first: FirstRefinement,
+}
+
+/// The whole algorithm of §3.4 with the extensions of §4.
+///
+/// # Errors
+/// As [`FirstRefinement::new`].
+///
+/// # Panics
+/// As [`auxiliary`] and [`FirstRefinement::new`].
+///
+/// ```
+/// use limitlab::interpolate::zheng_cai::{Constraints, PhaseOne, interpolate};
+/// use limitlab::mesh::{Topology, builtin};
+///
+/// let mesh = builtin::builtin("icosahedron")?;
+/// let topology = Topology::new(&mesh.faces, mesh.len());
+/// let result = interpolate(&mesh, &topology, &Constraints::default(), &PhaseOne::default())?;
+/// // Three sweeps or thirty: the centroids of the type-V faces are the given points.
+/// let fine = result.first.surface(3)?;
+/// let face = fine.faces.face(result.first.first_vertex_face + 7);
+/// let centroid = face.iter().map(|&c| fine.positions[c as usize]).sum::<glam::DVec3>() / face.len() as f64;
+/// assert!(centroid.distance(mesh.positions[7]) < 1e-14);
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn interpolate(
+    mesh: &Mesh,
+    topology: &Topology,
+    constraints: &Constraints,
+    phase: &PhaseOne,
+) -> Result<TwoPhase> {
+    constraints.check(mesh.len())?;
+    let auxiliary = auxiliary(mesh, topology, constraints.interpolated, phase)?;
+    let first = FirstRefinement::new(
+        &auxiliary.mesh,
+        topology,
+        Rule::ZhengCai,
+        &mesh.positions,
+        constraints,
+    )?;
+    Ok(TwoPhase { auxiliary, first })
+}
+
+/// Below this part of Σ|W_k||W_{k+1}| a vector area is rounding, or so nearly that its direction is.
+const NO_AREA: f64 = 1e-12;
+
+/// Σ W_k × W_{k+1} and Σ |W_k||W_{k+1}| of a ring seen from its centroid.
+fn vector_area(ring: &[DVec3]) -> (DVec3, f64) {
+    let next = ring.iter().cycle().skip(1);
+    ring.iter()
+        .zip(next)
+        .fold((DVec3::ZERO, 0.0), |(area, scale), (w, x)| {
+            (area + w.cross(*x), scale + w.length() * x.length())
+        })
+}
+
+/// Eq. 10; `None` where there is none.
+fn average_normal(ring: &[DVec3]) -> Option<DVec3> {
+    let (area, scale) = vector_area(ring);
+    let length = area.length();
+    (length > NO_AREA * scale).then(|| area / length)
+}
+
+/// Refuses a normal whose plane sees the ring edge-on: the corrected face would collapse to a line, and the surface
+/// would have no tangent plane there.
+fn require_area(v: usize, ring: &[DVec3], normal: DVec3) -> Result<()> {
+    let (area, scale) = vector_area(ring);
+    if area.dot(normal).abs() > NO_AREA * scale {
+        return Ok(());
+    }
+    Err(Error::mesh(
+        "normals",
+        format!(
+            "vertex {v}: the given normal lies in the plane of the vertex's face, which would collapse: tilt it, or give none"
+        ),
+    ))
+}

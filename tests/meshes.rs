@@ -1,0 +1,277 @@
+//! Every mesh of `../shared/meshes` against its MANIFEST: sizes, shape, and what is wrong with it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use limitlab::mesh::Mesh;
+use limitlab::mesh::io::{self, Loaded};
+use limitlab::mesh::validate::{Boundary, DefectKind, Validation, validate};
+
+fn collection() -> Option<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
+    if root.is_dir() {
+        return Some(root);
+    }
+    // Not `eprintln!`, which the test runner swallows.
+    let mut stderr = std::io::stderr();
+    writeln!(stderr, "skipped: no {}", root.display()).unwrap();
+    None
+}
+
+/// One row of the MANIFEST.
+struct Row {
+    file: String,
+    columns: Vec<String>,
+}
+
+impl Row {
+    fn number(&self, column: usize) -> i64 {
+        self.columns[column].parse().unwrap()
+    }
+
+    /// The number that stands before `what` in the notes, as the last remark about it; 0 if none does.
+    fn noted(&self, what: &str) -> usize {
+        let notes = &self.columns[15];
+        notes.rfind(what).map_or(0, |at| {
+            let before = notes[..at].trim_end();
+            before.rsplit(' ').next().unwrap().parse().unwrap()
+        })
+    }
+}
+
+fn rows(root: &Path) -> Vec<Row> {
+    let text = fs::read_to_string(root.join("MANIFEST.tsv")).unwrap();
+    let rows = text.lines().skip(1).map(|line| {
+        let columns: Vec<String> = line.split('\t').map(str::to_owned).collect();
+        Row {
+            file: columns[0].clone(),
+            columns,
+        }
+    });
+    rows.collect()
+}
+
+fn report(loaded: &Loaded, boundary: Boundary) -> Validation {
+    let lines = loaded.lines.as_ref();
+    let lines = lines.map(|l| (&l.vertices[..], &l.faces[..]));
+    validate(&loaded.mesh, lines, boundary)
+}
+
+/// The number in front of the remark that holds `what`; 0 if there is none.
+fn remarked(report: &Validation, what: &str) -> usize {
+    let remark = report.remarks.iter().find(|r| r.contains(what));
+    remark.map_or(0, |r| r.split(' ').next().unwrap().parse().unwrap())
+}
+
+/// The readers refuse this file, as they must: it has four coordinates a vertex.
+const REFUSED: &str = "bad/hypercube_4off_16v.off";
+
+#[test]
+fn counts_and_defects_are_those_of_the_manifest() {
+    let Some(root) = collection() else { return };
+    let rows = rows(&root);
+    assert!(rows.len() > 100);
+    for row in &rows {
+        if row.file == REFUSED {
+            assert!(io::read(&root.join(&row.file)).is_err());
+            continue;
+        }
+        let file = &row.file;
+        let loaded = io::read(&root.join(file)).unwrap();
+        let report = report(&loaded, Boundary::Refuse);
+        let topology = report.topology.as_ref().unwrap();
+        let counts = report.counts.as_ref().unwrap();
+        let sizes = [
+            counts.vertices,
+            counts.edges,
+            counts.faces,
+            counts.components,
+        ];
+        assert_eq!(
+            sizes.map(|n| n as i64),
+            [2, 3, 4, 9].map(|c| row.number(c)),
+            "{file}"
+        );
+        assert_eq!(counts.euler_characteristic, row.number(10), "{file}");
+
+        let totals = report.totals();
+        let total = |kind| totals.get(&kind).copied().unwrap_or(0);
+        // The MANIFEST counts a vertex twice in a row as an edge: among those in 3+ faces if that often, and
+        // twice in a valence.
+        let loops: Vec<_> = topology
+            .irregular_edges()
+            .iter()
+            .filter(|e| e.is_loop())
+            .collect();
+        let long_loops = loops.iter().filter(|e| e.sides > 2).count();
+        let looped: BTreeSet<u32> = loops.iter().map(|e| e.vertices[0]).collect();
+        if looped.is_empty() {
+            let valences = [counts.min_valence, counts.max_valence].map(|n| n as i64);
+            assert_eq!(valences, [11, 12].map(|c| row.number(c)), "{file}");
+        }
+        // It looks at umbrellas only where no edge has more than two faces.
+        let pinched = match row.noted("edges in 3+ faces") {
+            0 => total(DefectKind::NonManifoldVertex),
+            _ => row.noted("non-manifold vertices"),
+        };
+        let found = [
+            total(DefectKind::BoundaryEdge),
+            total(DefectKind::InconsistentOrientation),
+            total(DefectKind::NonManifoldEdge) + long_loops,
+            pinched,
+            total(DefectKind::IsolatedVertex),
+            total(DefectKind::RepeatedVertex),
+            remarked(&report, "duplicate position"),
+            remarked(&report, "zero-area face"),
+        ];
+        let noted = [
+            "boundary edges",
+            "misoriented edges",
+            "edges in 3+ faces",
+            "non-manifold vertices",
+            "isolated vertices",
+            "faces with a repeated vertex",
+            "duplicate vertex positions",
+            "zero-area faces",
+        ];
+        assert_eq!(found, noted.map(|what| row.noted(what)), "{file}");
+        // The MANIFEST compares faces by vertices; by position there are more where positions are doubled.
+        let (faces, noted) = (
+            remarked(&report, "on the same positions"),
+            row.noted("duplicate faces"),
+        );
+        let more = match file.as_str() {
+            "closed/psb_m149_boy_17342v_holesfilled.off" | "bad/all_degen_7v.off" => 2,
+            _ => 0,
+        };
+        assert_eq!(faces, noted + more, "{file}");
+    }
+}
+
+/// The faces at every vertex, flooded across edges at it: an oracle that shares nothing with the validator.
+fn pinched_vertices(mesh: &Mesh) -> Vec<u32> {
+    let mut at: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (f, face) in mesh.faces.iter().enumerate() {
+        for &v in face {
+            at.entry(v).or_default().push(f);
+        }
+    }
+    let edges_at = |f: usize, v: u32| {
+        let face = mesh.faces.face(f);
+        let sides = (0..face.len()).map(|k| (face[k], face[(k + 1) % face.len()]));
+        let ends = sides.filter_map(|(a, b)| match (a == v, b == v) {
+            (true, false) => Some(b),
+            (false, true) => Some(a),
+            _ => None,
+        });
+        ends.collect::<BTreeSet<u32>>()
+    };
+    let mut pinched = Vec::new();
+    for (v, faces) in at {
+        let mut rest: BTreeSet<usize> = faces.into_iter().collect();
+        let mut queue: Vec<usize> = rest.pop_first().into_iter().collect();
+        while let Some(f) = queue.pop() {
+            let here = edges_at(f, v);
+            let joined = |g: &usize| !edges_at(*g, v).is_disjoint(&here);
+            let reached: Vec<usize> = rest.iter().copied().filter(joined).collect();
+            for g in reached {
+                rest.remove(&g);
+                queue.push(g);
+            }
+        }
+        if !rest.is_empty() {
+            pinched.push(v);
+        }
+    }
+    pinched
+}
+
+#[test]
+fn non_manifold_vertices_are_those_that_flooding_finds() {
+    let Some(root) = collection() else { return };
+    let bad = |row: &&Row| row.file.starts_with("bad/") && row.file != REFUSED;
+    for row in rows(&root).iter().filter(bad) {
+        let loaded = io::read(&root.join(&row.file)).unwrap();
+        let report = report(&loaded, Boundary::Refuse);
+        let found: Vec<u32> = (report.defects.iter())
+            .filter(|d| d.kind == DefectKind::NonManifoldVertex)
+            .filter_map(|d| d.vertex)
+            .collect();
+        assert_eq!(found, pinched_vertices(&loaded.mesh), "{}", row.file);
+    }
+}
+
+#[test]
+fn closed_meshes_are_valid_open_and_bad_ones_are_not() {
+    let Some(root) = collection() else { return };
+    for row in rows(&root).iter().filter(|row| row.file != REFUSED) {
+        let file = &row.file;
+        let loaded = io::read(&root.join(file)).unwrap();
+        let refused = report(&loaded, Boundary::Refuse);
+        let summary = refused.summary_line();
+        assert!(!summary.contains('\n'));
+        // Every line that is named is that of the vertex or face.
+        let lines = loaded.lines.as_ref().unwrap();
+        for d in &refused.defects {
+            let line = match (d.face, d.vertex) {
+                (Some(f), _) => lines.faces[f as usize],
+                (None, Some(v)) => lines.vertices[v as usize],
+                (None, None) => panic!("{file}: a defect without a place"),
+            };
+            assert_eq!(d.line, Some(line));
+        }
+        match file.split('/').next().unwrap() {
+            "closed" => assert!(refused.is_valid(), "{file}: {summary}"),
+            "open" => {
+                assert_eq!(refused.defects[0].kind, DefectKind::BoundaryEdge, "{file}");
+                assert!(summary.contains("boundary edge"), "{file}: {summary}");
+                let has_valence_two = row.number(11) < 3;
+                assert_eq!(
+                    summary.contains("valence below three"),
+                    has_valence_two,
+                    "{file}"
+                );
+                let interior = report(&loaded, Boundary::AsInterior);
+                assert!(
+                    interior
+                        .totals()
+                        .keys()
+                        .all(|&k| k == DefectKind::LowValence)
+                );
+                assert_eq!(interior.is_valid(), !has_valence_two, "{file}");
+                assert!(
+                    interior.remarks[0].contains("treated as interior"),
+                    "{file}"
+                );
+            }
+            _ => {
+                assert!(!refused.is_valid(), "{file}");
+                let error = refused.into_topology(&loaded.name).unwrap_err().to_string();
+                assert!(error.contains(file.as_str()) && error.ends_with(&summary));
+            }
+        }
+    }
+}
+
+#[test]
+fn the_papers_boy_has_six_holes() {
+    let Some(root) = collection() else { return };
+    let loaded = io::read(&root.join("open/psb_m149_boy_17342v_raw.off")).unwrap();
+    let report = report(&loaded, Boundary::AsInterior);
+    assert!(report.is_valid());
+    assert_eq!(
+        report.remarks,
+        [
+            "26 boundary edges in 6 loops: boundary vertices are treated as interior",
+            "4 duplicate positions (first: vertex 14664 lies on vertex 378)",
+        ]
+    );
+    let topology = report.topology.unwrap();
+    let mut loops: Vec<usize> = (topology.boundary_loops(&loaded.mesh.faces).iter())
+        .map(Vec::len)
+        .collect();
+    loops.sort_unstable();
+    assert_eq!(loops, [4, 4, 4, 4, 5, 5]);
+}
