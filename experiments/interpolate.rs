@@ -16,6 +16,7 @@ use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::Scheme;
 use limitlab::cli::{self, CommonFlags, Input, MeshFlags, Progress, StopFlags, constraints, number};
 use limitlab::error::Error;
+use limitlab::interpolate::automatic::control_points;
 use limitlab::interpolate::lin_luo;
 use limitlab::interpolate::normals::Rotation;
 use limitlab::interpolate::subset::Restriction;
@@ -24,7 +25,7 @@ use limitlab::interpolate::zheng_cai::{self, Constraints, PhaseOne, Sweep};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, io};
 use limitlab::solvers::system::Rows;
-use limitlab::solvers::{Errors, Method, Outcome, Solution, Step, run_watched};
+use limitlab::solvers::{Errors, Method, Outcome, Report, Step, run_watched};
 use limitlab::subdivide::doo_sabin::{Rule, limit_positions};
 
 /// Computes the control mesh V with A V = P: the vertices P of the mesh become points of the limit surface. Unless
@@ -40,8 +41,8 @@ struct Arguments {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
-    /// pcg-ssor, pcg-ic0, or two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); auto is chebyshev with
-    /// proven bounds where there are any, else cg
+    /// pcg-ssor, pcg-ic0, or two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); auto is chebyshev
+    /// in mixed precision without a stored matrix, else cg
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice)]
     method: Choice,
     /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, random or random:SEED
@@ -266,6 +267,9 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
     if arguments.method == Choice::TwoPhase {
         return two_phase(arguments, input, wishes);
     }
+    if arguments.method == Choice::Auto && wishes.interpolated.is_none() {
+        return fastest(arguments, input);
+    }
     let start = Instant::now();
     let system = input.system()?;
     let part = match &wishes.interpolated {
@@ -295,7 +299,7 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
         None => run_watched(&system, points, setup, &stop, watch),
     };
     drop(progress);
-    check(input, method, &solution, stop.tolerance)?;
+    check(input, method, &solution.report, stop.tolerance)?;
     Ok(Control {
         method: method.name(),
         points: solution.points,
@@ -307,6 +311,30 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
         seconds: Seconds {
             assemble,
             solve: start.elapsed().as_secs_f64(),
+            ..Seconds::default()
+        },
+    })
+}
+
+/// All vertices, by the library's choice of order, operator and method.
+fn fastest(arguments: &Arguments, input: &Input) -> Result<Control> {
+    let stop = arguments.stop.stop(&input.mesh);
+    let progress = Progress::open("solving", arguments.common.quiet);
+    let (mesh, topology) = (&input.mesh, &input.topology);
+    let found = control_points(mesh, Some(topology), input.scheme, &stop)
+        .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
+    drop(progress);
+    check(input, found.method, &found.report, stop.tolerance)?;
+    Ok(Control {
+        method: found.method.name(),
+        points: found.points,
+        iterations: found.report.iterations,
+        status: found.report.outcome.name(),
+        errors: found.report.last(),
+        tolerance: stop.tolerance,
+        seconds: Seconds {
+            assemble: input.check_seconds + found.curve_seconds + found.setup_seconds,
+            solve: found.solve_seconds,
             ..Seconds::default()
         },
     })
@@ -501,8 +529,7 @@ fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished
 }
 
 /// A run that did not converge gives no control mesh.
-fn check(input: &Input, method: Method, solution: &Solution, tolerance: f64) -> Result<()> {
-    let report = &solution.report;
+fn check(input: &Input, method: Method, report: &Report, tolerance: f64) -> Result<()> {
     let what = match report.outcome {
         Outcome::Converged => return Ok(()),
         Outcome::Singular => {

@@ -49,7 +49,9 @@ impl Modes {
     fn of(scheme: Scheme, size: usize) -> Option<Modes> {
         let turn = |k: usize| (std::f64::consts::TAU * k as f64 / size as f64).cos();
         let f = |k| scheme.face_weight(size, k);
-        let cosine = (f(1) - f(2)) / (turn(1) - turn(2));
+        // The two places furthest apart on the wave lose fewest digits.
+        let half = size / 2;
+        let cosine = (f(1) - f(half)) / (turn(1) - turn(half));
         let constant = f(1) - cosine * turn(1);
         let modes = Modes {
             identity: f(0) - constant - cosine,

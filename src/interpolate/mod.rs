@@ -9,10 +9,12 @@
 //! | [`nasri`] | Nasri's method, beside it |
 //! | [`lin_luo`] | Lin & Luo's unified schemes for curves and √3 surfaces |
 //! | [`surface`] | from a control mesh to the surface: levels, limit points, normals |
+//! | [`automatic`] | the control mesh by the fastest way: order, operator, mixed precision |
 //! | [`subset`] | some vertices only, for every scheme and solver |
 //!
 //! This room builds on meshes, subdivision, assembly, solvers and analysis, and knows no plotting.
 
+pub mod automatic;
 pub mod lin_luo;
 pub mod nasri;
 pub mod normals;

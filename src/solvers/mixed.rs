@@ -24,8 +24,12 @@ const PROGRESS: f64 = 0.5;
 const DOUBT: f64 = 2.0;
 /// An interval is stretched to this part of the λ_min that a weak reduction speaks for: modes beneath remain.
 const STRETCH: f64 = 0.8;
-/// Intervals do not start below.
-const LOWEST: f64 = 1e-6;
+/// Intervals do not start below: there, conjugate gradients need fewer iterations.
+const LOWEST: f64 = 1e-4;
+/// An interval starts at no less than this part of the last one's start: one weak reduction may be an accident.
+const STEP: f64 = 1.0 / 16.0;
+/// Residuals of this many times ε·max‖p‖ are rounding.
+const FLOOR: f64 = 16.0;
 
 /// Solves `A V = P` from V = P. Eigenvalues are within `[lambda_min, 1]`; 0 stands for an unknown λ_min: then the
 /// interval is corrected by what each correction was seen to gain. (Eigenvalues below the interval are no danger:
@@ -63,6 +67,8 @@ fn in_pool(
     // Residuals in units of the tolerance are far from the ends of single precision's range.
     let unit = if stop.tolerance > 0.0 { stop.tolerance } else { 1.0 };
     let mut interval = (if lambda_min > 0.0 { lambda_min } else { GUESS }, 1.0);
+    let largest = points.iter().map(|p| p.length_squared()).fold(0.0, f64::max);
+    let floor = FLOOR * f64::EPSILON * largest.sqrt();
     let mut history: Vec<Errors> = Vec::new();
     let mut iterations = 0;
     // The last correction: its number of iterations.
@@ -97,8 +103,14 @@ fn in_pool(
         }
         if let Some(before) = before {
             let gain = errors.max / before;
-            if lambda_min <= 0.0 && gain > DOUBT * reduction(interval, count) {
-                let a = (STRETCH * lowest_mode(interval, count, gain)).max(LOWEST);
+            let doubtful = lambda_min <= 0.0
+                && gain > DOUBT * reduction(interval, count)
+                && interval.0 > LOWEST
+                && errors.max > floor;
+            if doubtful {
+                let a = (STRETCH * lowest_mode(interval, count, gain))
+                    .max(STEP * interval.0)
+                    .max(LOWEST);
                 // The correction prepared above begins with the old interval's step.
                 let rescale = {
                     interval = (a.min(interval.0), 1.0);
