@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 
 use glam::{DVec3, Vec3A};
 use limitlab::assemble::{LimitSystem, Operator, Scheme};
+use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::generate::{dual, permute_vertices, random_polygons, shuffle_faces, union};
 use limitlab::mesh::order::{Order, along_curve, inverse, is_scattered};
 use limitlab::mesh::{Faces, Mesh, Topology, builtin::builtin, noise::add_noise};
@@ -13,6 +14,7 @@ use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use limitlab::solvers::gauss_seidel::Sor;
 use limitlab::solvers::iteration::{Iterate, Report};
 use limitlab::solvers::jacobi::Jacobi;
+use limitlab::solvers::local::{Editor, decay};
 use limitlab::solvers::pia::Pia;
 use limitlab::solvers::ssor::Ssor;
 use limitlab::solvers::system::{Rows, System};
@@ -426,4 +428,101 @@ fn scatter_is_recognised_and_mended() {
     }
     let wrong = Mesh::new(rough(3), Faces::from_lists([[0u32, 1, 7]]));
     assert!(along_curve(&wrong).is_none());
+}
+
+#[test]
+fn the_inverse_decays_as_on_the_infinite_grid() {
+    // T⁻¹ of T = [1 4 1]/6 has the entries √3 (−q)^|k|, q = 2 − √3, and A = T ⊗ T; largest in ring m: 3 q^m.
+    let case = both("torus:64x64", mesh("torus:64x64"), Scheme::CatmullClark);
+    let rings = decay(&case.operator, 1000, 1e-10);
+    let q = 2.0 - 3f64.sqrt();
+    assert!(rings.len() >= 17, "{rings:?}");
+    for (m, &entry) in rings.iter().enumerate() {
+        let exact = 3.0 * q.powi(m as i32);
+        assert!((entry - exact).abs() <= 2e-11, "ring {m}: {entry} against {exact}");
+    }
+}
+
+#[test]
+fn local_edits_give_what_solving_anew_gives() {
+    for case in all().filter(|c| c.explicit.bounds.lambda_min > 0.05) {
+        let points = &case.mesh.positions;
+        let n = points.len();
+        let tolerance = 1e-11 * case.mesh.diagonal();
+        let stop = Stop {
+            tolerance,
+            max_iterations: 1000,
+        };
+        let bound = case.explicit.bounds.lambda_min;
+        let (control, _) = mixed::solve(&case.operator, points, bound, &stop);
+        let mut editor = Editor::new(&case.operator, points.clone(), control);
+        let moves: Vec<(u32, DVec3)> = [0, n / 3, n - 1]
+            .map(|v| (v as u32, points[v] + DVec3::new(0.1, -0.2, 0.05)))
+            .to_vec();
+        // Twice: an edit leaves a solution to edit.
+        for moves in [&moves[..1], &moves[1..]] {
+            let edit = editor.edit(moves, tolerance, usize::MAX);
+            assert!(edit.max_error <= tolerance, "{}", case.name);
+        }
+        let errors = Rows::new(n).errors(&case.explicit, editor.points(), editor.control());
+        assert!(errors.max <= 1.01 * tolerance, "{}: {errors:?}", case.name);
+        assert_eq!(editor.points()[n - 1], points[n - 1] + DVec3::new(0.1, -0.2, 0.05));
+        let lu = run(&case.explicit, editor.points(), Setup::Lu, &stop);
+        // The residuals of both, times ‖A⁻¹‖ ≤ √κ(H)/λ_min.
+        let h = &case.explicit.h;
+        let (low, high) = h.iter().fold((f64::MAX, 0.0f64), |(l, u), &h| (l.min(h), u.max(h)));
+        let factor = (n as f64 * high / low).sqrt() / bound;
+        assert_close(&case.name, editor.control(), &lu.points, 2.0 * factor * tolerance);
+    }
+}
+
+#[test]
+fn the_work_of_an_edit_does_not_grow_with_the_mesh() {
+    let work = |name| {
+        let case = both(name, mesh(name), Scheme::Loop);
+        let points = case.mesh.positions.clone();
+        let stop = Stop {
+            tolerance: 1e-10,
+            max_iterations: 1000,
+        };
+        let (control, _) = mixed::solve(&case.operator, &points, 0.1, &stop);
+        let mut editor = Editor::new(&case.operator, points.clone(), control);
+        let edit = editor.edit(&[(20, points[20] + DVec3::X)], 1e-8, usize::MAX);
+        (edit.touched, case.mesh.len())
+    };
+    let (small, _) = work("icosphere:5");
+    let (large, n) = work("icosphere:7");
+    assert!(large <= 2 * small && 50 * large < n, "{small} and {large} of {n}");
+}
+
+#[test]
+fn auto_returns_to_file_order_and_meets_the_tolerance() {
+    // Above and below the size from which vertices are renumbered, in good and in random order.
+    for name in ["irregular-quad:3000", "irregular-quad:60000", "icosphere:6", "irregular-poly:60000"] {
+        let good = mesh(name);
+        let topology = Topology::new(&good.faces, good.len());
+        let order = Order::Random(2).order(&good, &topology.incidence);
+        let scattered = shuffle_faces(&permute_vertices(&good, &order), 4);
+        for mesh in [&good, &scattered] {
+            let scheme = Scheme::default_for(&mesh.faces);
+            let stop = Stop {
+                tolerance: 1e-10 * mesh.diagonal(),
+                max_iterations: 1000,
+            };
+            let found = control_points(mesh, None, scheme, &stop).expect("a system");
+            assert_eq!(found.report.outcome, Outcome::Converged, "{name}");
+            let case = both(name, mesh.clone(), scheme);
+            let errors = Rows::new(mesh.len()).errors(&case.explicit, &mesh.positions, &found.points);
+            assert!(errors.max <= 1.01 * stop.tolerance, "{name}: {errors:?}");
+        }
+    }
+    // Nearly singular: κ grows like k², beyond what corrections of the interval reach. Conjugate gradients finish.
+    let mut prism = mesh("prism:401");
+    add_noise(&mut prism, 0.1, 3);
+    let stop = Stop {
+        tolerance: 1e-9,
+        max_iterations: 10_000,
+    };
+    let found = control_points(&prism, None, Scheme::CatmullClark, &stop).expect("a system");
+    assert_eq!(found.report.outcome, Outcome::Converged, "{:?}", found.report);
 }

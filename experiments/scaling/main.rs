@@ -18,7 +18,7 @@ use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, Topology, builtin::builtin};
-use limitlab::report::{Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette};
+use limitlab::report::{Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette};
 use limitlab::solvers::chebyshev::Chebyshev;
 use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use limitlab::solvers::iteration::Iterate;
@@ -107,12 +107,14 @@ fn measure(arguments: &Arguments) -> Result<()> {
     );
     let mut panels = Vec::new();
     for &scheme in &arguments.scheme.0 {
-        panels.push(of_scheme(arguments, scheme, bandwidth, &mut table)?);
+        panels.extend(of_scheme(arguments, scheme, bandwidth, &mut table)?);
     }
     table.write(&arguments.out)?;
     if !panels.is_empty() {
-        let mut figure = Figure::stack(panels);
-        figure.share_x = true;
+        let rows = panels.len() as u32 / 2;
+        let mut figure = Figure::row(panels);
+        figure.columns = 2;
+        (figure.width, figure.height) = (900, 40 + 230 * rows);
         figure.render()?.save(&arguments.out.join("scaling.png"))?;
     }
     if arguments.profile >= LEAST {
@@ -186,6 +188,13 @@ impl Way {
     }
 }
 
+/// Time per vertex of one way over the sizes.
+struct Curve {
+    way: Way,
+    random: bool,
+    points: Vec<(f64, f64)>,
+}
+
 struct Outcome {
     iterations: usize,
     status: &'static str,
@@ -197,12 +206,12 @@ fn of_scheme(
     scheme: Scheme,
     bandwidth: f64,
     table: &mut Table,
-) -> Result<LinePlot> {
+) -> Result<[LinePlot; 2]> {
     let small = noisy(&family(scheme, ESTIMATE))?;
     let topology = Topology::new(&small.faces, small.len());
     let system = LimitSystem::new(&small, &topology, scheme)?;
     let estimate = 0.98 * spectrum(&system)?.a.min;
-    let mut curves: Vec<(Way, bool, Vec<(f64, f64)>)> = Vec::new();
+    let mut curves: Vec<Curve> = Vec::new();
     let mut bound = Vec::new();
     let progress = Progress::open(scheme.name(), arguments.common.quiet);
     for &n in &arguments.sizes.0 {
@@ -241,57 +250,69 @@ fn of_scheme(
                     (1e9 * seconds / mesh.len() as f64).into(),
                     memory.map(|m| m as f64 / 1e6).into(),
                 ]);
-                let at = (mesh.len() as f64, seconds);
-                match curves.iter_mut().find(|c| (c.0, c.1) == (way, random)) {
-                    Some(curve) => curve.2.push(at),
-                    None => curves.push((way, random, vec![at])),
+                let at = (mesh.len() as f64, 1e9 * seconds / mesh.len() as f64);
+                let known = curves.iter_mut().find(|c| c.way == way && c.random == random);
+                match known {
+                    Some(curve) => curve.points.push(at),
+                    None => curves.push(Curve {
+                        way,
+                        random,
+                        points: vec![at],
+                    }),
                 }
-                if way == Way::Plain && !random {
+                if way == Way::Free(Method::Chebyshev) && !random {
                     // What a fused iteration in double precision must move, as often.
                     let bytes = 4.0 * 24.0 + 37.0;
-                    let least = bytes * at.0 * outcome.iterations as f64 / bandwidth;
-                    bound.push((at.0, least));
+                    bound.push((at.0, 1e9 * bytes * outcome.iterations as f64 / bandwidth));
                 }
             }
         }
     }
     drop(progress);
-    Ok(plot(scheme, curves, bound))
+    Ok([false, true].map(|random| plot(scheme, random, &curves, &bound)))
 }
 
-fn plot(
-    scheme: Scheme,
-    curves: Vec<(Way, bool, Vec<(f64, f64)>)>,
-    bound: Vec<(f64, f64)>,
-) -> LinePlot {
+/// Time per vertex over the number of vertices, in one of the two orders. The legend stands beside the second.
+fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) -> LinePlot {
+    const GREY: Colour = Colour(120, 120, 120);
+    let look = |way: Way| match way {
+        Way::Auto => (palette(0), Marker::Circle),
+        Way::Plain => (palette(1), Marker::Square),
+        Way::Free(Method::Chebyshev) => (palette(2), Marker::Circle),
+        Way::Free(_) => (palette(3), Marker::Diamond),
+        Way::Stored(Method::Chebyshev) => (palette(4), Marker::Circle),
+        Way::Stored(Method::GaussSeidel) => (palette(5), Marker::Square),
+        Way::Stored(Method::PcgIc0) => (palette(6), Marker::Diamond),
+        Way::Stored(Method::Cholesky) => (GREY, Marker::Triangle),
+        Way::Stored(_) => (GREY, Marker::InvertedTriangle),
+    };
     let mut series: Vec<Series> = curves
-        .into_iter()
-        .map(|(way, random, points)| {
-            let colour = Way::ALL.iter().position(|w| *w == way).unwrap_or(0);
-            let name = if random {
-                String::new()
-            } else {
-                way.name()
-            };
-            Series::line(name, points)
-                .colour(palette(colour))
-                .marker(if random { Marker::Square } else { Marker::Circle })
-                .dash(if random { Dash::Dashed } else { Dash::Solid })
+        .iter()
+        .filter(|c| c.random == random)
+        .map(|c| {
+            let (colour, marker) = look(c.way);
+            let name = if random { c.way.name() } else { String::new() };
+            Series::line(name, c.points.iter().copied())
+                .colour(colour)
+                .marker(marker)
+                .dash(Dash::Solid)
         })
         .collect();
     if bound.len() > 1 {
+        let name = if random { "bandwidth bound" } else { "" };
         series.push(
-            Series::line("bandwidth bound", bound)
-                .colour(limitlab::report::Colour(0, 0, 0))
+            Series::line(name, bound.iter().copied())
+                .colour(Colour(0, 0, 0))
                 .dash(Dash::Dotted),
         );
     }
     LinePlot {
-        title: format!("{scheme}: good order solid, random order dashed"),
+        title: format!("{scheme}, {} order", if random { "random" } else { "good" }),
         x_label: "vertices".into(),
-        y_label: "seconds".into(),
+        y_label: "nanoseconds a vertex".into(),
         x_scale: Scale::Log,
         y_scale: Scale::Log,
+        y_range: Some((20.0, 2e4)),
         series,
         ..LinePlot::default()
     }

@@ -170,6 +170,12 @@ impl Operator {
         self.row(i, x) / self.diagonal[i]
     }
 
+    /// Calls `visit(j, a_ij)` for every neighbour j ≠ i of vertex `i`; a vertex that is joined to `i` more than once
+    /// comes as often, with a part of the entry each time. O(neighbours + corners of large faces at `i`).
+    pub fn neighbours(&self, i: usize, visit: impl FnMut(usize, f64)) {
+        self.stencil.entries(i, visit);
+    }
+
     /// Sums over the large faces that the rows of one sweep share; empty without such faces.
     pub fn moments<P: Point>(&self, x: &[P], moments: &mut Vec<[P; 3]>) {
         self.stencil.moments(x, moments);
@@ -423,7 +429,7 @@ fn renumber<C: Code>(
 
 impl Listed {
     /// The large faces at vertex `i`, each with the place of `i` in it.
-    fn large_at(&self, i: usize) -> &[(u32, u32)] {
+    pub(super) fn large_at(&self, i: usize) -> &[(u32, u32)] {
         match self.slots.get(i) {
             Some(&slot) if slot != NONE => {
                 let slot = slot as usize;

@@ -218,6 +218,15 @@ impl LargeFaces {
         moments
     }
 
+    /// Calls `visit(j, m)` for what face `f` adds to the row of M at its corner `t`, at each other corner j.
+    fn entries(&self, f: usize, t: usize, mut visit: impl FnMut(usize, f64)) {
+        let corners = self.corners_of(f);
+        for (s, &v) in corners.iter().enumerate().filter(|&(s, _)| s != t) {
+            let (_, turn) = angle(s.abs_diff(t), corners.len());
+            visit(v as usize, self.constant[f] + self.cosine[f] * turn);
+        }
+    }
+
     /// What face `f` adds to the row of M at its corner `t`, its own part aside.
     fn row<P: Point>(&self, f: usize, t: usize, moments: [P; 3]) -> P {
         let sum = moments[0].times(P::weight(self.constant[f]));
@@ -368,6 +377,45 @@ impl Stencil {
                 rings.edges[codes.len()].value_of_edges(window[row], edge)
             }
             Kind::Listed => self.listed_row(i, codes, window, row, start, moments),
+        }
+    }
+
+    /// Calls `visit(j, part of a_ij)` for every neighbour.
+    pub(super) fn entries(&self, i: usize, visit: impl FnMut(usize, f64)) {
+        match &self.neighbours {
+            Neighbours::Near(near) => self.coded_entries(near, i, visit),
+            Neighbours::Far(far) => self.coded_entries(far, i, visit),
+        }
+    }
+
+    fn coded_entries<C: Code>(&self, codes: &[C], i: usize, mut visit: impl FnMut(usize, f64)) {
+        let codes = &codes[self.offsets[i] as usize..self.offsets[i + 1] as usize];
+        match self.kinds[i] {
+            Kind::Quads => {
+                let n = codes.len() / 2;
+                let ring = self.double.quads[n];
+                for (k, c) in codes.iter().enumerate() {
+                    let a = if k < n { ring.edge } else { ring.opposite };
+                    visit(c.place(i, 0), a);
+                }
+            }
+            Kind::Edges => {
+                let ring = self.double.edges[codes.len()];
+                codes.iter().for_each(|c| visit(c.place(i, 0), ring.edge));
+            }
+            Kind::Listed => {
+                let listed = &self.listed;
+                let slot = listed.slots[i] as usize;
+                let weights = &listed.weights[listed.starts[slot] as usize..];
+                for (c, &a) in codes.iter().zip(weights) {
+                    visit(c.place(i, 0), a);
+                }
+                for &(f, t) in listed.large_at(i) {
+                    self.large.entries(f as usize, t as usize, |j, m| {
+                        visit(j, listed.h[slot] * m);
+                    });
+                }
+            }
         }
     }
 

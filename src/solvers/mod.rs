@@ -8,6 +8,7 @@ pub mod gauss_seidel;
 pub mod incomplete_cholesky;
 pub mod iteration;
 pub mod jacobi;
+pub mod local;
 pub mod method;
 pub mod mixed;
 pub mod pia;
