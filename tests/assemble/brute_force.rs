@@ -80,7 +80,7 @@ fn every_entry_is_the_response_to_a_unit_vector() {
 }
 
 /// The limit of one vertex's points over consecutive levels. The star of a vertex approaches its limit by μ_1ᵏ and, under
-/// Catmull-Clark, μ_2ᵏ: two or three differences tell the μ, and these the limit (minimal polynomial extrapolation).
+/// Catmull-Clark, μ_2ᵏ: the differences tell the μ, and these the limit (minimal polynomial extrapolation).
 fn extrapolate(scheme: Scheme, valence: usize, x: &[DVec3]) -> DVec3 {
     // At valence 3, μ_2 = 0: gone after a step. The other schemes have no μ_2.
     let single = match (scheme, valence) {
@@ -94,16 +94,23 @@ fn extrapolate(scheme: Scheme, valence: usize, x: &[DVec3]) -> DVec3 {
         return x[2] + mu / (1.0 - mu) * after;
     }
     let d: Vec<DVec3> = x.windows(2).map(|w| w[1] - w[0]).collect();
-    // d_2 = s d_1 − p d_0 in the least squares sense, by the normal equations.
-    let (a, b, c) = (
-        d[1].length_squared(),
-        -d[1].dot(d[0]),
-        d[0].length_squared(),
-    );
-    let (f, g) = (d[1].dot(d[2]), -d[0].dot(d[2]));
+    // d_{k+2} = s d_{k+1} − p d_k for all k, in the least squares sense, by the normal equations. (Of one k alone it may
+    // be undetermined: among triangles all differences of a vertex are parallel.)
+    let (mut a, mut b, mut c, mut f, mut g) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for w in d.windows(3) {
+        a += w[1].length_squared();
+        b -= w[1].dot(w[0]);
+        c += w[0].length_squared();
+        f += w[1].dot(w[2]);
+        g -= w[0].dot(w[2]);
+    }
     let determinant = a * c - b * b;
-    let (s, p) = ((f * c - b * g) / determinant, (a * g - b * f) / determinant);
-    (x[2] - s * x[1] + p * x[0]) / (1.0 - s + p)
+    let s = (f * c - b * g) / determinant;
+    let p = (a * g - b * f) / determinant;
+    let [.., before, last, next] = x else {
+        unreachable!("at least three levels")
+    };
+    (*next - s * *last + p * *before) / (1.0 - s + p)
 }
 
 /// Extrapolation divides by the differences, of which the later ones are some 10⁻³ of the points, twice.
@@ -123,7 +130,7 @@ fn plain_refinement_ends_where_the_rows_say() {
             let incidence = topology(&mesh).incidence;
             let mut level = refinement.refine_n(&mesh, first).unwrap();
             let mut levels = vec![level.positions[..mesh.len()].to_vec()];
-            for _ in 0..3 {
+            for _ in 0..4 {
                 level = refinement.refine_n(&level, 1).unwrap();
                 levels.push(level.positions[..mesh.len()].to_vec());
             }
@@ -136,7 +143,7 @@ fn plain_refinement_ends_where_the_rows_say() {
                     error < EXTRAPOLATION,
                     "{scheme} {seed}, vertex {v}: {error:e}"
                 );
-                assert!((path[3] - row).length() < (path[0] - row).length() || error == 0.0);
+                assert!((path[4] - row).length() < (path[0] - row).length() || error == 0.0);
             }
         }
     }

@@ -21,9 +21,10 @@ pub fn iterates(iterations: usize, scale: f64) -> f64 {
     64.0 * (iterations + 4) as f64 * EPS * scale
 }
 
-/// Two runs of conjugate gradients, whose step sizes amplify rounding: seen to stay below 10⁻¹² of the scale here.
+/// Two runs of conjugate gradients on points of size `scale`: differences of rounding grow while Ritz values converge,
+/// at most to √ε before the directions lose their orthogonality altogether (Paige 1980).
 pub fn krylov(scale: f64) -> f64 {
-    1e-10 * scale
+    EPS.sqrt() * scale
 }
 
 /// Rates fitted to histories of tens to hundreds of iterations.

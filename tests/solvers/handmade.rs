@@ -349,32 +349,57 @@ fn chebyshev_is_the_textbook_s() {
     });
 }
 
+/// Conjugate gradients amplify rounding while Ritz values converge (Paige 1980), by how much shows a second run by hand,
+/// on points that differ by rounding: two implementations may differ by a small multiple of that.
+fn hold_cg(case: &Case, name: &str, setup: Setup, loops: impl Fn(&Dense) -> Vec<Points>) {
+    const FACTOR: f64 = 100.0;
+    let expected = loops(case.dense);
+    let mut other = Dense::new(case.mesh, case.scheme, case.dense.tolerance);
+    for (k, x) in other.p.iter_mut().enumerate() {
+        *x *= 1.0 + f64::EPSILON * [1.0, -2.0, 3.0][k % 3];
+    }
+    let mut spread: Vec<f64> = (expected.iter().zip(loops(&other)))
+        .map(|(v, w)| max_row(&(v - w)))
+        .collect();
+    for k in 1..spread.len() {
+        spread[k] = spread[k].max(spread[k - 1]);
+    }
+    let last = spread.len() - 1;
+    case.hold(name, setup, &expected, |k, scale| {
+        tol::iterates(k, scale) + FACTOR * spread[k.min(last)]
+    });
+    // Not so much that the comparison would be idle.
+    assert!(
+        spread[last] < 1e-2 * case.dense.tolerance,
+        "{name}: {:e}",
+        spread[last]
+    );
+}
+
 #[test]
 fn conjugate_gradients_are_the_textbook_s() {
-    for_each_case(1e-6, |case| {
-        let dense = case.dense;
-        let allowed = |_, scale| tol::krylov(scale);
-        let by_h = dense.cg(|r| dense.scaled_rows(r, |i| dense.plain.h[i]));
-        case.hold("cg", Setup::Cg, &by_h, allowed);
-        case.hold(
-            "plain cg",
-            Setup::PlainCg,
-            &dense.cg(Points::clone),
-            allowed,
-        );
-        let diagonal = dense.plain.dense_m().diagonal();
-        let by_diagonal = dense.cg(|r| dense.scaled_rows(r, |i| 1.0 / diagonal[i]));
-        case.hold("pcg-jacobi", Setup::PcgJacobi, &by_diagonal, allowed);
-        for omega in [1.0, 1.2] {
-            let by_sweep = dense.cg(|r| dense.symmetric_sweep(omega, r));
-            case.hold("pcg-ssor", Setup::PcgSsor { omega }, &by_sweep, allowed);
-        }
-        let l = dense.incomplete_cholesky();
-        let by_ic0 = dense.cg(|r| {
-            let y = l.solve_lower_triangular(r).unwrap();
-            l.tr_solve_lower_triangular(&y).unwrap()
+    for_each_case(1e-4, |case| {
+        hold_cg(case, "cg", Setup::Cg, |d| {
+            d.cg(|r| d.scaled_rows(r, |i| d.plain.h[i]))
         });
-        case.hold("pcg-ic0", Setup::PcgIc0, &by_ic0, allowed);
+        hold_cg(case, "plain cg", Setup::PlainCg, |d| d.cg(Points::clone));
+        hold_cg(case, "pcg-jacobi", Setup::PcgJacobi, |d| {
+            let diagonal = d.plain.dense_m().diagonal();
+            d.cg(|r| d.scaled_rows(r, |i| 1.0 / diagonal[i]))
+        });
+        for omega in [1.0, 1.2] {
+            let setup = Setup::PcgSsor { omega };
+            hold_cg(case, "pcg-ssor", setup, |d| {
+                d.cg(|r| d.symmetric_sweep(omega, r))
+            });
+        }
+        hold_cg(case, "pcg-ic0", Setup::PcgIc0, |d| {
+            let l = d.incomplete_cholesky();
+            d.cg(|r| {
+                let y = l.solve_lower_triangular(r).unwrap();
+                l.tr_solve_lower_triangular(&y).unwrap()
+            })
+        });
     });
 }
 

@@ -59,6 +59,27 @@ fn a_breakdown_is_an_outcome_that_says_where() {
     assert_eq!(report.outcome, Outcome::Converged);
 }
 
+/// M under Catmull-Clark has positive entries only: it is no M-matrix, and leaving out fill takes more than the pivots
+/// have.
+#[test]
+fn incomplete_cholesky_breaks_down_on_the_cube() {
+    for name in ["cube", "prism:4", "cubes:3"] {
+        let mesh = noisy(name);
+        let system = system(&mesh, Scheme::CatmullClark);
+        let stop = Stop {
+            tolerance: 1e-10,
+            max_iterations: 100,
+        };
+        let report = checked(&system, &mesh.positions, Setup::PcgIc0, &stop).report;
+        assert_eq!(
+            (report.outcome, report.iterations),
+            (Outcome::Breakdown, 0),
+            "{name}"
+        );
+        assert!(report.detail.unwrap().contains("is not positive"));
+    }
+}
+
 #[test]
 fn numbers_that_are_not_finite_never_converge() {
     let mesh = noisy("irregular-tri:100");
