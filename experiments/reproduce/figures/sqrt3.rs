@@ -94,8 +94,8 @@ pub fn parameters(album: &mut Album) -> Result<()> {
             .push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
     }
     for (caption, chosen) in [
-        ("through every 4th vertex", every(4)),
-        ("through every 2nd vertex", every(2)),
+        ("every 4th vertex", every(4)),
+        ("every 2nd vertex", every(2)),
     ] {
         let mut alpha = all(0.0);
         for &v in &chosen {

@@ -17,7 +17,7 @@ const BAR_WIDTH: f64 = 10.0;
 const TICK_LENGTH: f64 = 3.0;
 const TICK_GAP: f64 = 3.0;
 /// Least distance from tick label to tick label.
-const TICK_PITCH: f64 = 24.0;
+const TICK_PITCH: f64 = 15.0;
 /// A bar longer than this tells no more.
 const LONGEST_BAR: f64 = 220.0;
 
