@@ -423,7 +423,9 @@ fn renumber<C: Code>(
     match rows::<C, i16>(codes, old_offsets, order, place, offsets) {
         Some(near) => Neighbours::Near(near),
         // Every vertex has a code of 32 bits.
-        None => Neighbours::Far(rows(codes, old_offsets, order, place, offsets).unwrap_or_default()),
+        None => {
+            Neighbours::Far(rows(codes, old_offsets, order, place, offsets).unwrap_or_default())
+        }
     }
 }
 
