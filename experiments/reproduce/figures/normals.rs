@@ -198,7 +198,7 @@ pub fn end_cap(album: &mut Album) -> Result<()> {
         let surface = limit_surface(Refinement::CatmullClark, &cage)?;
         let heights = surface.mesh.positions.iter().map(|p| p.y);
         let over = 100.0 * (heights.fold(0.0, f64::max) / RADIUS - 1.0);
-        let caption = format!("{} η = {eta}, {radius} r: {over:+.1} %", letters[0]);
+        let caption = format!("{} η = {eta}, r × {radius}: {over:+.1} %", letters[0]);
         panels.push(
             Picture::new(caption, across)
                 .surface(surface.clone())
