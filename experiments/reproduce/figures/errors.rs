@@ -51,7 +51,7 @@ pub fn maps(album: &mut Album) -> Result<()> {
         iterations: SHOWN.last().copied(),
         error: Some(last),
     };
-    album.add(&line, &sheet(3, (115, 112), panels))
+    album.add(&line, &sheet(3, (110, 108), panels))
 }
 
 /// The eigenvectors of Catmull-Clark's matrix that PIA is slowest to remove.
@@ -94,7 +94,7 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet(2, (140, 122), panels))
+    album.add(&line, &sheet(2, (126, 112), panels))
 }
 
 /// Steps of the power iteration; it ends before where it has converged.

@@ -32,7 +32,7 @@ struct Printed {
 const PRINTED: [Printed; 5] = [
     Printed {
         name: "pia-3-horse",
-        caption: "PIA Fig. 3: Loop surface through the horse, 12 iterations",
+        caption: "PIA Fig. 3 (horse): mesh and Loop surface, 12 iterations",
         file: "closed/psb_m104_horse_233v.off",
         otherwise: "irregular-tri:233",
         scheme: Scheme::Loop,
@@ -45,7 +45,7 @@ const PRINTED: [Printed; 5] = [
     },
     Printed {
         name: "pia-4-bird",
-        caption: "PIA Fig. 4: Loop surface through the bird, 9 iterations",
+        caption: "PIA Fig. 4 (bird): mesh and Loop surface, 9 iterations",
         file: "closed/psb_m32_bird_1129v.off",
         otherwise: "irregular-tri:1129",
         scheme: Scheme::Loop,
@@ -58,7 +58,7 @@ const PRINTED: [Printed; 5] = [
     },
     Printed {
         name: "pia-5-hand",
-        caption: "PIA Fig. 5: Loop surface through the hand, 3 iterations",
+        caption: "PIA Fig. 5 (hand): mesh and Loop surface, 3 iterations",
         file: "closed/psb_m329_hand_6191v.off",
         otherwise: "irregular-tri:6191",
         scheme: Scheme::Loop,
@@ -67,11 +67,11 @@ const PRINTED: [Printed; 5] = [
         azimuth: 20.0,
         elevation: 12.0,
         shown: 1.0,
-        size: (180, 190),
+        size: (172, 182),
     },
     Printed {
         name: "pia-6-boy",
-        caption: "PIA Fig. 6: Loop surface through the boy (holes filled), 6 iterations; head and shoulders",
+        caption: "PIA Fig. 6 (boy, holes filled): mesh and Loop surface, 6 iterations; the head alone",
         file: "closed/psb_m149_boy_17342v_holesfilled.off",
         otherwise: "icosphere:5",
         scheme: Scheme::Loop,
@@ -84,7 +84,7 @@ const PRINTED: [Printed; 5] = [
     },
     Printed {
         name: "pia-7-mushroom",
-        caption: "PIA Fig. 7: Catmull-Clark surface through the mushroom, 8 iterations",
+        caption: "PIA Fig. 7 (mushroom): mesh and Catmull-Clark surface, 8 iterations",
         file: "closed/geomview_mushroom_226v.off",
         otherwise: "irregular-quad:226",
         scheme: Scheme::CatmullClark,
@@ -186,5 +186,5 @@ pub fn thall_series(album: &mut Album) -> Result<()> {
         iterations: SERIES.last().copied(),
         error: Some(last),
     };
-    album.add(&line, &sheet(3, (115, 125), panels))
+    album.add(&line, &sheet(3, (106, 116), panels))
 }

@@ -98,6 +98,14 @@ impl<'a> Album<'a> {
              from its limit point in percent of the bounding box's diagonal, are those of the last surface in the \
              picture.",
         );
+        if context.real() {
+            table.note(
+                "Sources of the models: horse, bird, hand, boy and hat are of the Princeton Shape Benchmark (Shilane, \
+                 Min, Kazhdan & Funkhouser 2004; copyright 2003 Princeton University); the mushroom is Geomview's; \
+                 the bunny is of the Stanford 3D Scanning Repository; spot and bob are Keenan Crane's; letter P and \
+                 tripod are CGAL's.",
+            );
+        }
         Album { context, table }
     }
 

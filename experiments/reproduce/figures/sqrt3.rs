@@ -30,7 +30,7 @@ fn surface(mesh: &Mesh, alpha: &[f64]) -> Result<Surface> {
 
 /// Fig. 5: modified Butterfly and the interpolatory √3 scheme.
 pub fn against_butterfly(album: &mut Album) -> Result<()> {
-    let subject = album.subject("closed/bob_small_250v.off", "star:7")?;
+    let subject = album.subject("closed/bob_small_250v.off", "tri-torus:12x7")?;
     let mesh = &subject.mesh;
     let view = view(DVec3::Y, 35.0, 20.0);
     let butterfly = Surface::smooth(Refinement::Butterfly.refine_n(mesh, 4)?);
