@@ -5,9 +5,12 @@
 pub mod bounds;
 pub mod csr;
 pub mod matrix_market;
+pub mod operator;
 pub mod scheme;
+pub mod stencil;
 pub mod system;
 
 pub use csr::Csr;
+pub use operator::Operator;
 pub use scheme::{Masks, Scheme};
 pub use system::LimitSystem;
