@@ -115,7 +115,9 @@ fn sweep(c: &mut Criterion) {
     let mut rows = Rows::new(n);
     let mut group = c.benchmark_group("A times three columns");
     group.sample_size(20);
-    group.bench_function("stored", |b| b.iter(|| product(&mut rows, &system, x, &mut y)));
+    group.bench_function("stored", |b| {
+        b.iter(|| product(&mut rows, &system, x, &mut y))
+    });
     group.bench_function("matrix-free, file order", |b| {
         b.iter(|| product(&mut rows, &file, x, &mut y));
     });
@@ -131,12 +133,20 @@ fn sweep(c: &mut Criterion) {
         .iter()
         .map(|&(i, j, a)| faer::sparse::Triplet::new(i as u32, j as u32, a))
         .collect();
-    let a = SparseColMat::<u32, f64>::try_new_from_triplets(n, n, &faer_triplets).expect("a matrix");
+    let a =
+        SparseColMat::<u32, f64>::try_new_from_triplets(n, n, &faer_triplets).expect("a matrix");
     let right = Mat::from_fn(n, 3, columns);
     let mut left = Mat::<f64>::zeros(n, 3);
     group.bench_function("faer", |b| {
         b.iter(|| {
-            sparse_dense_matmul(left.as_mut(), Accum::Replace, a.as_ref(), right.as_ref(), 1.0, Par::rayon(0));
+            sparse_dense_matmul(
+                left.as_mut(),
+                Accum::Replace,
+                a.as_ref(),
+                right.as_ref(),
+                1.0,
+                Par::rayon(0),
+            );
         });
     });
     let mut triplets = sprs::TriMatI::<f64, u32>::new((n, n));
@@ -196,7 +206,9 @@ fn methods(c: &mut Criterion) {
     group.bench_function("matrix-free chebyshev, fused, double", |b| {
         b.iter(|| {
             let mut method = Chebyshev::new(&front, &moved, INTERVAL);
-            solve(&mut method, &stop, &mut |_| std::ops::ControlFlow::Continue(()))
+            solve(&mut method, &stop, &mut |_| {
+                std::ops::ControlFlow::Continue(())
+            })
         });
     });
     let singles: Vec<glam::Vec3A> = moved.iter().map(|p| p.as_vec3a()).collect();
@@ -213,9 +225,27 @@ fn methods(c: &mut Criterion) {
         ("stored, chebyshev", Setup::Chebyshev { spectrum: INTERVAL }),
         ("stored, pia", Setup::Pia { omega: 1.0 }),
         ("stored, thall", Setup::THALL),
-        ("stored, gauss-seidel", Setup::Sor { omega: 1.0, order: None }),
-        ("stored, sor", Setup::Sor { omega: 1.1, order: None }),
-        ("stored, ssor", Setup::Ssor { omega: 1.0, order: None }),
+        (
+            "stored, gauss-seidel",
+            Setup::Sor {
+                omega: 1.0,
+                order: None,
+            },
+        ),
+        (
+            "stored, sor",
+            Setup::Sor {
+                omega: 1.1,
+                order: None,
+            },
+        ),
+        (
+            "stored, ssor",
+            Setup::Ssor {
+                omega: 1.0,
+                order: None,
+            },
+        ),
         ("stored, cg", Setup::Cg),
         ("stored, pcg-jacobi", Setup::PcgJacobi),
         ("stored, pcg-ssor", Setup::PcgSsor { omega: 1.0 }),

@@ -109,7 +109,9 @@ fn assert_close(what: &str, a: &[DVec3], b: &[DVec3], tolerance: f64) {
 fn product<S: System>(system: &S, x: &[DVec3]) -> Vec<DVec3> {
     let mut out = vec![DVec3::ZERO; x.len()];
     let mut nothing = vec![(); x.len()];
-    Rows::new(x.len()).product(system, x, &mut out, &mut nothing, |_, ax, out, (), _| *out = ax);
+    Rows::new(x.len()).product(system, x, &mut out, &mut nothing, |_, ax, out, (), _| {
+        *out = ax
+    });
     out
 }
 
@@ -127,14 +129,14 @@ fn rows_equal_the_explicit_matrix() {
         assert_close(name, &product(operator, &x), &expected, ROUNDING);
         let single: Vec<DVec3> = (0..x.len()).map(|i| operator.row(i, &x)).collect();
         assert_close(name, &single, &expected, ROUNDING);
-        for i in 0..x.len() {
+        for (i, ax) in expected.iter().enumerate() {
             let (h, d) = (explicit.h[i], explicit.diagonal[i]);
             assert!((operator.weights()[i] - h).abs() <= ROUNDING * h, "{name}");
             assert!((operator.diagonal()[i] - d).abs() <= ROUNDING, "{name}");
             let m = explicit.m.row_times(i, &x);
             let difference = (operator.symmetric_row(i, &x) - m).length();
             assert!(difference <= ROUNDING / h, "{name}");
-            let jacobi = (operator.jacobi_row(i, &x) - expected[i] / d).length();
+            let jacobi = (operator.jacobi_row(i, &x) - *ax / d).length();
             assert!(jacobi <= 4.0 * ROUNDING / d, "{name}");
         }
         assert_eq!(operator.bounds().lambda_min, explicit.bounds.lambda_min);
@@ -164,10 +166,8 @@ fn renumbering_permutes_rows_and_the_front_order_is_a_permutation() {
         let x = rough(n);
         let expected = product(&case.explicit, &x);
         let front = case.operator.front_order();
-        let shuffled = Order::Random(5).order(
-            &case.mesh,
-            &Topology::new(&case.mesh.faces, n).incidence,
-        );
+        let shuffled =
+            Order::Random(5).order(&case.mesh, &Topology::new(&case.mesh.faces, n).incidence);
         for order in [front, shuffled] {
             let place = inverse(&order);
             let moved = case.operator.renumbered(&order);
@@ -222,7 +222,12 @@ fn a_boundary_treated_as_interior_is_the_same_in_both() {
         let case = both("open", open.clone(), scheme);
         let x = rough(8);
         let expected = product(&case.explicit, &x);
-        assert_close(&case.name, &product(&case.operator, &x), &expected, ROUNDING);
+        assert_close(
+            &case.name,
+            &product(&case.operator, &x),
+            &expected,
+            ROUNDING,
+        );
     }
     let topology = Topology::new(&open.faces, 8);
     assert!(Operator::new(&open.faces, &topology, Scheme::CatmullClark).is_err());
@@ -241,11 +246,22 @@ fn every_iteration_runs_on_both_alike() {
             Box::new(Sor::new(system, points, 1.1, None)),
             Box::new(Ssor::new(system, points, 1.0, None)),
             Box::new(Chebyshev::new(system, points, (0.1, 1.0))),
-            Box::new(ConjugateGradient::new(system, points, Preconditioner::weights(system))),
-            Box::new(ConjugateGradient::new(system, points, Preconditioner::Ssor { omega: 1.0 })),
+            Box::new(ConjugateGradient::new(
+                system,
+                points,
+                Preconditioner::weights(system),
+            )),
+            Box::new(ConjugateGradient::new(
+                system,
+                points,
+                Preconditioner::Ssor { omega: 1.0 },
+            )),
         ];
         let watch = &mut |_: &limitlab::solvers::Step| ControlFlow::Continue(());
-        methods.iter_mut().map(|m| solve(m.as_mut(), stop, watch)).collect()
+        methods
+            .iter_mut()
+            .map(|m| solve(m.as_mut(), stop, watch))
+            .collect()
     }
     for case in all().filter(|c| c.explicit.bounds.lambda_min > 0.05) {
         let points = &case.mesh.positions;
@@ -265,7 +281,11 @@ fn every_iteration_runs_on_both_alike() {
 
 #[test]
 fn bands_change_no_bit() {
-    for (name, count) in [("torus:60x40", 21), ("irregular-quad:3000", 8), ("icosphere:4", 2)] {
+    for (name, count) in [
+        ("torus:60x40", 21),
+        ("irregular-quad:3000", 8),
+        ("icosphere:4", 2),
+    ] {
         let mesh = mesh(name);
         let topology = Topology::new(&mesh.faces, mesh.len());
         for scheme in Scheme::ALL {
@@ -287,7 +307,10 @@ fn bands_change_no_bit() {
             let plain = iterate(None);
             let reach = operator.reach().expect("no large faces");
             for band in [reach, reach + 17, 2 * reach, 10 * mesh.len()] {
-                assert!(iterate(Some(band)) == plain, "{name}, {scheme}, bands of {band}");
+                assert!(
+                    iterate(Some(band)) == plain,
+                    "{name}, {scheme}, bands of {band}"
+                );
             }
             // The same iterates as by the method that works with residuals from x = r's own start.
             let zero = vec![DVec3::ZERO; r.len()];
@@ -361,7 +384,12 @@ fn large_meshes_take_the_banded_way_with_the_same_result_as_the_explicit_method(
     let reference = run(&case.explicit, &case.mesh.positions, setup, &stop);
     let expected = limitlab::assemble::operator::gather(&reference.points, &order);
     // Both are within tolerance/λ_min of the solution, in a norm close to the greatest difference.
-    assert_close("icosphere:7", &one.0, &expected, 2.0 * stop.tolerance / bound);
+    assert_close(
+        "icosphere:7",
+        &one.0,
+        &expected,
+        2.0 * stop.tolerance / bound,
+    );
     assert!(one.1.iterations <= reference.report.iterations + 8);
 }
 
@@ -375,7 +403,11 @@ fn mixed_precision_stalls_on_inconsistent_data_of_a_singular_matrix() {
     let (_, report) = mixed::solve(&case.operator, &case.mesh.positions, 0.0, &stop);
     assert_eq!(report.outcome, Outcome::Stagnated);
     // The cube's own points have no part in the kernel.
-    let exact = both("cube", builtin("cube").expect("a mesh"), Scheme::CatmullClark);
+    let exact = both(
+        "cube",
+        builtin("cube").expect("a mesh"),
+        Scheme::CatmullClark,
+    );
     let (_, report) = mixed::solve(&exact.operator, &exact.mesh.positions, 0.0, &stop);
     assert_eq!(report.outcome, Outcome::Converged);
 }
@@ -398,7 +430,12 @@ fn an_interval_that_is_too_short_is_corrected() {
 
 #[test]
 fn scatter_is_recognised_and_mended() {
-    for name in ["torus:300x300", "irregular-quad:90000", "irregular-tri:90000", "icosphere:6"] {
+    for name in [
+        "torus:300x300",
+        "irregular-quad:90000",
+        "irregular-tri:90000",
+        "icosphere:6",
+    ] {
         let mesh = mesh(name);
         assert!(!is_scattered(&mesh.faces), "{name}");
         let topology = Topology::new(&mesh.faces, mesh.len());
@@ -439,7 +476,10 @@ fn the_inverse_decays_as_on_the_infinite_grid() {
     assert!(rings.len() >= 17, "{rings:?}");
     for (m, &entry) in rings.iter().enumerate() {
         let exact = 3.0 * q.powi(m as i32);
-        assert!((entry - exact).abs() <= 2e-11, "ring {m}: {entry} against {exact}");
+        assert!(
+            (entry - exact).abs() <= 2e-11,
+            "ring {m}: {entry} against {exact}"
+        );
     }
 }
 
@@ -466,13 +506,23 @@ fn local_edits_give_what_solving_anew_gives() {
         }
         let errors = Rows::new(n).errors(&case.explicit, editor.points(), editor.control());
         assert!(errors.max <= 1.01 * tolerance, "{}: {errors:?}", case.name);
-        assert_eq!(editor.points()[n - 1], points[n - 1] + DVec3::new(0.1, -0.2, 0.05));
+        assert_eq!(
+            editor.points()[n - 1],
+            points[n - 1] + DVec3::new(0.1, -0.2, 0.05)
+        );
         let lu = run(&case.explicit, editor.points(), Setup::Lu, &stop);
         // The residuals of both, times ‖A⁻¹‖ ≤ √κ(H)/λ_min.
         let h = &case.explicit.h;
-        let (low, high) = h.iter().fold((f64::MAX, 0.0f64), |(l, u), &h| (l.min(h), u.max(h)));
+        let (low, high) = h
+            .iter()
+            .fold((f64::MAX, 0.0f64), |(l, u), &h| (l.min(h), u.max(h)));
         let factor = (n as f64 * high / low).sqrt() / bound;
-        assert_close(&case.name, editor.control(), &lu.points, 2.0 * factor * tolerance);
+        assert_close(
+            &case.name,
+            editor.control(),
+            &lu.points,
+            2.0 * factor * tolerance,
+        );
     }
 }
 
@@ -492,13 +542,21 @@ fn the_work_of_an_edit_does_not_grow_with_the_mesh() {
     };
     let (small, _) = work("icosphere:5");
     let (large, n) = work("icosphere:7");
-    assert!(large <= 2 * small && 50 * large < n, "{small} and {large} of {n}");
+    assert!(
+        large <= 2 * small && 50 * large < n,
+        "{small} and {large} of {n}"
+    );
 }
 
 #[test]
 fn auto_returns_to_file_order_and_meets_the_tolerance() {
     // Above and below the size from which vertices are renumbered, in good and in random order.
-    for name in ["irregular-quad:3000", "irregular-quad:60000", "icosphere:6", "irregular-poly:60000"] {
+    for name in [
+        "irregular-quad:3000",
+        "irregular-quad:60000",
+        "icosphere:6",
+        "irregular-poly:60000",
+    ] {
         let good = mesh(name);
         let topology = Topology::new(&good.faces, good.len());
         let order = Order::Random(2).order(&good, &topology.incidence);
@@ -512,7 +570,8 @@ fn auto_returns_to_file_order_and_meets_the_tolerance() {
             let found = control_points(mesh, None, scheme, &stop).expect("a system");
             assert_eq!(found.report.outcome, Outcome::Converged, "{name}");
             let case = both(name, mesh.clone(), scheme);
-            let errors = Rows::new(mesh.len()).errors(&case.explicit, &mesh.positions, &found.points);
+            let errors =
+                Rows::new(mesh.len()).errors(&case.explicit, &mesh.positions, &found.points);
             assert!(errors.max <= 1.01 * stop.tolerance, "{name}: {errors:?}");
         }
     }
@@ -524,5 +583,10 @@ fn auto_returns_to_file_order_and_meets_the_tolerance() {
         max_iterations: 10_000,
     };
     let found = control_points(&prism, None, Scheme::CatmullClark, &stop).expect("a system");
-    assert_eq!(found.report.outcome, Outcome::Converged, "{:?}", found.report);
+    assert_eq!(
+        found.report.outcome,
+        Outcome::Converged,
+        "{:?}",
+        found.report
+    );
 }

@@ -18,7 +18,9 @@ use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, Topology, builtin::builtin};
-use limitlab::report::{Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette};
+use limitlab::report::{
+    Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette,
+};
 use limitlab::solvers::chebyshev::Chebyshev;
 use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use limitlab::solvers::iteration::Iterate;
@@ -30,10 +32,18 @@ use limitlab::solvers::{Method, Setup, Stop, run, solve};
 #[command(name = "scaling", version)]
 struct Arguments {
     /// Numbers of vertices
-    #[arg(long, value_name = "N,N,…", default_value = "1000,10000,100000,1000000")]
+    #[arg(
+        long,
+        value_name = "N,N,…",
+        default_value = "1000,10000,100000,1000000"
+    )]
     sizes: List<usize>,
     /// Schemes
-    #[arg(long, value_name = "NAME,…", default_value = "catmull-clark,loop,sqrt3,nasri,zheng-cai")]
+    #[arg(
+        long,
+        value_name = "NAME,…",
+        default_value = "catmull-clark,loop,sqrt3,nasri,zheng-cai"
+    )]
     scheme: List<Scheme>,
     /// Cholesky up to this many vertices
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
@@ -232,7 +242,8 @@ fn of_scheme(
                     continue;
                 }
                 progress.message(format!("{name}: {}", way.name()));
-                let Some((seconds, outcome, memory)) = timed(arguments, mesh, scheme, way, estimate)?
+                let Some((seconds, outcome, memory)) =
+                    timed(arguments, mesh, scheme, way, estimate)?
                 else {
                     continue;
                 };
@@ -251,7 +262,9 @@ fn of_scheme(
                     memory.map(|m| m as f64 / 1e6).into(),
                 ]);
                 let at = (mesh.len() as f64, 1e9 * seconds / mesh.len() as f64);
-                let known = curves.iter_mut().find(|c| c.way == way && c.random == random);
+                let known = curves
+                    .iter_mut()
+                    .find(|c| c.way == way && c.random == random);
                 match known {
                     Some(curve) => curve.points.push(at),
                     None => curves.push(Curve {
@@ -376,7 +389,11 @@ fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<
             start(&mut solve_seconds, since);
             Outcome {
                 iterations,
-                status: if converged { "converged" } else { "max-iterations" },
+                status: if converged {
+                    "converged"
+                } else {
+                    "max-iterations"
+                },
                 solve_seconds,
             }
         }

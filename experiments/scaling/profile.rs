@@ -70,7 +70,7 @@ pub fn profile(name: &str, mesh: &Mesh, scheme: Scheme, threads: usize) -> Resul
         ]);
     };
     if let Some(plain) = Plain::new(mesh, scheme) {
-        let seconds = best(|| plain.chebyshev(points, (0.1, 1.0), 0.0, ITERATIONS).1) ;
+        let seconds = best(|| plain.chebyshev(points, (0.1, 1.0), 0.0, ITERATIONS).1);
         // Product (2), residual (3), norm (1), step (3), update (3 arrays).
         let neighbours = free.entries() as f64 / n;
         push(

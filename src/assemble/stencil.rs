@@ -308,7 +308,10 @@ impl Stencil {
         let mut next = self.runs.partition_point(|&r| r as usize <= rows.start);
         let mut from = rows.start;
         while from < rows.end {
-            let to = self.runs.get(next).map_or(rows.end, |&r| rows.end.min(r as usize));
+            let to = self
+                .runs
+                .get(next)
+                .map_or(rows.end, |&r| rows.end.min(r as usize));
             next += 1;
             let run = Run {
                 codes: &codes[self.offsets[from] as usize..self.offsets[to] as usize],
@@ -436,8 +439,7 @@ impl Stencil {
         for (&c, &w) in codes.iter().zip(weights) {
             sum += window[c.place(row, start)].times(P::weight(w));
         }
-        let large =
-            listed.large_starts[slot] as usize..listed.large_starts[slot + 1] as usize;
+        let large = listed.large_starts[slot] as usize..listed.large_starts[slot + 1] as usize;
         for &(f, t) in &listed.corners[large] {
             let f = f as usize;
             let part = self.large.row(f, t as usize, moments(f, window));

@@ -21,8 +21,8 @@ use std::time::Instant;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::assemble::operator::{Operator, gather};
 use crate::assemble::Scheme;
+use crate::assemble::operator::{Operator, gather};
 use crate::error::Result;
 use crate::mesh::order::{along_curve, is_scattered};
 use crate::mesh::{Mesh, Topology};

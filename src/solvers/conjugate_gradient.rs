@@ -159,10 +159,16 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
         let mut nothing = vec![(); direction.len()];
         let curvature = self
             .rows
-            .product(system, direction, &mut self.work, &mut nothing, |i, ap, q, (), tally| {
-                *q = ap;
-                tally.dot(direction[i].dot(ap) / h[i]);
-            })
+            .product(
+                system,
+                direction,
+                &mut self.work,
+                &mut nothing,
+                |i, ap, q, (), tally| {
+                    *q = ap;
+                    tally.dot(direction[i].dot(ap) / h[i]);
+                },
+            )
             .dot;
         if !(curvature > 0.0 && curvature.is_finite()) {
             return Err(breakdown(format!(

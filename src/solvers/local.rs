@@ -49,11 +49,20 @@ impl<'a> Editor<'a> {
     /// If there is not one point a vertex in both.
     pub fn new(operator: &'a Operator, points: Vec<DVec3>, control: Vec<DVec3>) -> Self {
         let n = operator.len();
-        assert!(points.len() == n && control.len() == n, "one point a vertex");
+        assert!(
+            points.len() == n && control.len() == n,
+            "one point a vertex"
+        );
         let mut residual = vec![DVec3::ZERO; n];
-        Rows::new(n).residual(operator, &points, &control, &mut residual, |_, e, out, _| {
-            *out = e;
-        });
+        Rows::new(n).residual(
+            operator,
+            &points,
+            &control,
+            &mut residual,
+            |_, e, out, _| {
+                *out = e;
+            },
+        );
         Editor {
             operator,
             points,
@@ -112,7 +121,10 @@ impl<'a> Editor<'a> {
                 }
             }
         }
-        let errors = self.touched.iter().map(|&v| self.residual[v as usize].length());
+        let errors = self
+            .touched
+            .iter()
+            .map(|&v| self.residual[v as usize].length());
         Edit {
             relaxations,
             touched: self.touched.len(),
@@ -166,7 +178,10 @@ pub fn decay(operator: &Operator, vertex: usize, tolerance: f64) -> Vec<f64> {
     seen[vertex] = true;
     let mut ring = vec![vertex];
     while !ring.is_empty() {
-        let largest = ring.iter().map(|&v| editor.control[v].x.abs()).fold(0.0, f64::max);
+        let largest = ring
+            .iter()
+            .map(|&v| editor.control[v].x.abs())
+            .fold(0.0, f64::max);
         if largest <= tolerance {
             break;
         }

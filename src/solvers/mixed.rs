@@ -67,9 +67,16 @@ fn in_pool(
     let mut correction = vec![Vec3A::ZERO; n];
     let mut other = vec![Vec3A::ZERO; n];
     // Residuals in units of the tolerance are far from the ends of single precision's range.
-    let unit = if stop.tolerance > 0.0 { stop.tolerance } else { 1.0 };
+    let unit = if stop.tolerance > 0.0 {
+        stop.tolerance
+    } else {
+        1.0
+    };
     let mut interval = (if lambda_min > 0.0 { lambda_min } else { GUESS }, 1.0);
-    let largest = points.iter().map(|p| p.length_squared()).fold(0.0, f64::max);
+    let largest = points
+        .iter()
+        .map(|p| p.length_squared())
+        .fold(0.0, f64::max);
     let floor = FLOOR * f64::EPSILON * largest.sqrt();
     let mut history: Vec<Errors> = Vec::new();
     let mut iterations = 0;

@@ -69,7 +69,7 @@ impl<'a> Wavefront<'a> {
     /// a multiple of `r` and must be in `x` already: `x = τ₀ r` with the recurrence's first coefficient. The last
     /// iterate is returned in `x`; `other` is overwritten.
     ///
-    /// Reads, for each group of [`GROUP`] iterations, the operator, `r` and both iterates once from memory.
+    /// Reads, for each group of `GROUP` iterations, the operator, `r` and both iterates once from memory.
     ///
     /// # Panics
     /// If the arrays have not one point a vertex.
@@ -109,16 +109,19 @@ impl<'a> Wavefront<'a> {
     fn plain<P: Point>(&self, coefficients: (f64, f64), r: &[P], x: &[P], other: &mut [P]) {
         let mut moments = Vec::new();
         self.operator.moments(x, &mut moments);
-        other.par_chunks_mut(CHUNK).enumerate().for_each(|(k, out)| {
-            let task = Task {
-                rows: k * CHUNK..k * CHUNK + out.len(),
-                window: x,
-                start: 0,
-                out,
-                coefficients,
-            };
-            self.run(task, r, &moments);
-        });
+        other
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .for_each(|(k, out)| {
+                let task = Task {
+                    rows: k * CHUNK..k * CHUNK + out.len(),
+                    window: x,
+                    start: 0,
+                    out,
+                    coefficients,
+                };
+                self.run(task, r, &moments);
+            });
     }
 
     /// A group of iterations, band by band. After an odd number of them the last is in `other`, else in `x`.
