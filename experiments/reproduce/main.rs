@@ -3,6 +3,7 @@
 #[path = "../common/sweep.rs"]
 mod common;
 mod context;
+mod figures;
 mod methods;
 mod omega;
 mod pia;
@@ -50,13 +51,14 @@ struct Arguments {
 }
 
 /// All items, in the order in which they run.
-const ITEMS: [Item; 6] = [
+const ITEMS: [Item; 7] = [
     pia::TABLE1,
     thall::ITERATIONS,
     zheng_cai::SECTION_3_5,
     omega::SWEEPS,
     methods::ALL,
     sparsity::PATTERNS,
+    figures::ALL,
 ];
 
 fn main() -> ExitCode {

@@ -172,6 +172,22 @@ impl Csr {
         }
     }
 
+    /// `diag(scale) · self · diag(scale)`, on the same pattern; symmetric to the last bit if `self` is.
+    ///
+    /// # Panics
+    /// If `scale` does not hold one number a row.
+    pub fn scale_symmetrically(&self, scale: &[f64]) -> Csr {
+        assert_eq!(scale.len(), self.len(), "one factor a row");
+        let mut values = Vec::with_capacity(self.values.len());
+        for (i, &s) in scale.iter().enumerate() {
+            values.extend(self.row(i).map(|(j, v)| v * (s * scale[j])));
+        }
+        Csr {
+            pattern: Arc::clone(&self.pattern),
+            values,
+        }
+    }
+
     /// Row `i` times the points `x`: Σ_j a_ij x_j.
     #[inline]
     pub fn row_times(&self, i: usize, x: &[DVec3]) -> DVec3 {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::bounds::{SpectralBounds, lambda_min_bound};
+use super::bounds::SpectralBounds;
 use super::csr::{Csr, Pattern};
 use super::scheme::{Masks, Scheme};
 use crate::error::{Error, Result};
@@ -59,10 +59,11 @@ impl LimitSystem {
         check_mesh(&mesh.faces, topology, scheme)?;
         let mut system = Self::with_masks(mesh, topology, &scheme)?;
         if topology.is_closed() {
-            system.bounds.lambda_min = lambda_min_bound(
+            system.bounds = SpectralBounds::closed(
                 scheme,
                 &valences(&mesh.faces, topology),
                 mesh.faces.uniform_size() == Some(3),
+                &system.diagonal,
             );
         }
         Ok(system)

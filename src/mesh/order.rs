@@ -12,7 +12,7 @@ use super::topology::Incidence;
 use super::{Faces, Mesh, bounding_box};
 use crate::{Error, Result};
 
-/// `--order file|reverse|bfs|rcm|morton|valence|random[:SEED]`.
+/// `--order file|reverse|bfs|rcm|morton|valence|multicolour|random[:SEED]`.
 ///
 /// Neighbours in `Bfs` and `Rcm` are vertices that share a face: the pattern of the limit matrices.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,6 +31,9 @@ pub enum Order {
     Morton,
     /// By ascending number of faces, ties as in the file.
     Valence,
+    /// Colour by colour, where vertices of one colour share no face: a greedy colouring in the file's order. All
+    /// vertices of a colour may be relaxed at once.
+    Multicolour,
     /// Shuffled from a seed.
     Random(u64),
 }
@@ -46,12 +49,14 @@ impl FromStr for Order {
             "rcm" => Order::Rcm,
             "morton" => Order::Morton,
             "valence" => Order::Valence,
+            "multicolour" => Order::Multicolour,
             "random" => Order::Random(1),
             _ => match text.strip_prefix("random:").map(str::parse) {
                 Some(Ok(seed)) => Order::Random(seed),
                 _ => {
                     return Err(Error::Unknown(format!(
-                        "unknown vertex order `{text}`: use file, reverse, bfs, rcm, morton, valence or random[:SEED]"
+                        "unknown vertex order `{text}`: use file, reverse, bfs, rcm, morton, valence, multicolour \
+                         or random[:SEED]"
                     )));
                 }
             },
@@ -69,6 +74,7 @@ impl fmt::Display for Order {
             Order::Rcm => "rcm",
             Order::Morton => "morton",
             Order::Valence => "valence",
+            Order::Multicolour => "multicolour",
             Order::Random(seed) => return write!(f, "random:{seed}"),
         };
         f.write_str(name)
@@ -91,6 +97,12 @@ impl Order {
                 order.sort_by_key(|&v| incidence.face_count(v as usize));
                 order
             }
+            Order::Multicolour => {
+                let colour = colouring(&mesh.faces, incidence);
+                let mut order: Vec<u32> = file.collect();
+                order.sort_by_key(|&v| colour[v as usize]);
+                order
+            }
             Order::Random(seed) => {
                 let mut order: Vec<u32> = file.collect();
                 order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
@@ -98,6 +110,31 @@ impl Order {
             }
         }
     }
+}
+
+/// The least colour for every vertex, in the file's order, that no earlier vertex of its faces has. O(Σ|F|²).
+pub fn colouring(faces: &Faces, incidence: &Incidence) -> Vec<u32> {
+    const NONE: u32 = u32::MAX;
+    let mut colour = vec![NONE; incidence.vertices()];
+    // The last vertex that met a colour among its neighbours.
+    let mut met: Vec<u32> = Vec::new();
+    for v in 0..incidence.vertices() {
+        for &c in incidence.corners_at(v) {
+            for &w in faces.face(incidence.face_of(c)) {
+                let taken = colour[w as usize];
+                if taken != NONE {
+                    met[taken as usize] = v as u32;
+                }
+            }
+        }
+        let free = met.iter().position(|&last| last != v as u32);
+        let free = free.unwrap_or(met.len());
+        if free == met.len() {
+            met.push(NONE);
+        }
+        colour[v] = free as u32;
+    }
+    colour
 }
 
 /// The place of every vertex: `inverse(o)[o[k]] = k`.
