@@ -129,14 +129,14 @@ fn rows_equal_the_explicit_matrix() {
         assert_close(name, &product(operator, &x), &expected, ROUNDING);
         let single: Vec<DVec3> = (0..x.len()).map(|i| operator.row(i, &x)).collect();
         assert_close(name, &single, &expected, ROUNDING);
-        for i in 0..x.len() {
+        for (i, ax) in expected.iter().enumerate() {
             let (h, d) = (explicit.h[i], explicit.diagonal[i]);
             assert!((operator.weights()[i] - h).abs() <= ROUNDING * h, "{name}");
             assert!((operator.diagonal()[i] - d).abs() <= ROUNDING, "{name}");
             let m = explicit.m.row_times(i, &x);
             let difference = (operator.symmetric_row(i, &x) - m).length();
             assert!(difference <= ROUNDING / h, "{name}");
-            let jacobi = (operator.jacobi_row(i, &x) - expected[i] / d).length();
+            let jacobi = (operator.jacobi_row(i, &x) - *ax / d).length();
             assert!(jacobi <= 4.0 * ROUNDING / d, "{name}");
         }
         assert_eq!(operator.bounds().lambda_min, explicit.bounds.lambda_min);

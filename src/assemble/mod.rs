@@ -7,6 +7,7 @@ pub mod csr;
 pub mod matrix_market;
 pub mod operator;
 pub mod scheme;
+mod source;
 pub mod stencil;
 pub mod system;
 

@@ -73,11 +73,17 @@ impl Incidence {
     /// The opposite of every half-edge, if each has exactly one: the usual case, in parallel. O(Σ n²) over the
     /// valences n, so vertices of more than [`MANY`] faces are left to the sorts.
     fn pairs(&self, faces: &Faces) -> Option<Vec<u32>> {
+        // Among triangles, and among quads, the next corner takes no look at the face.
+        match faces.uniform_size() {
+            Some(3) => self.pairs_by(faces, |c| if c % 3 == 2 { c - 2 } else { c + 1 }),
+            Some(4) => self.pairs_by(faces, |c| if c % 4 == 3 { c - 3 } else { c + 1 }),
+            _ => self.pairs_by(faces, |c| next_in(&faces.range(self.face_of(c)), c)),
+        }
+    }
+
+    fn pairs_by(&self, faces: &Faces, next: impl Fn(u32) -> u32 + Sync) -> Option<Vec<u32>> {
         let corners = faces.corners();
-        let end = |c: u32| {
-            let range = faces.range(self.face_of(c));
-            corners[next_in(&range, c) as usize]
-        };
+        let end = |c: u32| corners[next(c) as usize];
         (0..corners.len() as u32)
             .into_par_iter()
             .with_min_len(8192)

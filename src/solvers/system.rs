@@ -203,7 +203,7 @@ impl Rows {
         totals
     }
 
-    /// Calls `chunk(first row, its part of a, its part of b, tally)` for chunks of [`CHUNK`] rows.
+    /// Calls `chunk(first row, its part of a, its part of b, tally)` for chunks of 4096 rows.
     fn chunks<A: Send, B: Send>(
         &mut self,
         a: &mut [A],

@@ -69,7 +69,7 @@ impl<'a> Wavefront<'a> {
     /// a multiple of `r` and must be in `x` already: `x = τ₀ r` with the recurrence's first coefficient. The last
     /// iterate is returned in `x`; `other` is overwritten.
     ///
-    /// Reads, for each group of [`GROUP`] iterations, the operator, `r` and both iterates once from memory.
+    /// Reads, for each group of `GROUP` iterations, the operator, `r` and both iterates once from memory.
     ///
     /// # Panics
     /// If the arrays have not one point a vertex.

@@ -8,7 +8,7 @@ use crate::*;
 #[test]
 fn help_and_version_end_with_success() {
     let folder = tempdir().unwrap();
-    for program in [ASSEMBLE, INTERPOLATE, COMPARE, SWEEP, REPRODUCE] {
+    for program in [ASSEMBLE, INTERPOLATE, COMPARE, SWEEP, REPRODUCE, SPLITTING] {
         let help = run(program, folder.path(), ["--help"]);
         assert_done(&help, program);
         let out = text(&help.stdout);
@@ -72,7 +72,7 @@ fn bad_arguments_end_with_2() {
         );
     };
     for arguments in everywhere {
-        for program in [ASSEMBLE, INTERPOLATE, COMPARE, SWEEP, REPRODUCE] {
+        for program in [ASSEMBLE, INTERPOLATE, COMPARE, SWEEP, REPRODUCE, SPLITTING] {
             check(program, arguments);
         }
     }

@@ -19,6 +19,7 @@ pub const INTERPOLATE: &str = env!("CARGO_BIN_EXE_interpolate");
 pub const COMPARE: &str = env!("CARGO_BIN_EXE_compare-solvers");
 pub const SWEEP: &str = env!("CARGO_BIN_EXE_sweep-omega");
 pub const REPRODUCE: &str = env!("CARGO_BIN_EXE_reproduce");
+pub const SPLITTING: &str = env!("CARGO_BIN_EXE_splitting");
 
 /// The programs that take meshes.
 pub const ON_MESHES: [&str; 4] = [ASSEMBLE, INTERPOLATE, COMPARE, SWEEP];
