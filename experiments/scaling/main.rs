@@ -1,6 +1,8 @@
-//! How time and memory grow with the mesh: `scaling` writes `scaling.{md,csv,png}` and `scaling-profile.{md,csv}`.
+//! How time and memory grow with the mesh: `scaling` writes `scaling.{md,csv,png}`, `scaling-profile`, `scaling-edits`
+//! and `scaling-decay.{md,csv}`.
 
 mod baseline;
+mod edits;
 mod machine;
 mod profile;
 
@@ -127,6 +129,7 @@ fn measure(arguments: &Arguments) -> Result<()> {
         (figure.width, figure.height) = (900, 40 + 230 * rows);
         figure.render()?.save(&arguments.out.join("scaling.png"))?;
     }
+    local_edits(arguments)?;
     if arguments.profile >= LEAST {
         let name = family(Scheme::CatmullClark, arguments.profile);
         let mesh = noisy(&name)?;
@@ -139,6 +142,25 @@ fn measure(arguments: &Arguments) -> Result<()> {
         .common
         .remark(format_args!("tables and plot: {}", arguments.out.display()));
     Ok(())
+}
+
+/// Local edits on the meshes of all schemes and sizes, and the decay on the largest.
+fn local_edits(arguments: &Arguments) -> Result<()> {
+    let mut table = edits::edits_table(arguments.tol);
+    let mut largest = Vec::new();
+    for &scheme in &arguments.scheme.0 {
+        for (k, &n) in arguments.sizes.0.iter().enumerate() {
+            let name = family(scheme, n);
+            let mesh = noisy(&name)?;
+            let operator = edits::edits(&name, &mesh, scheme, arguments.tol, &mut table)?;
+            if k + 1 == arguments.sizes.0.len() {
+                largest.push((format!("{name}, {scheme}"), operator));
+            }
+        }
+    }
+    table.write(&arguments.out)?;
+    edits::decay_table(&largest).write(&arguments.out)?;
+    cli::print(&table.to_markdown())
 }
 
 /// The built-in mesh of about `n` vertices that suits the scheme.

@@ -1,6 +1,11 @@
 //! Bounds on the spectra of A and D⁻¹A that valences, face sizes and the diagonal alone prove.
 
+use rayon::prelude::*;
+
 use super::scheme::{Scheme, loop_beta, sqrt3_beta};
+
+/// Entries of one task.
+const CHUNK: usize = 8192;
 
 /// Proven bounds: every eigenvalue of A lies in `[lambda_min, lambda_max]`, every eigenvalue of D⁻¹A in
 /// `[jacobi_lambda_min, jacobi_lambda_max]`, D = diag A.
@@ -21,9 +26,15 @@ impl SpectralBounds {
     /// Gershgorin's bounds for a matrix with rows that sum to 1, no negative entry and this diagonal:
     /// `λ(A) ≥ min (2a_ii − 1)`, `λ(A) ≤ 1`, `2 − max 1/a_ii ≤ λ(D⁻¹A) ≤ max 1/a_ii`.
     pub fn gershgorin(diagonal: &[f64]) -> Self {
-        let jacobi_lambda_max = diagonal.iter().map(|a| 1.0 / a).fold(1.0, f64::max);
+        // Both are attained at the least entry.
+        let least = diagonal
+            .par_iter()
+            .with_min_len(CHUNK)
+            .copied()
+            .reduce(|| 1.0, f64::min);
+        let jacobi_lambda_max = 1.0 / least;
         SpectralBounds {
-            lambda_min: diagonal.iter().map(|a| 2.0 * a - 1.0).fold(1.0, f64::min),
+            lambda_min: 2.0 * least - 1.0,
             lambda_max: 1.0,
             jacobi_lambda_min: 2.0 - jacobi_lambda_max,
             jacobi_lambda_max,
@@ -39,24 +50,23 @@ impl SpectralBounds {
         diagonal: &[f64],
     ) -> Self {
         let mut bounds = Self::gershgorin(diagonal);
-        let (mut a, mut jacobi) = (f64::INFINITY, f64::INFINITY);
-        for (&n, a_ii) in valences.iter().zip(diagonal) {
-            let b = lambda_min_at(scheme, n as usize, triangles_only);
-            a = a.min(b);
-            jacobi = jacobi.min(b / a_ii);
-        }
+        let greatest = valences.iter().copied().max().unwrap_or(0) as usize;
+        let at: Vec<f64> = (0..=greatest)
+            .map(|n| lambda_min_at(scheme, n, triangles_only))
+            .collect();
+        let (a, jacobi) = valences
+            .par_iter()
+            .zip(diagonal)
+            .with_min_len(CHUNK)
+            .map(|(&n, a_ii)| (at[n as usize], at[n as usize] / a_ii))
+            .reduce(
+                || (f64::INFINITY, f64::INFINITY),
+                |(a, b), (c, d)| (a.min(c), b.min(d)),
+            );
         bounds.lambda_min = a.min(1.0);
         bounds.jacobi_lambda_min = jacobi.min(bounds.jacobi_lambda_max);
         bounds
     }
-}
-
-/// A lower bound of λ_min(A) on a closed mesh, from its valences: the least [`lambda_min_at`]. O(N).
-pub fn lambda_min_bound(scheme: Scheme, valences: &[u32], triangles_only: bool) -> f64 {
-    valences
-        .iter()
-        .map(|&n| lambda_min_at(scheme, n as usize, triangles_only))
-        .fold(1.0, f64::min)
 }
 
 /// What a vertex of valence n ≥ 3 allows λ_min(A) to be on a closed mesh.

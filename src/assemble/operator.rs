@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::bounds::{SpectralBounds, lambda_min_bound};
+use super::bounds::SpectralBounds;
 use super::scheme::{Masks, Scheme};
 use super::source::{Encode, Source, fill_rows};
 use super::stencil::{Code, Kind, LargeFaces, Listed, Neighbours, Point, Stencil, runs};
@@ -49,12 +49,11 @@ impl Operator {
             None => Neighbours::Far(source.fill::<u32>(&kinds, &offsets).unwrap_or_default()),
         };
         let double = source.rings();
-        let h: Vec<f64> = source
-            .valences
-            .par_iter()
-            .with_min_len(CHUNK)
-            .map(|&n| scheme.h(n as usize))
+        let greatest = source.valences.iter().copied().max().unwrap_or(0);
+        let by_valence: Vec<f64> = (0..=greatest)
+            .map(|n| scheme.h(n.max(1) as usize))
             .collect();
+        let h = gather(&by_valence, &source.valences);
         let (listed, large) = source.listed(&kinds, &h);
         let diagonal: Vec<f64> = (0..n)
             .into_par_iter()
@@ -64,11 +63,12 @@ impl Operator {
                 kind => double.own(kind, source.valences[i] as usize),
             })
             .collect();
-        let mut bounds = SpectralBounds::gershgorin(&diagonal);
-        if topology.is_closed() {
+        let bounds = if topology.is_closed() {
             let triangles = faces.uniform_size() == Some(3);
-            bounds.lambda_min = lambda_min_bound(scheme, &source.valences, triangles);
-        }
+            SpectralBounds::closed(scheme, &source.valences, triangles, &diagonal)
+        } else {
+            SpectralBounds::gershgorin(&diagonal)
+        };
         Ok(Operator {
             stencil: Stencil {
                 runs: runs(&kinds, &offsets),
