@@ -18,6 +18,7 @@ use limitlab::cli::{
     self, CommonFlags, Input, MeshFlags, Progress, StopFlags, constraints, number,
 };
 use limitlab::error::Error;
+use limitlab::interpolate::automatic::control_points;
 use limitlab::interpolate::halstead::{self, Energies, Fairness, Weights, fit};
 use limitlab::interpolate::lin_luo;
 use limitlab::interpolate::normals::Rotation;
@@ -26,7 +27,7 @@ use limitlab::interpolate::surface::{Request, Surface, surface};
 use limitlab::interpolate::zheng_cai::{self, Constraints, PhaseOne, Sweep};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, io};
-use limitlab::solvers::{Errors, Method, Outcome, Solution, Step, run_watched};
+use limitlab::solvers::{Errors, Method, Outcome, Report, Solution, Step, run_watched};
 use limitlab::subdivide::doo_sabin::{Rule, limit_positions};
 
 /// Computes the control mesh V with A V = P: the vertices P of the mesh become points of the limit surface. Unless
@@ -43,8 +44,8 @@ struct Arguments {
     output: PathBuf,
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
     /// pcg-ssor, pcg-ic0; two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); halstead (the fairest
-    /// surface, with --scheme catmull-clark: a control mesh two refinements down). auto is chebyshev with proven
-    /// bounds where there are any, else cg, and ldlt where that makes no progress
+    /// surface, with --scheme catmull-clark: a control mesh two refinements down). auto is chebyshev in mixed
+    /// precision without a stored matrix, cg where that makes no progress, and ldlt where neither does
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice)]
     method: Choice,
     /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
@@ -294,6 +295,24 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
     if arguments.method == Choice::TwoPhase {
         return two_phase(arguments, input, wishes);
     }
+    if input.mesh.diagonal() == 0.0 && arguments.stop.tol_absolute.is_none() {
+        return Err(Error::mesh(
+            &input.name,
+            "all points coincide, so no tolerance can be relative to their extent: give --tol-absolute",
+        ));
+    }
+    let mut chosen = match arguments.method {
+        Choice::Solver(method) => Some(method),
+        _ => None,
+    };
+    if arguments.method == Choice::Auto && wishes.interpolated.is_none() {
+        if let Some(control) = fastest(arguments, input)? {
+            return Ok(control);
+        }
+        // A factorization tells a nearly singular matrix, on which iterations may make no progress for long, from a
+        // singular one.
+        chosen = Some(Method::Ldlt);
+    }
     let start = Instant::now();
     let system = input.system()?;
     let part = match &wishes.interpolated {
@@ -302,10 +321,7 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
     };
     let solved = part.as_ref().map_or(&system, |p| &p.system);
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
-    let mut method = match arguments.method {
-        Choice::Solver(method) => method,
-        _ => automatic(solved),
-    };
+    let mut method = chosen.unwrap_or_else(|| automatic(solved));
     let start = Instant::now();
     let order = arguments
         .order
@@ -330,15 +346,12 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
     };
     let mut solution = solve(method)?;
     let outcome = solution.report.outcome;
-    if arguments.method == Choice::Auto && matches!(outcome, Outcome::Stagnated | Outcome::Diverged)
-    {
-        // A factorization tells a nearly singular matrix, on which iterations may make no progress for long, from a
-        // singular one.
+    if arguments.method == Choice::Auto && no_progress(outcome) {
         method = Method::Ldlt;
         solution = solve(method)?;
     }
     drop(progress);
-    check(input, method, &solution, stop.tolerance)?;
+    check(input, method, &solution.report, stop.tolerance)?;
     Ok(Control {
         method: method.name(),
         points: solution.points,
@@ -353,6 +366,41 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
             ..Seconds::default()
         },
     })
+}
+
+/// Whether an iteration ended without getting nearer.
+fn no_progress(outcome: Outcome) -> bool {
+    matches!(
+        outcome,
+        Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown
+    )
+}
+
+/// All vertices, by the library's choice of order, operator and method; `None` if that makes no progress.
+fn fastest(arguments: &Arguments, input: &Input) -> Result<Option<Control>> {
+    let stop = arguments.stop.stop(&input.mesh);
+    let progress = Progress::open("solving", arguments.common.quiet);
+    let (mesh, topology) = (&input.mesh, &input.topology);
+    let found = control_points(mesh, Some(topology), input.scheme, &stop)
+        .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
+    drop(progress);
+    if no_progress(found.report.outcome) {
+        return Ok(None);
+    }
+    check(input, found.method, &found.report, stop.tolerance)?;
+    Ok(Some(Control {
+        method: found.method.name(),
+        points: found.points,
+        iterations: found.report.iterations,
+        status: found.report.outcome.name(),
+        errors: found.report.last(),
+        tolerance: stop.tolerance,
+        seconds: Seconds {
+            assemble: input.check_seconds + found.curve_seconds + found.setup_seconds,
+            solve: found.solve_seconds,
+            ..Seconds::default()
+        },
+    }))
 }
 
 /// Zheng & Cai's phase one by its own rule.
@@ -615,8 +663,7 @@ fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished
 }
 
 /// A run that did not converge gives no control mesh.
-fn check(input: &Input, method: Method, solution: &Solution, tolerance: f64) -> Result<()> {
-    let report = &solution.report;
+fn check(input: &Input, method: Method, report: &Report, tolerance: f64) -> Result<()> {
     let what = match report.outcome {
         Outcome::Converged => return Ok(()),
         Outcome::Singular => {

@@ -156,7 +156,7 @@ pub fn eigenvalues_below(system: &LimitSystem, operator: Operator, sigma: f64) -
     let column = |j: usize| starts[j] as usize..starts[j + 1] as usize;
     let n = s.len();
     let below = (0..n).filter(|&j| factor[column(j).start] < 0.0).count();
-    let mut rng = ChaCha8Rng::seed_from_u64(0x4c44_4c);
+    let mut rng = ChaCha8Rng::seed_from_u64(0x4c_444c);
     let mut backward_error = 0.0f64;
     for _ in 0..3 {
         let x: Vec<f64> = (0..n).map(|_| rng.random_range(-1.0..1.0)).collect();
@@ -176,16 +176,23 @@ pub fn eigenvalues_below(system: &LimitSystem, operator: Operator, sigma: f64) -
                 z[rows[k] as usize] += factor[k] * y;
             }
         }
-        let (mut error, mut norm) = (0.0, 0.0);
+        let (mut error, mut norm) = (0.0f64, 0.0f64);
         for (k, &i) in place.iter().enumerate() {
             let i = i as usize;
             let exact = s.row_times_scalar(i, &x) - sigma * x[i];
             error += (z[k] - exact).powi(2);
             norm += x[i] * x[i];
         }
-        backward_error = backward_error.max((error / norm).sqrt());
+        let here = (error / norm).sqrt();
+        // Not f64::max, which would drop a NaN.
+        if here.is_nan() || here > backward_error {
+            backward_error = here;
+        }
+        if here.is_nan() {
+            break;
+        }
     }
-    if !(backward_error <= LARGEST_BACKWARD_ERROR) {
+    if backward_error.is_nan() || backward_error > LARGEST_BACKWARD_ERROR {
         return Err(unstable(sigma));
     }
     Ok(Inertia {

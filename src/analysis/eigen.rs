@@ -166,7 +166,7 @@ pub fn extreme(s: &Csr, request: &Request) -> Result<Eigenpairs> {
         )));
     }
     let mut iteration = Iteration::new(s, width);
-    let mut rng = ChaCha8Rng::seed_from_u64(0x626c_6f63_6b);
+    let mut rng = ChaCha8Rng::seed_from_u64(0x62_6c6f_636b);
     for x in &mut iteration.x {
         *x = rng.random_range(-1.0..1.0);
     }

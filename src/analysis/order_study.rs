@@ -1,12 +1,23 @@
 //! Does the vertex order of Gauss-Seidel and SOR matter (Zheng-Cai §5)? Rates and counts over many orders, and the
 //! greedy sweep that always relaxes the largest residual.
 //!
-//! Measured on tori, spheres and irregular meshes under all five schemes (see `order_study` tests and reports): the
-//! asymptotic rate of random orders scatters by a few hundredths and lies at or above that of file, breadth-first and
-//! space-filling orders; colour by colour is as good or better, the same whatever the file's order, and may run in
-//! parallel. No order changes the count by more than a few sweeps where the valence bound is positive. So: keep the
-//! file's order if it is coherent; else renumber along a space-filling curve, which also speeds up memory; take
-//! multicolour for parallel sweeps; a random order never pays.
+//! Measured with [`order_study`] (20 random orders) on `torus:24x24`, `quad-sphere:3`, `irregular-quad:500`,
+//! `tri-torus:24x24`, `icosphere:2`, `irregular-tri:500`, each with noise 0.1, under the schemes that fit, at ω = 1 and
+//! 1.1, to 1e-10 of the diagonal:
+//!
+//! - The order changes the count by up to a half, never by orders of magnitude: 27 to 34 sweeps of Gauss-Seidel on the
+//!   Catmull-Clark torus, 18 to 28 at ω = 1.1 (ρ from 0.34 to 0.52).
+//! - Orders that advance as a front (breadth first, reverse Cuthill-McKee, the row by row file order of a grid) take the
+//!   most sweeps on regular meshes; a small ρ does not help them (breadth first on that torus: 0.34, yet 27 sweeps), as
+//!   the error is first carried along the front: the error matrix is far from normal.
+//! - Colour by colour is the least or within three sweeps of it, and may run in parallel. A file order that comes from
+//!   subdivision (old vertices, then edges, then faces) acts like one and is as good or a little better.
+//! - Random orders spread by at most three sweeps and are about as good as colour by colour, but on quads with
+//!   Catmull-Clark.
+//! - Largest residual first, at ω = 1, takes from 4 % more to 20 % fewer updates than the best of the orders (7.2 N
+//!   against 9 N for Zheng-Cai), and each costs a heap operation for every neighbour.
+//!
+//! So: multicolour, unless memory order decides the time of a sweep; then a space-filling order within it.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;

@@ -115,7 +115,7 @@ impl Singularity {
         }
         for here in &mut verdict.singular {
             here.unreachable /= here.vertices as f64;
-            // A sum of n numbers has an error of n ε, its mean of ε, times their size; the factor is for luck's sake.
+            // The mean of n numbers by a plain sum: rounding errors of a small multiple of ε times their size.
             let rounding = 64.0 * f64::EPSILON * largest;
             verdict.excited |= here.unreachable.abs().max_element() > rounding;
         }

@@ -1,5 +1,10 @@
 //! Spectrum against valence: what one extraordinary vertex in a regular surrounding does to the spectrum, and which
 //! vertices the slow modes live on.
+//!
+//! What it shows: the slow modes sit on vertices of *low* valence. Under Loop λ_min is 0.227 next to valence 3 and
+//! 0.238 for the valences 6 to 30 tried (the modes of the valence 4 vertices that the mesh needs elsewhere); under
+//! Catmull-Clark it rises with the valence of the poles and its mode peaks on the vertices of valence 3. A vertex of
+//! high valence adds nothing at the slow end of these meshes.
 
 use super::dense;
 use super::eigen::End;

@@ -10,10 +10,12 @@
 //! | [`lin_luo`] | Lin & Luo's unified schemes for curves and √3 surfaces |
 //! | [`halstead`] | fair interpolation as a sparse constrained least-squares problem; iterations watched by it |
 //! | [`surface`] | from a control mesh to the surface: levels, limit points, normals |
+//! | [`automatic`] | the control mesh by the fastest way: order, operator, mixed precision |
 //! | [`subset`] | some vertices only, for every scheme and solver |
 //!
 //! This room builds on meshes, subdivision, assembly, solvers and analysis, and knows no plotting.
 
+pub mod automatic;
 pub mod halstead;
 pub mod lin_luo;
 pub mod nasri;

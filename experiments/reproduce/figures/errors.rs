@@ -6,11 +6,11 @@ use limitlab::Result;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::{LimitSystem, Scheme};
 use limitlab::error::Error;
-use limitlab::mesh::{Topology, builtin};
+use limitlab::mesh::builtin;
 use limitlab::report::{ColourScale, Picture, Surface};
 use limitlab::solvers::{Setup, System};
 
-use super::{Album, FINE_EDGE, Line, control, sheet, view};
+use super::{Album, FINE_EDGE, Line, control, plain, power, sheet, view};
 use crate::context::Subject;
 
 /// Iterates of the maps.
@@ -21,7 +21,7 @@ pub fn maps(album: &mut Album) -> Result<()> {
     let subject = album.subject("closed/psb_m104_horse_233v.off", "irregular-tri:233")?;
     let system = subject.system(Scheme::Loop)?;
     let size = subject.mesh.diagonal();
-    let scale = ColourScale::logarithmic("error / L", (1e-5, 1e-1));
+    let scale = ColourScale::logarithmic("error / L", (1e-6, 1e-1));
     let view = view(DVec3::Y, 30.0, 12.0);
     let mut panels = Vec::new();
     let mut last = 0.0;
@@ -36,8 +36,8 @@ pub fn maps(album: &mut Album) -> Result<()> {
         let surface = Surface::smooth(subject.mesh.clone())
             .scalars(errors, scale.clone())
             .edges(FINE_EDGE);
-        let mut picture = Picture::new(format!("{k} updates: at most {:.1e}", error / size), view)
-            .surface(surface);
+        let mut picture =
+            Picture::new(format!("k = {k}: {}", power(error / size)), view).surface(surface);
         if i % 3 == 2 {
             picture = picture.colour_bar(scale.clone());
         }
@@ -51,38 +51,36 @@ pub fn maps(album: &mut Album) -> Result<()> {
         iterations: SHOWN.last().copied(),
         error: Some(last),
     };
-    album.add(&line, &sheet("", 3, (135, 140), panels))
+    album.add(&line, &sheet(3, (115, 112), panels))
 }
 
 /// The eigenvectors of Catmull-Clark's matrix that PIA is slowest to remove.
 pub fn slow_modes(album: &mut Album) -> Result<()> {
-    let plain = |name: &str| -> Result<Subject> {
-        let mesh = builtin::builtin(name)?;
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        Ok(Subject {
-            name: name.to_owned(),
-            mesh,
-            topology,
-        })
-    };
+    let plain = |name: &str| Ok::<Subject, Error>(plain(name, builtin::builtin(name)?));
     let mut subjects = vec![
         plain("truncated-octahedron")?,
         plain("prism:17")?,
         plain("torus:24x12")?,
     ];
     subjects.push(album.subject("closed/spot_188v_poly.off", "irregular-quad:226")?);
-    let scale = ColourScale::signed("eigenvector / its largest entry", 1.0);
+    let scale = ColourScale::signed("eigenvector / largest", 1.0);
     let mut panels = Vec::new();
     for (i, subject) in subjects.iter().enumerate() {
         let system = subject.system(Scheme::CatmullClark)?;
         let (lambda, mode) = slowest(&system, &subject.name)?;
         let view = view(DVec3::Y, 30.0, 25.0);
-        let caption = format!("{}: λ = {}", subject.name, significant(lambda));
+        // Where the mode is; elsewhere there is nothing to see.
+        let framed: Vec<DVec3> = (subject.mesh.positions.iter().zip(&mode))
+            .filter(|(_, x)| x.abs() > 0.01)
+            .map(|(&p, _)| p)
+            .collect();
+        let caption = format!("λ = {}", significant(lambda));
         let mut picture = Picture::new(caption, view).surface(
             Surface::flat(subject.mesh.clone())
                 .scalars(mode, scale.clone())
                 .edges(FINE_EDGE),
         );
+        picture.framed = Some(framed);
         if i % 2 == 1 {
             picture = picture.colour_bar(scale.clone());
         }
@@ -90,13 +88,13 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
     }
     let line = Line {
         name: "slow-modes",
-        shows: "Catmull-Clark: the eigenvector of the least eigenvalue of A on four meshes; the truncated \
-                octahedron's matrix is singular",
+        shows: "Catmull-Clark: the eigenvector of the least eigenvalue of A on the truncated octahedron (whose matrix \
+                is singular), a 17-sided prism, a 24×12 torus and this mesh, where it is not zero",
         subject: &subjects[3],
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet("", 2, (160, 140), panels))
+    album.add(&line, &sheet(2, (140, 122), panels))
 }
 
 /// Steps of the power iteration; it ends before where it has converged.
@@ -151,6 +149,6 @@ fn significant(x: f64) -> String {
     if x.abs() < 1e-9 {
         "0".into()
     } else {
-        format!("{x:.3}")
+        format!("{x:.4}")
     }
 }

@@ -67,7 +67,7 @@ const PRINTED: [Printed; 5] = [
         azimuth: 20.0,
         elevation: 12.0,
         shown: 1.0,
-        size: (190, 190),
+        size: (180, 190),
     },
     Printed {
         name: "pia-6-boy",
@@ -80,7 +80,7 @@ const PRINTED: [Printed; 5] = [
         azimuth: 60.0,
         elevation: 12.0,
         shown: 0.22,
-        size: (190, 190),
+        size: (165, 160),
     },
     Printed {
         name: "pia-7-mushroom",
@@ -149,7 +149,7 @@ pub fn pia(album: &mut Album) -> Result<()> {
             iterations: Some(printed.updates),
             error: Some(error),
         };
-        album.add(&line, &sheet("", 2, printed.size, panels))?;
+        album.add(&line, &sheet(2, printed.size, panels))?;
     }
     Ok(())
 }
@@ -173,7 +173,7 @@ pub fn thall_series(album: &mut Album) -> Result<()> {
     for &k in shown {
         let (cage_mesh, error) = control(&subject, &system, Setup::THALL, k);
         last = error;
-        let caption = format!("{k} iterations: error {:.2} %", 100.0 * error / size);
+        let caption = format!("k = {k}: error {:.2} %", 100.0 * error / size);
         let picture = Picture::new(caption, view)
             .surface(limit_surface(Refinement::CatmullClark, &cage_mesh)?)
             .points(Points {
@@ -191,5 +191,5 @@ pub fn thall_series(album: &mut Album) -> Result<()> {
         iterations: shown.last().copied(),
         error: Some(last),
     };
-    album.add(&line, &sheet("", 3, (130, 137), panels))
+    album.add(&line, &sheet(3, (115, 125), panels))
 }

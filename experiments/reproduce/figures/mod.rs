@@ -6,6 +6,7 @@
 mod doo_sabin;
 mod errors;
 mod limits;
+mod normals;
 mod sqrt3;
 
 use limitlab::Result;
@@ -41,11 +42,15 @@ fn run(context: &mut Context) -> Result<()> {
     limits::thall_series(&mut album)?;
     if !album.context.quick {
         limits::pia(&mut album)?;
+        normals::bones(&mut album)?;
+        normals::end_cap(&mut album)?;
         errors::maps(&mut album)?;
         errors::slow_modes(&mut album)?;
         doo_sabin::approximation(&mut album)?;
         doo_sabin::against_nasri(&mut album)?;
         doo_sabin::large(&mut album)?;
+        doo_sabin::with_normals(&mut album)?;
+        doo_sabin::with_handles(&mut album)?;
         sqrt3::against_butterfly(&mut album)?;
         sqrt3::bunny(&mut album)?;
         sqrt3::parameters(&mut album)?;
@@ -120,6 +125,25 @@ impl<'a> Album<'a> {
     }
 }
 
+/// A mesh of our own.
+fn plain(name: &str, mesh: Mesh) -> Subject {
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    Subject {
+        name: name.to_owned(),
+        mesh,
+        topology,
+    }
+}
+
+/// `3.8×10⁻²`, as the report's texts are marked up.
+fn power(x: f64) -> String {
+    let text = format!("{x:.1e}");
+    match text.split_once('e') {
+        Some((digits, exponent)) => format!("{digits}×10^{{{}}}", exponent.replace('-', "−")),
+        None => text,
+    }
+}
+
 /// The control points after so many steps from V = P, and the largest error that they leave.
 fn control(
     subject: &Subject,
@@ -175,12 +199,7 @@ fn cage(mesh: &Mesh, colour: Colour) -> Surface {
 }
 
 /// Panels in rows of `columns`, each `width`×`height` points.
-fn sheet(
-    title: impl Into<String>,
-    columns: usize,
-    (width, height): (u32, u32),
-    panels: Vec<Picture>,
-) -> Figure {
+fn sheet(columns: usize, (width, height): (u32, u32), panels: Vec<Picture>) -> Figure {
     let rows = panels.len().div_ceil(columns);
     Figure {
         width: width * columns as u32,
@@ -188,7 +207,6 @@ fn sheet(
         columns,
         ..Figure::row(panels)
     }
-    .title(title)
 }
 
 /// The view of a model, whose axes differ.

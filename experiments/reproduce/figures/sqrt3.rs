@@ -54,7 +54,7 @@ pub fn against_butterfly(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet("", 3, (170, 165), panels))
+    album.add(&line, &sheet(3, (170, 165), panels))
 }
 
 /// Fig. 6: a bunny under the interpolatory √3 scheme, step by step.
@@ -76,7 +76,7 @@ pub fn bunny(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet("", 3, (150, 150), panels))
+    album.add(&line, &sheet(3, (135, 138), panels))
 }
 
 const MODEL: (&str, &str) = ("closed/tripod_24v.off", "star:5");
@@ -94,8 +94,8 @@ pub fn parameters(album: &mut Album) -> Result<()> {
             .push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
     }
     for (caption, chosen) in [
-        ("through every 4th vertex", every(4)),
-        ("through every 2nd vertex", every(2)),
+        ("every 4th vertex", every(4)),
+        ("every 2nd vertex", every(2)),
     ] {
         let mut alpha = all(0.0);
         for &v in &chosen {
@@ -131,7 +131,7 @@ pub fn parameters(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet("", 4, (115, 115), panels))
+    album.add(&line, &sheet(4, (115, 115), panels))
 }
 
 /// How smooth the surfaces are: reflection lines for α = 0, ½, 1.
@@ -151,5 +151,5 @@ pub fn reflections(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet("", 3, (170, 165), panels))
+    album.add(&line, &sheet(3, (170, 165), panels))
 }

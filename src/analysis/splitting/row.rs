@@ -45,7 +45,7 @@ pub const MAP_ROUNDS: usize = 3;
 /// Rows of a scheme for several valences, in parallel.
 ///
 /// # Errors
-/// [`Error::Unknown`] for a valence outside [`VALENCES`](super::VALENCES).
+/// [`Error::Unknown`](crate::Error::Unknown) for a valence outside [`VALENCES`](super::VALENCES).
 pub fn rows(scheme: LocalScheme, valences: &[usize]) -> Result<Vec<Row>> {
     valences.par_iter().map(|&n| row(scheme, n)).collect()
 }

@@ -181,15 +181,16 @@ fn line_gram(order: usize) -> [[f64; 4]; 4] {
 /// The two energies of a unit patch; control point (i, j) of u and v has number 4i + j.
 fn patch_grams() -> [Gram; 2] {
     let [g0, g1, g2] = [0, 1, 2].map(line_gram);
-    let mut grams = [[[0.0; 16]; 16]; 2];
-    for a in 0..16 {
-        for b in 0..16 {
-            let (i, j, k, l) = (a / 4, a % 4, b / 4, b % 4);
-            grams[0][a][b] = g2[i][k] * g0[j][l] + 2.0 * g1[i][k] * g1[j][l] + g0[i][k] * g2[j][l];
-            grams[1][a][b] = g1[i][k] * g0[j][l] + g0[i][k] * g1[j][l];
-        }
-    }
-    grams
+    let form = |entry: &dyn Fn([usize; 2], [usize; 2]) -> f64| -> Gram {
+        let place = |a: usize| [a / 4, a % 4];
+        std::array::from_fn(|a| std::array::from_fn(|b| entry(place(a), place(b))))
+    };
+    [
+        form(&|[i, j], [k, l]| {
+            g2[i][k] * g0[j][l] + 2.0 * g1[i][k] * g1[j][l] + g0[i][k] * g2[j][l]
+        }),
+        form(&|[i, j], [k, l]| g1[i][k] * g0[j][l] + g0[i][k] * g1[j][l]),
+    ]
 }
 
 /// For corner k of a face, the numbers of its vertex and of the three points around it outside the face: backwards

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::energy::{Energies, Fairness, Weights};
 use crate::assemble::Csr;
@@ -11,7 +12,7 @@ use crate::interpolate::normals::unit_normals;
 use crate::mesh::topology::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::solvers::Errors;
-use crate::solvers::direct::{Factorization, SparseLu};
+use crate::solvers::direct::{Cholesky, Factorization, Kind};
 use crate::solvers::system::Rows;
 use crate::subdivide::catmull_clark::{limit_mask, tangent_constant};
 use crate::{Error, Result};
@@ -26,6 +27,11 @@ pub struct Fit {
     pub errors: Errors,
 }
 
+/// ε and δ against weights of sum 1. Tuned: refinement gains three digits or more a step on all built-in meshes.
+const PRIMAL_SHIFT: f64 = 1e-8;
+const DUAL_SHIFT: f64 = 1e-6;
+/// Steps of refinement at most.
+const MOST_REFINEMENTS: usize = 20;
 /// A fit that misses its points by more than this part of their size has failed: sums of ring points round at 10⁻¹⁵,
 /// and the rest is room for the growth of the factorization.
 const MISS: f64 = 1e-8;
@@ -34,9 +40,11 @@ const MISS: f64 = 1e-8;
 /// at all original vertices, ℓ_v·x = P_v, and where a normal n is given under the tangent masks' (τ·x)·n = 0 for both
 /// tangents.
 ///
-/// Solved by the Karush-Kuhn-Tucker system [K Cᵀ; C 0], symmetric and indefinite, with faer's sparse LU and one step of
-/// refinement: with points alone one system of n + N unknowns for all three coordinates; with normals, which couple
-/// them, one of 3n + 3N + 2·(normals). A positive membrane weight makes it regular on every mesh.
+/// Solved by the Karush-Kuhn-Tucker system [K Cᵀ; C 0], symmetric and indefinite: with points alone one system of n + N
+/// unknowns for all three coordinates; with normals, which couple them, one of 3n + 3N + 2·(normals). A positive membrane
+/// weight makes it regular on every mesh. With small shifts, K + εI and −δI, it is quasi-definite and has an LDLᵀ
+/// without pivoting in any order (Vanderbei 1995), which faer makes under minimum degree; refinement with the unshifted
+/// matrix takes the shifts out again.
 ///
 /// # Errors
 /// Weights that are negative, not finite, or without a membrane part; a normal without direction; a factorization
@@ -255,36 +263,61 @@ impl Kkt {
         for &(j, w) in &terms {
             self.rows[j as usize].push((multiplier, w));
         }
+        terms.push((multiplier, 0.0));
         self.rows.push(terms);
     }
 
+    /// Solves by LDLᵀ of a nearby quasi-definite matrix and refinement with the true one.
     fn solve(self, right: Vec<DVec3>) -> Result<Vec<DVec3>> {
+        let unknowns = self.unknowns;
         let mut offsets = vec![0u32];
-        let (mut columns, mut values) = (Vec::new(), Vec::new());
-        for row in self.rows {
-            columns.extend(row.iter().map(|e| e.0));
-            values.extend(row.iter().map(|e| e.1));
+        let mut columns = Vec::new();
+        let (mut values, mut shifted) = (Vec::new(), Vec::new());
+        for (i, row) in self.rows.iter().enumerate() {
+            for &(j, value) in row {
+                let shift = match (j as usize == i, i < unknowns) {
+                    (false, _) => 0.0,
+                    (true, true) => PRIMAL_SHIFT,
+                    (true, false) => -DUAL_SHIFT,
+                };
+                columns.push(j);
+                values.push(value);
+                shifted.push(value + shift);
+            }
             let end = u32::try_from(columns.len()).map_err(|_| {
-                Error::Computation(
-                    "the mesh is too large for the fairness system: use another method".into(),
-                )
+                let what = "the mesh is too large for the fairness system: use another method";
+                Error::Computation(what.into())
             })?;
             offsets.push(end);
         }
-        let matrix = Csr::new(Arc::new(Pattern::new(offsets, columns)), values);
-        let mut lu = SparseLu::symmetric(&matrix).map_err(|f| {
-            Error::Computation(format!(
-                "the fairness system cannot be factored: {}",
-                f.detail
-            ))
+        let pattern = Arc::new(Pattern::new(offsets, columns));
+        let matrix = Csr::new(Arc::clone(&pattern), values);
+        let mut factors = Cholesky::new(&Csr::new(pattern, shifted), Kind::Ldlt).map_err(|f| {
+            let what = format!("the fairness system cannot be factored: {}", f.detail);
+            Error::Computation(what)
         })?;
-        let mut x = right.clone();
-        lu.solve(&[], &mut x);
-        let mut rest: Vec<DVec3> = (0..x.len())
-            .map(|i| right[i] - matrix.row_times(i, &x))
-            .collect();
-        lu.solve(&[], &mut rest);
-        x.iter_mut().zip(&rest).for_each(|(x, d)| *x += *d);
+        let ones = vec![1.0; matrix.len()];
+        let mut x = vec![DVec3::ZERO; matrix.len()];
+        let mut rest = right.clone();
+        let mut smallest = f64::INFINITY;
+        for _ in 0..MOST_REFINEMENTS {
+            factors.solve(&ones, &mut rest);
+            x.iter_mut().zip(&rest).for_each(|(x, d)| *x += *d);
+            let residual = |(i, r): (usize, &mut DVec3)| {
+                *r = right[i] - matrix.row_times(i, &x);
+                r.abs().max_element()
+            };
+            let largest = rest
+                .par_iter_mut()
+                .enumerate()
+                .map(residual)
+                .reduce(|| 0.0, f64::max);
+            // The residual falls by a constant factor until it is rounding, and then no more.
+            if largest.is_nan() || largest > 0.5 * smallest {
+                break;
+            }
+            smallest = largest;
+        }
         Ok(x)
     }
 }

@@ -17,7 +17,7 @@ const BAR_WIDTH: f64 = 10.0;
 const TICK_LENGTH: f64 = 3.0;
 const TICK_GAP: f64 = 3.0;
 /// Least distance from tick label to tick label.
-const TICK_PITCH: f64 = 24.0;
+const TICK_PITCH: f64 = 15.0;
 /// A bar longer than this tells no more.
 const LONGEST_BAR: f64 = 220.0;
 
@@ -56,8 +56,8 @@ impl Picture {
             draw_bar(canvas, frame, scale)?;
         }
         // A caption that is longer than its picture is wide is made smaller.
-        let room = frame.width() + 2.0 * GAP;
-        let size = TITLE_SIZE * (room / text_width(&self.caption, TITLE_SIZE)?.max(1.0)).min(1.0);
+        let size =
+            TITLE_SIZE * (frame.width() / text_width(&self.caption, TITLE_SIZE)?.max(1.0)).min(1.0);
         let place = (
             frame.centre().0,
             frame.top - figure::title_room(&self.caption) + 2.0 + TITLE_SIZE,

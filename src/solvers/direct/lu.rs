@@ -11,7 +11,7 @@ use glam::DVec3;
 
 use super::cholesky::faer_pattern;
 use super::{Factorization, failed};
-use crate::assemble::{Csr, LimitSystem};
+use crate::assemble::LimitSystem;
 use crate::solvers::iteration::{Failure, Outcome};
 
 /// A factored by faer, sequentially. The supernodal variant always: the simplicial one panics on a vanishing
@@ -30,6 +30,7 @@ impl SparseLu {
     /// [`Outcome::Singular`] if A is structurally singular, [`Outcome::Breakdown`] when memory or 32-bit indices
     /// do not suffice.
     pub fn new(system: &LimitSystem) -> Result<Self, Failure> {
+        let broken = |why: &dyn std::fmt::Debug| failed("LU", Outcome::Breakdown, why);
         // Column j of A holds h_i m_ij: row j of M, weighted by the column's H.
         let m = &system.m;
         let values: Vec<f64> = m
@@ -39,20 +40,6 @@ impl SparseLu {
             .zip(m.values())
             .map(|(&i, &m)| system.h[i as usize] * m)
             .collect();
-        Self::factor(m, &values)
-    }
-
-    /// Factors the symmetric, possibly indefinite matrix `m`.
-    ///
-    /// # Errors
-    /// As [`new`](Self::new).
-    pub fn symmetric(m: &Csr) -> Result<Self, Failure> {
-        Self::factor(m, m.values())
-    }
-
-    /// Factors the matrix whose column j has the pattern of row j of the structurally symmetric `m`.
-    fn factor(m: &Csr, values: &[f64]) -> Result<Self, Failure> {
-        let broken = |why: &dyn std::fmt::Debug| failed("LU", Outcome::Breakdown, why);
         let pattern = faer_pattern(m);
         let params = LuSymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
@@ -65,7 +52,7 @@ impl SparseLu {
         symbolic
             .factorize_numeric_lu(
                 &mut numeric,
-                SparseColMatRef::new(pattern, values),
+                SparseColMatRef::new(pattern, &values),
                 Par::Seq,
                 MemStack::new(&mut memory),
                 Default::default(),
