@@ -30,6 +30,12 @@ pub fn krylov(scale: f64) -> f64 {
 /// Rates fitted to histories of tens to hundreds of iterations.
 pub const RATE: f64 = 5e-3;
 
+/// Solutions and residuals of runs stopped at 10⁻¹⁰ of the diagonal: far above that, far below what is told apart.
+pub const SOLVED: f64 = 1e-8;
+
+/// Ends of spectra by Lanczos.
+pub const ESTIMATE: f64 = 1e-6;
+
 /// How far V may be from the solution if max_i ‖e_i‖ ≤ `error`. With e = A d and A similar to H^½MH^½, ‖H^-½d‖₂ ≤
 /// ‖H^-½e‖₂/λ_min, so max_i ‖d_i‖ ≤ √(h_max/h_min)·√N·error/λ_min. `scale` is the size of the points, whose
 /// rounding counts as an error.

@@ -100,18 +100,21 @@ fn the_noisy_torus_is_best_at_four_fifths_and_diverges_where_an_excited_mode_gro
         .collect();
     let sweep = torus_sweep(&grid);
     let thresholds = sweep.thresholds[0];
-    assert!((thresholds.matrix.critical_omega() - 8.0 / 9.0).abs() < 1e-9);
-    assert!((thresholds.matrix.optimal_omega() - 0.8).abs() < 1e-6);
+    assert!((thresholds.matrix.critical_omega() - 8.0 / 9.0).abs() < tol::ESTIMATE);
+    assert!((thresholds.matrix.optimal_omega() - 0.8).abs() < tol::ESTIMATE);
     let data = thresholds.data.unwrap();
     assert!(
-        (data.critical_omega() - threshold).abs() < 1e-6,
+        (data.critical_omega() - threshold).abs() < tol::ESTIMATE,
         "{}",
         data.critical_omega()
     );
     for row in &sweep.rows {
         let omega = row.omega;
         let radius = (1.0 - 0.25 * omega).max((1.0 - 2.25 * omega).abs());
-        assert!((row.predicted_rho - radius).abs() < 1e-6, "ω = {omega}");
+        assert!(
+            (row.predicted_rho - radius).abs() < tol::ESTIMATE,
+            "ω = {omega}"
+        );
         let expected = if omega < threshold {
             Outcome::Converged
         } else {

@@ -5,6 +5,8 @@ use limitlab::analysis::dense;
 use limitlab::assemble::LimitSystem;
 use limitlab::solvers::{Outcome, Setup, Solution, Stop, run};
 
+use crate::common::tol;
+
 pub const DIRECT: [(&str, Setup<'static>); 4] = [
     ("lu", Setup::Lu),
     ("cholesky", Setup::Cholesky),
@@ -97,28 +99,30 @@ pub fn checked(system: &LimitSystem, points: &[DVec3], setup: Setup, stop: &Stop
     );
     assert_eq!(solution.points.len(), points.len());
     assert!(report.iterations <= stop.max_iterations, "{setup:?}");
-    let start = residual(system, points, points);
-    let first = report.history[0].max;
+    // The same operations in the same order: the same number.
+    let same = |a: f64, b: f64| a == b || a.is_nan() && b.is_nan();
+    let (start, first) = (residual(system, points, points), report.history[0].max);
     assert!(
-        first == start
-            || (first - start).abs() <= 1e-12 * start
-            || start.is_nan() && first.is_nan()
+        same(first, start),
+        "{setup:?}: {first:e} at the start is {start:e}"
     );
     for errors in &report.history {
+        let limit = errors.max * (1.0 + tol::rounding(points.len()));
         assert!(
-            !(errors.mean > errors.max * (1.0 + 1e-12)),
+            errors.mean <= limit || errors.mean.is_nan(),
             "{setup:?}: mean above maximum"
         );
     }
+    let (truth, last) = (
+        residual(system, points, &solution.points),
+        report.last().max,
+    );
     if report.outcome == Outcome::Converged {
-        let truth = residual(system, points, &solution.points);
-        let allowed =
-            stop.tolerance + 1e-15 * points.iter().fold(0.0, |m: f64, p| m.max(p.length()));
         assert!(
-            truth <= allowed,
-            "{setup:?} claims {} but has {truth:e}",
-            report.last().max
+            same(last, truth),
+            "{setup:?} claims {last:e} but has {truth:e}"
         );
+        assert!(truth <= stop.tolerance);
     }
     solution
 }

@@ -8,6 +8,7 @@ use limitlab::solvers::{Outcome, Setup, Stop};
 
 use crate::common::collection::collection;
 use crate::common::meshes::*;
+use crate::common::tol;
 use crate::setups::*;
 
 fn stop(mesh: &Mesh) -> Stop {
@@ -83,7 +84,7 @@ fn direct_methods_call_singular_what_is_singular_whatever_the_data() {
         assert!(colour.iter().any(|c| *c != 0.0), "{name} has a kernel");
         let image = |i: usize| system.a.row_times_scalar(i, &colour);
         assert!(
-            (0..mesh.len()).all(|i| image(i).abs() < 1e-15),
+            (0..mesh.len()).all(|i| image(i).abs() <= tol::rounding(32)),
             "{name}: A colour = 0"
         );
         let consistent = product(&system, &random_points(mesh.len(), 4));
@@ -154,7 +155,7 @@ fn pia_converges_on_the_cube_s_own_points_and_stagnates_on_perturbed_ones() {
         assert_eq!(solution.report.outcome, Outcome::Converged);
         // A corner's limit is at half its control point: the control cube is twice as large.
         let twice: Vec<DVec3> = cube.positions.iter().map(|p| 2.0 * *p).collect();
-        assert!(distance(&solution.points, &twice) < 1e-8);
+        assert!(distance(&solution.points, &twice) < tol::SOLVED);
         for seed in 1..6 {
             let mut perturbed = cube.clone();
             add_noise(&mut perturbed, 0.1, seed);
@@ -169,7 +170,7 @@ fn pia_converges_on_the_cube_s_own_points_and_stagnates_on_perturbed_ones() {
                 .map(|(p, c)| *p * *c)
                 .sum::<DVec3>()
                 / 8.0;
-            assert!((report.last().max - part.length()).abs() < 1e-9 * part.length().max(1e-3));
+            assert!((report.last().max - part.length()).abs() < tol::SOLVED);
         }
     }
 }
