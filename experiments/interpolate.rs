@@ -14,7 +14,9 @@ use limitlab::Result;
 use limitlab::analysis::comparison::{automatic, standard_setup};
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::Scheme;
-use limitlab::cli::{self, CommonFlags, Input, MeshFlags, Progress, StopFlags, constraints, number};
+use limitlab::cli::{
+    self, CommonFlags, Input, MeshFlags, Progress, StopFlags, constraints, number,
+};
 use limitlab::error::Error;
 use limitlab::interpolate::lin_luo;
 use limitlab::interpolate::normals::Rotation;
@@ -279,8 +281,12 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
         _ => automatic(solved),
     };
     let start = Instant::now();
-    let order = arguments.order.order(&input.mesh, &input.topology.incidence);
-    let order = part.as_ref().map_or_else(|| order.clone(), |p| p.order(&order));
+    let order = arguments
+        .order
+        .order(&input.mesh, &input.topology.incidence);
+    let order = part
+        .as_ref()
+        .map_or_else(|| order.clone(), |p| p.order(&order));
     let setup = standard_setup(solved, method, Some(&order), &|| spectrum(solved))?;
     let stop = arguments.stop.stop(&input.mesh);
     let progress = Progress::open("solving", arguments.common.quiet);
@@ -315,7 +321,9 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
 /// Zheng & Cai's phase one by its own rule.
 fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
     let start = Instant::now();
-    let order = arguments.order.order(&input.mesh, &input.topology.incidence);
+    let order = arguments
+        .order
+        .order(&input.mesh, &input.topology.incidence);
     let phase = PhaseOne {
         sweep: Sweep::GaussSeidel(Some(&order)),
         max_iterations: arguments.shape.ite_max,
@@ -329,7 +337,11 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
         errors: auxiliary_errors(input, marks, &found.mesh)?,
         points: found.mesh.positions,
         iterations: found.updates.len(),
-        status: if found.passed { "converged" } else { "max-iterations" },
+        status: if found.passed {
+            "converged"
+        } else {
+            "max-iterations"
+        },
         tolerance: arguments.shape.eps * mesh.diagonal(),
         seconds: Seconds {
             assemble: input.check_seconds,
@@ -409,7 +421,10 @@ fn unified(arguments: &Arguments, input: &Input, alpha: &[f64]) -> Result<Finish
         surface: Surface::plain(mesh),
         iterations: 0,
         status: "converged",
-        errors: Errors { max: 0.0, mean: 0.0 },
+        errors: Errors {
+            max: 0.0,
+            mean: 0.0,
+        },
         tolerance: 0.0,
         seconds: Seconds {
             assemble: input.check_seconds,
@@ -422,7 +437,13 @@ fn unified(arguments: &Arguments, input: &Input, alpha: &[f64]) -> Result<Finish
 /// Nothing that is no number reaches a file.
 fn require_finite(input: &Input, surface: &Surface) -> Result<()> {
     let normals = surface.normals.iter().flatten();
-    match surface.mesh.positions.iter().chain(normals).position(|p| !p.is_finite()) {
+    match surface
+        .mesh
+        .positions
+        .iter()
+        .chain(normals)
+        .position(|p| !p.is_finite())
+    {
         None => Ok(()),
         Some(v) => Err(Error::mesh(
             &input.name,
@@ -435,7 +456,12 @@ fn require_finite(input: &Input, surface: &Surface) -> Result<()> {
 }
 
 fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished) -> Result<()> {
-    let Finished { surface, errors, seconds, .. } = result;
+    let Finished {
+        surface,
+        errors,
+        seconds,
+        ..
+    } = result;
     let common = &arguments.common;
     if !surface.not_flattened.is_empty() {
         common.remark(format_args!(
@@ -445,7 +471,12 @@ fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished
             surface.not_flattened[0]
         ));
     }
-    let without = surface.normals.iter().flatten().filter(|n| **n == DVec3::ZERO).count();
+    let without = surface
+        .normals
+        .iter()
+        .flatten()
+        .filter(|n| **n == DVec3::ZERO)
+        .count();
     if without > 0 {
         common.remark(format_args!(
             "{}: the surface has no normal at {without} vertices; (0, 0, 0) is written",

@@ -90,11 +90,7 @@ pub fn numbers(text: &str, vertices: usize, otherwise: f64) -> Result<Vec<f64>> 
 }
 
 /// The lines of a text file as a vertex and K numbers each.
-fn rows<const K: usize>(
-    path: &Path,
-    vertices: usize,
-    form: &str,
-) -> Result<Vec<Option<[f64; K]>>> {
+fn rows<const K: usize>(path: &Path, vertices: usize, form: &str) -> Result<Vec<Option<[f64; K]>>> {
     let mut rows = vec![None; vertices];
     for (number, line) in read(path)?.lines().enumerate() {
         let refuse = |what: String| Err(Error::parse(path, Some(number + 1), what));
@@ -114,7 +110,9 @@ fn rows<const K: usize>(
             ));
         };
         if place.replace(row).is_some_and(|before| before != row) {
-            return refuse(format!("vertex {vertex} is given twice, and differently: keep one"));
+            return refuse(format!(
+                "vertex {vertex} is given twice, and differently: keep one"
+            ));
         }
     }
     Ok(rows)
@@ -159,12 +157,18 @@ mod tests {
     fn rows_are_read_once_a_vertex_and_errors_name_the_line() {
         let good = file("2 0 0 1 # up\n\n0 1e-3 2 -3\n2 0 0 1\n");
         let found = normals(good.path(), 3).unwrap();
-        assert_eq!(found, [Some(DVec3::new(1e-3, 2.0, -3.0)), None, Some(DVec3::Z)]);
+        assert_eq!(
+            found,
+            [Some(DVec3::new(1e-3, 2.0, -3.0)), None, Some(DVec3::Z)]
+        );
         for (text, what) in [
             ("0 1 2\n", ", line 1: `0 1 2` is not of the form"),
             ("0 1 2 3 4\n", ", line 1: `0 1 2 3 4` is not of the form"),
             ("\n-1 1 2 3\n", ", line 2: `-1 1 2 3` is not of the form"),
-            ("0 0 0 1\n3 1 2 3\n", ", line 2: vertex 3 is not in the mesh"),
+            (
+                "0 0 0 1\n3 1 2 3\n",
+                ", line 2: vertex 3 is not in the mesh",
+            ),
             ("1 0 0 1\n1 0 0 2\n", ", line 2: vertex 1 is given twice"),
         ] {
             let error = normals(file(text).path(), 3).unwrap_err().to_string();
@@ -173,7 +177,10 @@ mod tests {
         assert!(normals(Path::new("/nowhere/normals.txt"), 3).is_err());
         assert_eq!(numbers("0.5", 3, 1.0).unwrap(), [0.5; 3]);
         let few = file("1 2.5\n");
-        assert_eq!(numbers(few.path().to_str().unwrap(), 3, 1.0).unwrap(), [1.0, 2.5, 1.0]);
+        assert_eq!(
+            numbers(few.path().to_str().unwrap(), 3, 1.0).unwrap(),
+            [1.0, 2.5, 1.0]
+        );
     }
 
     #[test]
@@ -188,10 +195,20 @@ mod tests {
             let found = normals(&path, 4).unwrap();
             assert_eq!(found[0], Some(given[0]));
             assert_eq!(found[2], None);
-            assert!(normals(&path, 5).unwrap_err().to_string().contains("4 normals for a mesh of 5"));
+            assert!(
+                normals(&path, 5)
+                    .unwrap_err()
+                    .to_string()
+                    .contains("4 normals for a mesh of 5")
+            );
         }
         let path = folder.path().join("a.obj");
         io::write(&path, &mesh, Some(&given)).unwrap();
-        assert!(normals(&path, 4).unwrap_err().to_string().contains("holds no normals"));
+        assert!(
+            normals(&path, 4)
+                .unwrap_err()
+                .to_string()
+                .contains("holds no normals")
+        );
     }
 }

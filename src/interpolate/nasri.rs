@@ -30,8 +30,10 @@ pub fn control_points(
     let points = &mesh.positions;
     Ok(match interpolated {
         None => run(&system, points, setup, stop),
-        Some(marks) => Restriction::new(&system, marks)?.solve(&system, points, setup, stop, &mut |_| {
-            ControlFlow::Continue(())
-        }),
+        Some(marks) => {
+            Restriction::new(&system, marks)?.solve(&system, points, setup, stop, &mut |_| {
+                ControlFlow::Continue(())
+            })
+        }
     })
 }

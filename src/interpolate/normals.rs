@@ -61,7 +61,10 @@ pub fn unit_normals(normals: &[Option<DVec3>]) -> Result<Vec<Option<DVec3>>> {
             Some(unit) if n.is_finite() => Ok(Some(unit)),
             _ => Err(Error::mesh(
                 "normals",
-                format!("vertex {v}: ({}, {}, {}) has no direction: give a finite vector other than zero, or none", n.x, n.y, n.z),
+                format!(
+                    "vertex {v}: ({}, {}, {}) has no direction: give a finite vector other than zero, or none",
+                    n.x, n.y, n.z
+                ),
             )),
         },
     };
@@ -114,7 +117,13 @@ pub fn rotate_rings(
                 continue;
             };
             let turn = part * (angle(from, target) - rotation.tolerance);
-            rotate_ring(&mut mesh, &topology, v, limits[v], DQuat::from_axis_angle(axis, turn));
+            rotate_ring(
+                &mut mesh,
+                &topology,
+                v,
+                limits[v],
+                DQuat::from_axis_angle(axis, turn),
+            );
         }
     }
     Ok(Rotated {
@@ -136,14 +145,18 @@ fn deviating(
         if found[v] == DVec3::ZERO {
             return Err(Error::mesh(
                 "normals",
-                format!("vertex {v}: the surface has no normal there (its ring lies in a line or a point): give none, or move its neighbours"),
+                format!(
+                    "vertex {v}: the surface has no normal there (its ring lies in a line or a point): give none, or move its neighbours"
+                ),
             ));
         }
         let off = angle(found[v], target);
         if off > OPPOSITE {
             return Err(Error::mesh(
                 "normals",
-                format!("vertex {v}: the given normal is opposite to the surface's: turn it round, or all faces"),
+                format!(
+                    "vertex {v}: the given normal is opposite to the surface's: turn it round, or all faces"
+                ),
             ));
         }
         if off > rotation.threshold.max(rotation.tolerance) {

@@ -7,8 +7,8 @@ use super::normals::{Rotation, rotate_rings};
 use super::zheng_cai::{Constraints, FirstRefinement};
 use crate::assemble::Scheme;
 use crate::mesh::{Mesh, Topology};
-use crate::subdivide::doo_sabin::{self, Rule};
 use crate::subdivide::Refinement;
+use crate::subdivide::doo_sabin::{self, Rule};
 use crate::{Error, Result};
 
 /// What is wanted of the surface.
@@ -153,7 +153,11 @@ fn primal(control: Mesh, scheme: Refinement, request: &Request) -> Result<Surfac
     let Some(normals) = given.normals else {
         // A control mesh that stays is not copied: it may be as large as memory allows.
         let stays = request.levels == 0;
-        return Ok(Surface::plain(if stays { control } else { scheme.refine_n(&control, request.levels)? }));
+        return Ok(Surface::plain(if stays {
+            control
+        } else {
+            scheme.refine_n(&control, request.levels)?
+        }));
     };
     let needed = request.rotation.levels + 1;
     if request.levels < needed {

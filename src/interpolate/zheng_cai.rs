@@ -77,9 +77,8 @@ impl Constraints<'_> {
         if !(0..vertices).any(|v| self.is_interpolated(v)) {
             return Err(nothing());
         }
-        let refuse = |v: usize, what: String| {
-            Err(Error::mesh("constraints", format!("vertex {v}: {what}")))
-        };
+        let refuse =
+            |v: usize, what: String| Err(Error::mesh("constraints", format!("vertex {v}: {what}")));
         for v in 0..vertices {
             let free = !self.is_interpolated(v);
             if free && self.normals.is_some_and(|n| n[v].is_some()) {
@@ -89,7 +88,12 @@ impl Constraints<'_> {
                 continue;
             };
             if !(s > 0.0 && s.is_finite()) {
-                return refuse(v, format!("the shape handle {s} is no positive number: 1 leaves the shape as it is"));
+                return refuse(
+                    v,
+                    format!(
+                        "the shape handle {s} is no positive number: 1 leaves the shape as it is"
+                    ),
+                );
             }
             if free && s != 1.0 {
                 return refuse(v, "a shape handle is given where no point is interpolated: interpolate the vertex, or leave the handle at 1".into());

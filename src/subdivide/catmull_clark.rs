@@ -7,7 +7,8 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::star::{
-    Circle, Tangents, centroid, edge_numbers, for_each_star, require_closed, require_room, sides, twin,
+    Circle, Tangents, centroid, edge_numbers, for_each_star, require_closed, require_room, sides,
+    twin,
 };
 use crate::Result;
 use crate::mesh::topology::{next_in, prev_in};
@@ -101,7 +102,12 @@ fn split(mesh: &Mesh, topology: &Topology, edge: &[u32]) -> Faces {
         let range = mesh.faces.range(f);
         let mut entering = edge[range.end - 1];
         for (&v, &leaving) in corners[range.clone()].iter().zip(&edge[range]) {
-            quads.extend([v, vertices + leaving, first_face + f as u32, vertices + entering]);
+            quads.extend([
+                v,
+                vertices + leaving,
+                first_face + f as u32,
+                vertices + entering,
+            ]);
             entering = leaving;
         }
     }

@@ -152,7 +152,8 @@ impl Refinement {
             }
             Refinement::Sqrt3 => sqrt3::limit_normals(mesh, topology),
             Refinement::Butterfly => Err(Error::Unknown(
-                "butterfly has no tangent masks here: use loop, sqrt3, catmull-clark or doo-sabin".into(),
+                "butterfly has no tangent masks here: use loop, sqrt3, catmull-clark or doo-sabin"
+                    .into(),
             )),
         }
     }

@@ -56,7 +56,11 @@ fn local_masks_are_jacobi_with_one_half_iterate_by_iterate() {
 /// not, except on quads.
 #[test]
 fn the_inverse_mask_gives_the_wanted_limit_of_one_vertex() {
-    for (name, quads) in [("torus:7x5", true), ("dodecahedron", false), ("irregular-poly:60", false)] {
+    for (name, quads) in [
+        ("torus:7x5", true),
+        ("dodecahedron", false),
+        ("irregular-poly:60", false),
+    ] {
         let mesh = noisy(name);
         let topology = topology(&mesh);
         for inverse in [Inverse::Exact, Inverse::Regular] {
@@ -118,14 +122,21 @@ fn medial_metrics_in_closed_form() {
     let center = DVec3::new(1.0, -2.0, 0.5);
     let normals: Vec<DVec3> = mesh.positions.iter().map(|p| p.normalize()).collect();
     let at = |radius: f64, shift: DVec3| -> Vec<DVec3> {
-        normals.iter().map(|n| center + shift + radius * *n).collect()
+        normals
+            .iter()
+            .map(|n| center + shift + radius * *n)
+            .collect()
     };
     let given = at(2.0, DVec3::ZERO);
     let involutes = Faces::from_lists([vec![0u32, 1], vec![2, 7, 5], vec![3]]);
     let atom = MedialAtom::fit((0..4).map(|v| (given[v], normals[v]))).unwrap();
     assert!((atom.radius - 2.0).abs() < ROUNDING && atom.position.distance(center) < ROUNDING);
     // A surface of another radius has the same centre; a moved one is off by shift over the given radius.
-    let same = medial_shifts(&involutes, (&at(1.7, DVec3::ZERO), &normals), (&given, &normals));
+    let same = medial_shifts(
+        &involutes,
+        (&at(1.7, DVec3::ZERO), &normals),
+        (&given, &normals),
+    );
     assert!(same[0].unwrap() < ROUNDING && same[1].unwrap() < ROUNDING && same[2].is_none());
     let shift = DVec3::new(0.3, 0.0, 0.4);
     let moved = medial_shifts(&involutes, (&at(2.0, shift), &normals), (&given, &normals));
@@ -139,7 +150,10 @@ fn normal_deviation_is_the_angle() {
     let turn = |angle: f64| DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), angle) * DVec3::Y;
     for wanted in [0.0, 1e-9, 0.3, 2.0, PI - 1e-9, PI] {
         let found = normal_deviations(&[turn(wanted)], &[DVec3::Y])[0];
-        assert!((found - wanted).abs() < 1e-15 + ROUNDING * wanted, "{wanted}");
+        assert!(
+            (found - wanted).abs() < 1e-15 + ROUNDING * wanted,
+            "{wanted}"
+        );
     }
     assert_eq!(normal_deviations(&[DVec3::ZERO], &[DVec3::Y]), [PI]);
 }
@@ -186,7 +200,10 @@ fn turned_rings_have_the_given_normals_and_keep_the_limits() {
                 let found = scheme.limit_normals(&fine, &fine_topology).unwrap();
                 for (v, normal) in wanted.iter().enumerate() {
                     let expected = normal.map_or(untouched[v], |n| n.normalize());
-                    assert!(found[v].distance(expected) < ROUNDING, "{name} {scheme} {v}");
+                    assert!(
+                        found[v].distance(expected) < ROUNDING,
+                        "{name} {scheme} {v}"
+                    );
                 }
             }
         }
@@ -210,7 +227,10 @@ fn rings_turn_only_beyond_the_threshold_and_stop_at_the_tolerance() {
         let Some(normal) = normal.map(DVec3::normalize) else {
             continue;
         };
-        let (off, now) = (before[v].angle_between(normal), after[v].angle_between(normal));
+        let (off, now) = (
+            before[v].angle_between(normal),
+            after[v].angle_between(normal),
+        );
         if off > 0.4 {
             assert!((now - 0.1).abs() < 1e-7, "{v}: {off} {now}");
             turned += 1;
@@ -220,7 +240,10 @@ fn rings_turn_only_beyond_the_threshold_and_stop_at_the_tolerance() {
         }
     }
     assert_eq!(result.turned.len(), turned);
-    assert!(turned > 3 && left > 3, "the test sees both: {turned} {left}");
+    assert!(
+        turned > 3 && left > 3,
+        "the test sees both: {turned} {left}"
+    );
 }
 
 /// T15, by looking: after two refinements no vertex is in the faces of two original vertices; after one some are.
@@ -263,7 +286,12 @@ fn normals_without_sense_are_errors_that_name_the_vertex() {
     flat.positions.iter_mut().for_each(|p| *p = DVec3::X * p.x);
     let normals = vec![Some(DVec3::Z); mesh.len()];
     let result = rotate_rings(&flat, Refinement::Loop, &normals, Rotation::default());
-    assert!(result.unwrap_err().to_string().contains("vertex 0: the surface has no normal"));
+    assert!(
+        result
+            .unwrap_err()
+            .to_string()
+            .contains("vertex 0: the surface has no normal")
+    );
 }
 
 /// T17: values stay by the midpoint rule, creep by the scheme's own, and come back where they interpolate.
@@ -274,7 +302,8 @@ fn attributes_stay_creep_or_interpolate() {
         .map(|v| DVec3::new((v as f64).sin(), v as f64 / 60.0, (0.3 * v as f64).cos()))
         .collect();
     let topology = topology(&mesh);
-    let refine = |values: Vec<DVec3>, rule| refine_attributes(&mesh, &topology, values, rule).unwrap();
+    let refine =
+        |values: Vec<DVec3>, rule| refine_attributes(&mesh, &topology, values, rule).unwrap();
     let mid = refine(values.clone(), AttributeRule::Midpoint);
     assert_eq!(mid[..mesh.len()], values);
     let fine = catmull_clark::refine(&mesh, &topology).unwrap();

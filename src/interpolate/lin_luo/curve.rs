@@ -123,6 +123,13 @@ pub fn jump_norm(alpha: f64, steps: u32) -> f64 {
     }
     let stride = 1 << steps;
     (0..stride)
-        .map(|r| iterated.iter().skip(r).step_by(stride).map(|w| w.abs()).sum())
+        .map(|r| {
+            iterated
+                .iter()
+                .skip(r)
+                .step_by(stride)
+                .map(|w| w.abs())
+                .sum()
+        })
         .fold(0.0, f64::max)
 }

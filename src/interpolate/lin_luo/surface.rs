@@ -42,7 +42,9 @@ pub fn volume(mesh: &Mesh) -> f64 {
     let at = |v: u32| mesh.positions[v as usize] - origin;
     let fan = |face: &[u32]| -> f64 {
         let pairs = face.windows(2).skip(1);
-        pairs.map(|w| at(face[0]).dot(at(w[0]).cross(at(w[1])))).sum()
+        pairs
+            .map(|w| at(face[0]).dot(at(w[0]).cross(at(w[1]))))
+            .sum()
     };
     mesh.faces.iter().map(fan).sum::<f64>() / 6.0
 }
