@@ -13,6 +13,8 @@ use limitlab::output::create_dir;
 use limitlab::report::index::{self, Entry};
 use limitlab::report::{Figure, Table, compare};
 
+use crate::claims::Record;
+
 /// One table or figure.
 pub struct Item {
     /// As in `--only ID`, and the stem of its files.
@@ -31,6 +33,8 @@ pub struct Context {
     pub quick: bool,
     check: Option<PathBuf>,
     differences: Vec<String>,
+    /// The ledger of claims, once it is computed.
+    pub ledger: Vec<Record>,
 }
 
 /// A mesh with its name for the tables.
@@ -77,6 +81,7 @@ impl Context {
             quick,
             check: check.map(Path::to_path_buf),
             differences: Vec::new(),
+            ledger: Vec::new(),
         };
         create_dir(&context.folder())?;
         Ok(context)
@@ -192,9 +197,17 @@ impl Context {
         table.notes.insert(0, self.note_on_meshes());
         table.write(&self.folder())?;
         cli::print(&table.to_markdown())?;
+        self.compare(&table)
+    }
+
+    /// Holds a table against the one of the same name in `--check`.
+    ///
+    /// # Errors
+    /// If that file cannot be read.
+    pub fn compare(&mut self, table: &Table) -> Result<()> {
         if let Some(root) = &self.check {
             let committed = self.within(root).join(format!("{}.csv", table.id));
-            for difference in compare(&table, &committed)? {
+            for difference in compare(table, &committed)? {
                 self.differences.push(difference.to_string());
             }
         }

@@ -1,5 +1,6 @@
 //! Every table and figure of the papers, on the papers' own models or on built-in stand-ins: `reproduce`.
 
+mod claims;
 #[path = "../common/sweep.rs"]
 mod common;
 mod context;
@@ -21,6 +22,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
+use claims::Claim;
 use context::{Context, Item};
 use limitlab::Result;
 use limitlab::cli::{self, CommonFlags, Progress};
@@ -33,10 +35,10 @@ use limitlab::error::Error;
 #[derive(Parser)]
 #[command(name = "reproduce", version)]
 struct Arguments {
-    /// Only the item with this ID; may be repeated
+    /// Only the item or claim with this ID; may be repeated. A claim alone is printed and not written
     #[arg(long, value_name = "ID")]
     only: Vec<String>,
-    /// List the items and stop
+    /// List the items and the papers' claims, and stop
     #[arg(long)]
     list: bool,
     /// The report folder
@@ -56,7 +58,7 @@ struct Arguments {
 }
 
 /// All items, in the order in which they run.
-const ITEMS: [Item; 10] = [
+const ITEMS: [Item; 12] = [
     pia::TABLE1,
     thall::ITERATIONS,
     zheng_cai::SECTION_3_5,
@@ -67,6 +69,8 @@ const ITEMS: [Item; 10] = [
     orders::ORDERS,
     valences::VALENCES,
     figures::ALL,
+    claims::LEDGER,
+    claims::FINDINGS,
 ];
 
 fn main() -> ExitCode {
@@ -79,42 +83,59 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<()> {
     if arguments.list {
-        let width = ITEMS.iter().map(|i| i.id.len()).max().unwrap_or(0);
-        let lines: Vec<String> = ITEMS
+        let claims = claims::all().map(|c| (c.id, c.title));
+        let all: Vec<(&str, &str)> = ITEMS
             .iter()
-            .map(|i| format!("{:width$}  {}", i.id, i.title))
+            .map(|i| (i.id, i.title))
+            .chain(claims)
+            .collect();
+        let width = all.iter().map(|(id, _)| id.len()).max().unwrap_or(0);
+        let lines: Vec<String> = all
+            .iter()
+            .map(|(id, title)| format!("{id:width$}  {title}"))
             .collect();
         return cli::print(&lines.join("\n"));
     }
-    let chosen: Vec<&Item> = if arguments.only.is_empty() {
-        ITEMS.iter().collect()
-    } else {
-        arguments
-            .only
-            .iter()
-            .map(|id| {
-                ITEMS.iter().find(|i| i.id == id).ok_or_else(|| {
-                    Error::Unknown(format!("no item is called \"{id}\"; see reproduce --list"))
-                })
-            })
-            .collect::<Result<_>>()?
-    };
+    let mut chosen: Vec<&Item> = Vec::new();
+    let mut claims: Vec<&'static Claim> = Vec::new();
+    if arguments.only.is_empty() {
+        chosen.extend(&ITEMS);
+    }
+    for id in &arguments.only {
+        if let Some(item) = ITEMS.iter().find(|i| i.id == id) {
+            chosen.push(item);
+        } else if let Some(claim) = claims::find(id) {
+            claims.push(claim);
+        } else {
+            return Err(Error::Unknown(format!(
+                "no item or claim is called \"{id}\"; see reproduce --list"
+            )));
+        }
+    }
     let mut context = Context::new(
         &arguments.out,
         arguments.meshes.as_deref(),
         arguments.quick,
         arguments.check.as_deref(),
     )?;
-    let progress = Progress::new("reproduce", chosen.len(), arguments.common.quiet);
-    for item in chosen {
+    let steps = chosen.len() + usize::from(!claims.is_empty());
+    let progress = Progress::new("reproduce", steps, arguments.common.quiet);
+    for item in &chosen {
         progress.message(item.id);
         (item.run)(&mut context)?;
         progress.step();
     }
+    if !claims.is_empty() {
+        progress.message("claims");
+        claims::run_alone(&mut context, &claims)?;
+        progress.step();
+    }
     drop(progress);
-    context.write_index(&ITEMS)?;
-    arguments
-        .common
-        .remark(format_args!("reports: {}", context.folder().display()));
+    if !chosen.is_empty() {
+        context.write_index(&ITEMS)?;
+        arguments
+            .common
+            .remark(format_args!("reports: {}", context.folder().display()));
+    }
     context.verdict()
 }

@@ -28,7 +28,7 @@ impl fmt::Display for Difference {
 ///   and absolute floor ([`ROUNDING_FLOOR`](super::table::ROUNDING_FLOOR) unless set); NaN agrees with NaN, an
 ///   infinity with itself;
 /// - a count or number that is empty or words on either side is compared as text;
-/// - times are not compared.
+/// - times and remarks are not compared.
 ///
 /// No difference means an empty list.
 ///
@@ -129,7 +129,7 @@ fn disagreement(kind: Kind, a: &str, b: &str) -> Option<String> {
         return None;
     }
     match kind {
-        Kind::Time => None,
+        Kind::Time | Kind::Remark => None,
         Kind::Key | Kind::Text => Some(String::new()),
         Kind::Count => match (a.parse::<i64>(), b.parse::<i64>()) {
             (Ok(a), Ok(b)) if a.abs_diff(b) <= 1 => None,

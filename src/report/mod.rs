@@ -31,6 +31,7 @@ pub use axis::Scale;
 pub use canvas::{Colour, Dash, Marker};
 pub use compare::compare;
 pub use figure::{Figure, Panel};
+pub use number::readable;
 pub use plot::LinePlot;
 pub use png::Image;
 pub use render::{

@@ -26,7 +26,7 @@ pub(super) fn csv_number(value: f64) -> String {
 }
 
 /// `value` with so many significant digits, for reading: `0.1667`, `8.138e-4`, `1.235e6`.
-pub(super) fn readable(value: f64, digits: usize) -> String {
+pub fn readable(value: f64, digits: usize) -> String {
     if value.is_nan() {
         return "NaN".to_owned();
     }

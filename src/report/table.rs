@@ -34,6 +34,8 @@ pub enum Kind {
     },
     /// Durations in seconds: never compared.
     Time,
+    /// Free text, with measured numbers in it perhaps: never compared.
+    Remark,
 }
 
 /// A column: its name in snake_case, which is the CSV header and the JSON field, and its kind.
@@ -82,6 +84,11 @@ impl Column {
     /// A column of [`Kind::Time`].
     pub fn time(name: impl Into<String>) -> Self {
         Column::new(name, Kind::Time)
+    }
+
+    /// A column of [`Kind::Remark`].
+    pub fn remark(name: impl Into<String>) -> Self {
+        Column::new(name, Kind::Remark)
     }
 
     /// The same column with another absolute floor; columns of other kinds have none and stay as they are.
@@ -311,7 +318,7 @@ impl Table {
     fn is_numeric(&self, column: usize) -> bool {
         match self.columns[column].kind {
             Kind::Count | Kind::Number { .. } | Kind::Time => true,
-            Kind::Key | Kind::Text => {
+            Kind::Key | Kind::Text | Kind::Remark => {
                 let mut cells = self.rows.iter().map(|row| &row[column]);
                 !self.rows.is_empty()
                     && cells.all(|c| matches!(c, Cell::Integer(_) | Cell::Float(_)))

@@ -1,0 +1,96 @@
+//! The page of findings: what the papers left open or state wrongly, with proofs in a few lines and the ledger's
+//! numbers in them.
+
+use limitlab::Result;
+use limitlab::error::Error;
+
+use super::{Record, shown};
+
+/// The page. `{{ID}}` stands for the verdict of a claim, `{{ID|start of a quantity}}` for a number of it.
+const PAGE: &str = include_str!("findings.md");
+
+/// The page with the ledger's numbers.
+///
+/// # Errors
+/// A placeholder that names no claim or number of the ledger.
+pub fn page(note_on_meshes: &str, records: &[Record]) -> Result<String> {
+    Ok(fill(PAGE, records)?.replace("(meshes)", note_on_meshes))
+}
+
+fn fill(text: &str, records: &[Record]) -> Result<String> {
+    let mut page = String::with_capacity(2 * text.len());
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once("{{") {
+        let (name, further) = after.split_once("}}").unwrap_or((after, ""));
+        page.push_str(before);
+        page.push_str(&look_up(name, records)?);
+        rest = further;
+    }
+    page.push_str(rest);
+    Ok(page)
+}
+
+fn look_up(name: &str, records: &[Record]) -> Result<String> {
+    let (id, quantity) = name.split_once('|').unwrap_or((name, ""));
+    let record = records.iter().find(|r| r.claim.id == id);
+    let found = match (record, quantity) {
+        (None, _) => None,
+        (Some(r), "") => Some(format!("{id}: {}", r.finding.verdict().name())),
+        (Some(r), _) => {
+            let mut matching = r
+                .finding
+                .evidence
+                .iter()
+                .filter(|e| e.quantity.starts_with(quantity));
+            matching.next().map(|e| shown(e.value))
+        }
+    };
+    found.ok_or_else(|| {
+        Error::Computation(format!(
+            "the page of findings quotes {name}, which is not in the ledger"
+        ))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::find;
+    use super::super::finding::{Evidence, Finding};
+    use super::*;
+
+    fn records() -> Vec<Record> {
+        let evidence = vec![
+            Evidence::at_most("deviation from 1", 0.5, 1.0),
+            Evidence::shown("meshes", 3_usize),
+        ];
+        vec![Record {
+            claim: find("Z12").unwrap(),
+            finding: Finding::settled(evidence),
+        }]
+    }
+
+    #[test]
+    fn numbers_and_verdicts_are_filled_in() {
+        let page = fill(
+            "{{Z12}} by {{Z12|dev}} on {{Z12|meshes}}, Σ_{F}.",
+            &records(),
+        )
+        .unwrap();
+        assert_eq!(page, "Z12: settled by 0.5 on 3, Σ_{F}.");
+    }
+
+    #[test]
+    fn a_number_that_is_not_there_is_an_error() {
+        for text in ["{{Z12|nothing}}", "{{T1}}", "{{X1|deviation}}"] {
+            assert!(fill(text, &records()).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_page_names_claims_that_exist() {
+        for part in PAGE.split("{{").skip(1) {
+            let name = part.split(['}', '|']).next().unwrap();
+            assert!(find(name).is_some(), "{name}");
+        }
+    }
+}

@@ -1,0 +1,336 @@
+//! What the claims compute with: meshes at random and by name, and small tools used by several of them.
+
+use std::cell::OnceCell;
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use limitlab::Result;
+use limitlab::analysis::dense;
+use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
+use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::mesh::{Mesh, Topology, builtin, generate};
+use limitlab::solvers::{Outcome, Setup, Solution, Stop, run, run_watched};
+
+use crate::context::{Context, Subject};
+
+/// Random meshes of [`Lab::polygons`] and [`Lab::triangles`], and the most vertices of each.
+pub const RANDOM_MESHES: usize = 300;
+pub const RANDOM_VERTICES: usize = 120;
+/// The most vertices of [`Lab::subjects`].
+const MODEL_VERTICES: usize = 3000;
+
+/// A run of the program as the claims see it, with the random meshes made once.
+pub struct Lab<'a> {
+    pub context: &'a Context,
+    polygons: OnceCell<Vec<Subject>>,
+    triangles: OnceCell<Vec<Subject>>,
+    subjects: OnceCell<Vec<Subject>>,
+}
+
+impl<'a> Lab<'a> {
+    pub fn new(context: &'a Context) -> Self {
+        Lab {
+            context,
+            polygons: OnceCell::new(),
+            triangles: OnceCell::new(),
+            subjects: OnceCell::new(),
+        }
+    }
+
+    /// Closed polygon meshes at random, all valences at least 3: spheres, tori, sums and unions of those, duals,
+    /// quads, mixed polygons, triangles.
+    pub fn polygons(&self) -> &[Subject] {
+        self.polygons
+            .get_or_init(|| small("random-polygons", generate::random_polygons))
+    }
+
+    /// Closed triangle meshes at random.
+    pub fn triangles(&self) -> &[Subject] {
+        self.triangles
+            .get_or_init(|| small("random-triangles", generate::random_triangulation))
+    }
+
+    /// The closed real models, or stand-ins of several kinds, of at most [`MODEL_VERTICES`] vertices.
+    pub fn subjects(&self) -> Result<&[Subject]> {
+        const STAND_INS: [&str; 8] = [
+            "torus:32x32",
+            "quad-sphere:4",
+            "icosphere:3",
+            "irregular-quad:1000",
+            "irregular-tri:1000",
+            "irregular-poly:1000",
+            "prism:17",
+            "star:12",
+        ];
+        if self.subjects.get().is_none() {
+            let found = self.context.subjects(&STAND_INS, MODEL_VERTICES)?;
+            return Ok(self.subjects.get_or_init(|| found));
+        }
+        Ok(self.subjects.get().map_or(&[], Vec::as_slice))
+    }
+}
+
+fn small(name: &str, make: fn(u64) -> Mesh) -> Vec<Subject> {
+    let mut found = Vec::with_capacity(RANDOM_MESHES);
+    let mut seed = 0;
+    while found.len() < RANDOM_MESHES {
+        let mesh = make(seed);
+        if mesh.len() <= RANDOM_VERTICES {
+            found.push(subject(format!("{name}:{seed}"), mesh));
+        }
+        seed += 1;
+    }
+    found
+}
+
+pub fn subject(name: impl Into<String>, mesh: Mesh) -> Subject {
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    Subject {
+        name: name.into(),
+        mesh,
+        topology,
+    }
+}
+
+/// A built-in mesh without noise.
+pub fn exact(name: &str) -> Result<Subject> {
+    Ok(subject(name, builtin::builtin(name)?))
+}
+
+/// A closed mesh of quads in which vertices `n` and n + 1 have valence n.
+pub fn quad_star(n: usize) -> Mesh {
+    generate::quad_split(&builtin::bipyramid(n))
+}
+
+/// Points without any structure, one a vertex.
+pub fn random_points(n: usize, seed: u64) -> Vec<DVec3> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..n)
+        .map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0))))
+        .collect()
+}
+
+/// max ‖a_i − b_i‖
+pub fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
+    assert_eq!(a.len(), b.len(), "as many of one as of the other");
+    largest(a.iter().zip(b).map(|(a, b)| a.distance(*b)))
+}
+
+/// The largest of some numbers; NaN if one is.
+pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(f64::NEG_INFINITY, |m, x| {
+        if m.is_nan() || x.is_nan() {
+            f64::NAN
+        } else {
+            m.max(x)
+        }
+    })
+}
+
+/// The smallest of some numbers; NaN if one is.
+pub fn smallest(values: impl IntoIterator<Item = f64>) -> f64 {
+    -largest(values.into_iter().map(|x| -x))
+}
+
+/// The middle of some numbers; the lower of two. NaN if there is none.
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len().saturating_sub(1) / 2;
+    values.get(middle).copied().unwrap_or(f64::NAN)
+}
+
+/// All of `subjects` in parallel, in their order.
+pub fn each<T: Send>(
+    subjects: &[Subject],
+    work: impl Fn(&Subject) -> Result<T> + Sync + Send,
+) -> Result<Vec<T>> {
+    subjects.par_iter().map(work).collect()
+}
+
+/// The limit mask by repetition alone: the first row of S^64.
+pub fn limit_by_powers(scheme: LocalScheme, n: usize) -> Result<Vec<f64>> {
+    let mut power: DMatrix<f64> = SplittingMatrix::new(scheme, n)?.entries;
+    for _ in 0..6 {
+        power = &power * &power;
+    }
+    Ok(power.row(0).iter().copied().collect())
+}
+
+/// The ends of the spectra of A and D⁻¹A of one small mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct Ends {
+    pub min: f64,
+    pub max: f64,
+    pub jacobi_min: f64,
+    pub jacobi_max: f64,
+}
+
+/// # Errors
+/// More than 600 vertices.
+pub fn ends(system: &LimitSystem) -> Result<Ends> {
+    let all = dense::eigenvalues(system)?;
+    let at = |list: &[f64], last: bool| {
+        let end = if last { list.last() } else { list.first() };
+        end.copied().unwrap_or(f64::NAN)
+    };
+    Ok(Ends {
+        min: at(&all.a, false),
+        max: at(&all.a, true),
+        jacobi_min: at(&all.jacobi, false),
+        jacobi_max: at(&all.jacobi, true),
+    })
+}
+
+/// Solves with structureless points, which excite every eigenvector, to `tolerance` times the largest coordinate 1.
+pub fn solve_random(system: &LimitSystem, setup: Setup, tolerance: f64, limit: usize) -> Solution {
+    let points = random_points(system.len(), system.len() as u64);
+    let stop = Stop {
+        tolerance,
+        max_iterations: limit,
+    };
+    run(system, &points, setup, &stop)
+}
+
+/// The first `count` iterates after the start V = P.
+pub fn iterates(
+    system: &LimitSystem,
+    points: &[DVec3],
+    setup: Setup,
+    count: usize,
+) -> Vec<Vec<DVec3>> {
+    let stop = Stop {
+        tolerance: 0.0,
+        max_iterations: count,
+    };
+    let mut found = Vec::with_capacity(count);
+    run_watched(system, points, setup, &stop, &mut |step| {
+        if step.iteration > 0 {
+            found.push(step.points.to_vec());
+        }
+        ControlFlow::Continue(())
+    });
+    found
+}
+
+/// Iterations from V = P to `tolerance` of the bounding box's diagonal; `None` if it was not reached.
+pub fn iterations(
+    system: &LimitSystem,
+    subject: &Subject,
+    setup: Setup,
+    tolerance: f64,
+) -> Option<usize> {
+    let stop = Stop {
+        tolerance: tolerance * subject.mesh.diagonal(),
+        max_iterations: 20_000,
+    };
+    let report = run(system, &subject.mesh.positions, setup, &stop).report;
+    (report.outcome == Outcome::Converged).then_some(report.iterations)
+}
+
+/// max_i ‖p_i − (A v)_i‖ after each iteration, relative to the bounding box's diagonal; entry 0 is the start.
+pub fn history(system: &LimitSystem, subject: &Subject, setup: Setup, count: usize) -> Vec<f64> {
+    let stop = Stop {
+        tolerance: 0.0,
+        max_iterations: count,
+    };
+    let report = run(system, &subject.mesh.positions, setup, &stop).report;
+    let size = subject.mesh.diagonal();
+    report.history.iter().map(|e| e.max / size).collect()
+}
+
+/// Stored entries of A a vertex.
+pub fn entries_per_vertex(system: &LimitSystem) -> f64 {
+    system.a.values().len() as f64 / system.len() as f64
+}
+
+/// (diagonal − Σ |others|) of row `i` of A.
+pub fn excess(system: &LimitSystem, i: usize) -> f64 {
+    system
+        .a
+        .row(i)
+        .map(|(j, a)| if i == j { a } else { -a.abs() })
+        .sum()
+}
+
+/// The pieces of a mesh whose vertices all have valence 3 and are two-colourable: what makes Catmull-Clark singular.
+pub fn cubic_bipartite_components(subject: &Subject) -> usize {
+    let (mesh, topology) = (&subject.mesh, &subject.topology);
+    let (component, count) = topology.components(&mesh.faces);
+    let mut singular = vec![true; count];
+    let mut neighbours = vec![Vec::new(); mesh.len()];
+    for face in mesh.faces.iter() {
+        for (k, &v) in face.iter().enumerate() {
+            let w = face[(k + 1) % face.len()];
+            neighbours[v as usize].push(w as usize);
+            neighbours[w as usize].push(v as usize);
+        }
+    }
+    let mut colour = vec![0i8; mesh.len()];
+    for start in 0..mesh.len() {
+        if topology.incidence.face_count(start) != 3 {
+            singular[component[start] as usize] = false;
+        }
+        if colour[start] != 0 {
+            continue;
+        }
+        colour[start] = 1;
+        let mut open = vec![start];
+        while let Some(v) = open.pop() {
+            for &w in &neighbours[v] {
+                if colour[w] == 0 {
+                    colour[w] = -colour[v];
+                    open.push(w);
+                } else if colour[w] == colour[v] {
+                    singular[component[v] as usize] = false;
+                }
+            }
+        }
+    }
+    singular.iter().filter(|&&s| s).count()
+}
+
+/// The schemes defined on the mesh: all five on triangles, three otherwise.
+pub fn schemes(subject: &Subject) -> impl Iterator<Item = Scheme> + '_ {
+    Scheme::ALL.into_iter().filter(|&s| subject.suits(s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_nan_is_not_lost_among_numbers() {
+        assert_eq!(largest([1.0, 3.0, 2.0]), 3.0);
+        assert_eq!(smallest([1.0, 3.0, 2.0]), 1.0);
+        assert!(largest([1.0, f64::NAN, 2.0]).is_nan());
+        assert!(smallest([f64::NAN, 2.0]).is_nan());
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
+    }
+
+    #[test]
+    fn only_cubic_bipartite_pieces_are_counted() {
+        for (name, count) in [
+            ("cube", 1),
+            ("tetrahedron", 0),
+            ("prism:6", 1),
+            ("prism:7", 0),
+            ("torus:4x4", 0),
+            ("cubes:3", 3),
+        ] {
+            let found = cubic_bipartite_components(&exact(name).unwrap());
+            assert_eq!(found, count, "{name}");
+        }
+    }
+
+    #[test]
+    fn the_quad_star_has_its_valence_at_the_apex() {
+        let star = subject("", quad_star(9));
+        assert_eq!(star.topology.incidence.face_count(9), 9);
+        assert_eq!(star.mesh.faces.uniform_size(), Some(4));
+    }
+}

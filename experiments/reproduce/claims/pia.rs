@@ -1,0 +1,704 @@
+//! Progressive iterative interpolation: P1–P12.
+
+use std::collections::HashMap;
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+
+use limitlab::Result;
+use limitlab::analysis::splitting::LocalScheme;
+use limitlab::assemble::scheme::loop_beta;
+use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::interpolate::pia::{TwoStepsBack, passes};
+use limitlab::mesh::validate::Boundary;
+use limitlab::solvers::{Outcome, Setup, Stop, run_watched};
+use limitlab::subdivide::Refinement;
+
+use super::Claim;
+use super::finding::{Evidence, Finding};
+use super::lab::{
+    Lab, cubic_bipartite_components, each, ends, entries_per_vertex, exact, iterations, largest,
+    limit_by_powers, random_points, smallest, solve_random,
+};
+
+const ROUNDING: f64 = 1e-12;
+/// Below this an eigenvalue of A counts as zero.
+const ZERO: f64 = 1e-12;
+
+pub const CLAIMS: &[Claim] = &[
+    Claim {
+        id: "P1",
+        title: "Table 1: iterations and errors of four models",
+        place: "§4, Table 1",
+        printed: "Horse, Bird, Hand, Boy: 12, 9, 3, 6 iterations, with maximum and average errors.",
+        slow: false,
+        check: table_1,
+    },
+    Claim {
+        id: "P2",
+        title: "The Mushroom, a quadrilateral mesh",
+        place: "§4, Fig. 7",
+        printed: "Mushroom, quadrilateral: 8 iterations, maximum error 0.000813821, average 0.000235506.",
+        slow: false,
+        check: mushroom,
+    },
+    Claim {
+        id: "P3",
+        title: "Loop's limit formula",
+        place: "§2, Eq. 1",
+        printed: "V_∞ = β_n V + (1 − β_n) Q with β_n = 3/(11 − 8(3/8 + (3/8 + ¼cos(2π/n))²)).",
+        slow: false,
+        check: loop_limit,
+    },
+    Claim {
+        id: "P4",
+        title: "B = D S and the properties of B",
+        place: "§2.1",
+        printed: "Rows of B are non-negative with sum 1, have n_i + 1 entries, equal beside the diagonal; S is \
+                  symmetric; nβ_n/(1−β_n) ≥ 2n/3 for n ≥ 3.",
+        slow: false,
+        check: properties,
+    },
+    Claim {
+        id: "P5",
+        title: "Propositions 1 and 2: S positive definite, convergence under Loop",
+        place: "§2.1",
+        printed: "S is positive definite, the eigenvalues of B lie in (0, 1], and the iteration converges.",
+        slow: true,
+        check: loop_convergence,
+    },
+    Claim {
+        id: "P6",
+        title: "C = H M with M symmetric, weights 4 and 1",
+        place: "§3, Eq. 2",
+        printed: "The Catmull-Clark matrix is H M; M is symmetric with n², 4 an edge, 1 a face; ‖C‖_∞ = 1.",
+        slow: false,
+        check: catmull_clark_matrix,
+    },
+    Claim {
+        id: "P7",
+        title: "Propositions 3 and 4: M positive definite, convergence under Catmull-Clark",
+        place: "§3",
+        printed: "M is positive definite, and the iteration converges (marked as not completely correct).",
+        slow: true,
+        check: when_singular,
+    },
+    Claim {
+        id: "P8",
+        title: "The quadratic form of M",
+        place: "§3, proof of Proposition 3",
+        printed: "xᵀMx = Σ_F (x_i+x_j+x_k+x_r) + Σ_E (x_i+x_j) + Σ (n²−3n) x_i².",
+        slow: false,
+        check: quadratic_form,
+    },
+    Claim {
+        id: "P9",
+        title: "Convergence on arbitrary meshes",
+        place: "§3 and §5",
+        printed: "The proof holds for quadrilateral meshes only; arbitrary meshes are future work.",
+        slow: true,
+        check: arbitrary_meshes,
+    },
+    Claim {
+        id: "P10",
+        title: "The algorithm as printed",
+        place: "§2",
+        printed: "In the prose e = V − V^k; in the algorithm CurrentMaxError is never reset.",
+        slow: false,
+        check: algorithm,
+    },
+    Claim {
+        id: "P11",
+        title: "The error always decreases",
+        place: "§2",
+        printed: "It can be proved that e^{k+1} is always less than e^k.",
+        slow: false,
+        check: monotone,
+    },
+    Claim {
+        id: "P12",
+        title: "O(mn) time",
+        place: "§4",
+        printed: "The method can handle very huge meshes, its complexity is O(mn).",
+        slow: true,
+        check: linear_time,
+    },
+];
+
+/// The paper's tolerance in mesh units, and the agreement of errors that single precision explains.
+const TOLERANCE: f64 = 1e-3;
+const AGREEMENT: f64 = 2e-5;
+
+/// |measured/printed − 1|, the larger of both errors.
+fn departure(errors: limitlab::solvers::Errors, printed: (f64, f64)) -> f64 {
+    largest([
+        (errors.max / printed.0 - 1.0).abs(),
+        (errors.mean / printed.1 - 1.0).abs(),
+    ])
+}
+
+fn table_1(lab: &Lab) -> Result<Finding> {
+    if !lab.context.real() {
+        return Ok(Finding::not_reproducible(
+            "Needs the four models of the Princeton Shape Benchmark: run with --meshes DIR.",
+        ));
+    }
+    let lines = [
+        (
+            "Horse",
+            "closed/psb_m104_horse_233v.off",
+            12,
+            (0.000912016, 0.00022811),
+        ),
+        (
+            "Bird",
+            "closed/psb_m32_bird_1129v.off",
+            9,
+            (0.000766811, 8.8345e-5),
+        ),
+        (
+            "Hand",
+            "closed/psb_m329_hand_6191v.off",
+            3,
+            (0.000914111, 0.000164207),
+        ),
+        (
+            "Boy",
+            "open/psb_m149_boy_17342v_raw.off",
+            6,
+            (0.000913795, 9.5615e-5),
+        ),
+    ];
+    let mut evidence = Vec::new();
+    for (name, file, printed, errors) in lines {
+        let subject = lab.context.model(file, Boundary::AsInterior)?;
+        let run = passes(
+            &subject.system(Scheme::Loop)?,
+            &subject.mesh.positions,
+            TOLERANCE,
+            1000,
+        );
+        evidence.push(Evidence::equal(
+            format!("{name}: passes of the loop"),
+            run.passes,
+            printed as f64,
+        ));
+        evidence.push(Evidence::at_most(
+            format!("{name}: relative departure of the printed errors"),
+            departure(run.errors, errors),
+            AGREEMENT,
+        ));
+    }
+    Ok(Finding::reproduced(evidence).remark(
+        "Iterations are passes of the paper's loop, one more than updates. The Boy's 26 boundary edges are treated as \
+         interior ones.",
+    ))
+}
+
+fn mushroom(lab: &Lab) -> Result<Finding> {
+    if !lab.context.real() {
+        return Ok(Finding::not_reproducible(
+            "Needs the mushroom of 226 vertices that comes with geomview: run with --meshes DIR.",
+        ));
+    }
+    let printed = (0.000813821, 0.000235506);
+    let subject = lab
+        .context
+        .model("closed/geomview_mushroom_226v.off", Boundary::Refuse)?;
+    let system = subject.system(Scheme::CatmullClark)?;
+    let points = &subject.mesh.positions;
+    let surface = passes(&system, points, TOLERANCE, 1000);
+    let masks = LimitSystem::with_masks(&subject.mesh, &subject.topology, &TwoStepsBack)?;
+    let reading = passes(&masks, points, TOLERANCE, 1000);
+    let triangles = subject.mesh.faces.iter().filter(|f| f.len() == 3).count();
+    Ok(Finding::corrected(
+        "relative departure of the printed errors, on the Catmull-Clark surface (print), with the face point two \
+         corners back (right)",
+        departure(surface.errors, printed),
+        departure(reading.errors, printed),
+        AGREEMENT,
+    )
+    .also([
+        Evidence::equal("passes of the loop, face point two corners back", reading.passes, 8.0),
+        Evidence::above("triangles of the mesh", triangles, 0.0),
+        Evidence::shown("maximum error with the true limit mask", surface.errors.max),
+        Evidence::shown("mean error with the true limit mask", surface.errors.mean),
+    ])
+    .remark(
+        "The mesh is not quadrilateral. The printed figures come out with a mask that is wrong on its triangles, so \
+         that row does not interpolate the Catmull-Clark surface there.",
+    ))
+}
+
+fn loop_limit(_: &Lab) -> Result<Finding> {
+    let mut worst = 0.0f64;
+    for n in 3..=50 {
+        let mask = limit_by_powers(LocalScheme::Loop, n)?;
+        let c = 0.375 + 0.25 * (std::f64::consts::TAU / n as f64).cos();
+        let beta = 3.0 / (11.0 - 8.0 * (0.375 + c * c));
+        for (i, w) in mask.iter().enumerate() {
+            let printed = if i == 0 {
+                beta
+            } else {
+                (1.0 - beta) / n as f64
+            };
+            worst = largest([worst, (w - printed).abs()]);
+        }
+    }
+    Ok(Finding::reproduced(vec![Evidence::at_most(
+        "largest deviation from the first row of S^64, n = 3…50",
+        worst,
+        ROUNDING,
+    )]))
+}
+
+fn properties(lab: &Lab) -> Result<Finding> {
+    struct Row {
+        sum: f64,
+        least: f64,
+        misses: usize,
+        spread: f64,
+        asymmetry: f64,
+    }
+    let rows = each(lab.triangles(), |subject| {
+        let system = subject.system(Scheme::Loop)?;
+        let mut row = Row {
+            sum: 0.0,
+            least: f64::INFINITY,
+            misses: 0,
+            spread: 0.0,
+            asymmetry: 0.0,
+        };
+        for i in 0..system.len() {
+            let entries: Vec<(usize, f64)> = system.a.row(i).collect();
+            row.sum = largest([
+                row.sum,
+                (entries.iter().map(|e| e.1).sum::<f64>() - 1.0).abs(),
+            ]);
+            row.least = smallest([row.least, smallest(entries.iter().map(|e| e.1))]);
+            row.misses += entries
+                .len()
+                .abs_diff(subject.topology.incidence.face_count(i) + 1);
+            let others = || entries.iter().filter(|e| e.0 != i).map(|e| e.1);
+            row.spread = largest([row.spread, largest(others()) - smallest(others())]);
+            for (j, m) in system.m.row(i) {
+                row.asymmetry = largest([row.asymmetry, (m - system.m.get(j, i)).abs()]);
+            }
+        }
+        Ok(row)
+    })?;
+    let part = |n: usize| {
+        let beta = loop_beta(n);
+        n as f64 * beta / (1.0 - beta) - 2.0 * n as f64 / 3.0
+    };
+    Ok(Finding::reproduced(vec![
+        Evidence::at_most(
+            "largest deviation of a row sum of B from 1, random triangle meshes",
+            largest(rows.iter().map(|r| r.sum)),
+            ROUNDING,
+        ),
+        Evidence::above(
+            "smallest stored entry",
+            smallest(rows.iter().map(|r| r.least)),
+            0.0,
+        ),
+        Evidence::equal(
+            "entries more or fewer than n_i + 1",
+            rows.iter().map(|r| r.misses).sum::<usize>(),
+            0.0,
+        ),
+        Evidence::at_most(
+            "largest difference of two entries of a row beside the diagonal",
+            largest(rows.iter().map(|r| r.spread)),
+            ROUNDING,
+        ),
+        Evidence::equal(
+            "largest |s_ij − s_ji|",
+            largest(rows.iter().map(|r| r.asymmetry)),
+            0.0,
+        ),
+        Evidence::above(
+            "smallest nβ_n/(1−β_n) − 2n/3, n = 4…1000",
+            smallest((4..=1000).map(part)),
+            0.0,
+        ),
+        Evidence::at_most(
+            "its size at n = 3, where equality holds",
+            part(3).abs(),
+            ROUNDING,
+        ),
+    ]))
+}
+
+fn loop_convergence(lab: &Lab) -> Result<Finding> {
+    let rows = each(lab.triangles(), |subject| {
+        let system = subject.system(Scheme::Loop)?;
+        let ends = ends(&system)?;
+        let outcome = solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-9, 10_000)
+            .report
+            .outcome;
+        Ok((
+            ends.min,
+            ends.max,
+            ends.min - system.bounds.lambda_min,
+            outcome,
+        ))
+    })?;
+    Ok(Finding::reproduced(vec![
+        Evidence::above(
+            "smallest eigenvalue of B, random triangle meshes",
+            smallest(rows.iter().map(|r| r.0)),
+            0.0,
+        ),
+        Evidence::at_most(
+            "largest eigenvalue of B",
+            largest(rows.iter().map(|r| r.1)),
+            1.0 + ROUNDING,
+        ),
+        Evidence::equal(
+            "runs from random points that did not converge to 10⁻⁹",
+            rows.iter().filter(|r| r.3 != Outcome::Converged).count(),
+            0.0,
+        ),
+        Evidence::at_least(
+            "smallest λ_min less its bound min (3β_n − 1)/2",
+            smallest(rows.iter().map(|r| r.2)),
+            -ROUNDING,
+        ),
+        Evidence::shown("meshes", rows.len()),
+    ]))
+}
+
+fn catmull_clark_matrix(_: &Lab) -> Result<Finding> {
+    let (mut weights, mut asymmetry, mut norm) = (0.0f64, 0.0f64, 0.0f64);
+    for name in ["irregular-quad:500", "quad-sphere:3", "torus:7x9"] {
+        let subject = exact(name)?;
+        let system = subject.system(Scheme::CatmullClark)?;
+        let n = system.len();
+        // Edge by edge and face by face, as the paper counts them.
+        let mut wanted = vec![HashMap::<usize, f64>::new(); n];
+        for (v, row) in wanted.iter_mut().enumerate() {
+            let valence = subject.topology.incidence.face_count(v) as f64;
+            row.insert(v, valence * valence);
+        }
+        for face in subject.mesh.faces.iter() {
+            for k in 0..4 {
+                let [v, next, opposite] = [0, 1, 2].map(|s| face[(k + s) % 4] as usize);
+                // Each edge has two faces, and each brings half of the 4 to either end.
+                *wanted[v].entry(next).or_default() += 2.0;
+                *wanted[next].entry(v).or_default() += 2.0;
+                *wanted[v].entry(opposite).or_default() += 1.0;
+            }
+        }
+        for (i, row) in wanted.iter().enumerate() {
+            for (j, m) in system.m.row(i) {
+                weights = largest([weights, (m - row.get(&j).copied().unwrap_or(0.0)).abs()]);
+                asymmetry = largest([asymmetry, (m - system.m.get(j, i)).abs()]);
+            }
+            let sum: f64 = system.a.row_values(i).iter().map(|a| a.abs()).sum();
+            norm = largest([norm, (sum - 1.0).abs()]);
+        }
+    }
+    Ok(Finding::reproduced(vec![
+        Evidence::at_most(
+            "largest deviation of an entry of M, three quad meshes",
+            weights,
+            ROUNDING,
+        ),
+        Evidence::equal("largest |m_ij − m_ji|", asymmetry, 0.0),
+        Evidence::at_most("largest deviation of ‖C‖_∞ from 1", norm, ROUNDING),
+    ]))
+}
+
+fn when_singular(lab: &Lab) -> Result<Finding> {
+    let special = [
+        "cube",
+        "cubes:2",
+        "prism:3",
+        "prism:4",
+        "prism:5",
+        "prism:6",
+        "prism:8",
+        "prism:9",
+        "tetrahedron",
+        "octahedron",
+        "icosahedron",
+        "dodecahedron",
+        "truncated-octahedron",
+        "torus:3x3",
+        "torus:4x4",
+        "torus:5x4",
+        "quad-sphere:1",
+        "irregular-quad:60",
+    ];
+    let judge = |subject: &crate::context::Subject| -> Result<(usize, usize, f64)> {
+        let all = limitlab::analysis::dense::eigenvalues(&subject.system(Scheme::CatmullClark)?)?.a;
+        let kernel = all.iter().filter(|l| l.abs() < ZERO).count();
+        Ok((kernel, cubic_bipartite_components(subject), all[0]))
+    };
+    let mut rows = each(lab.polygons(), judge)?;
+    for name in special {
+        rows.push(judge(&exact(name)?)?);
+    }
+    let cube = exact("cube")?;
+    let run = solve_random(
+        &cube.system(Scheme::CatmullClark)?,
+        Setup::Pia { omega: 1.0 },
+        1e-6,
+        10_000,
+    );
+    Ok(Finding::settled(vec![
+        Evidence::equal(
+            "meshes whose kernel is not as large as the number of 3-valent bipartite components",
+            rows.iter().filter(|r| r.0 != r.1).count(),
+            0.0,
+        ),
+        Evidence::above("singular meshes among them", rows.iter().filter(|r| r.0 > 0).count(), 0.0),
+        Evidence::at_least("smallest eigenvalue of C", smallest(rows.iter().map(|r| r.2)), -ZERO),
+        Evidence::above("maximum error that 10⁻⁶ is not reached from on the cube, random points", run.report.last().max, 1e-6),
+        Evidence::shown("meshes", rows.len()),
+    ])
+    .remark(
+        "M is positive semidefinite on every closed polygon mesh of valences from 3, and singular exactly when a \
+         component has all valences 3 and a bipartite vertex graph. The iteration converges for all data exactly when \
+         there is none such; on the cube it leaves the part of the data in the kernel.",
+    ))
+}
+
+fn quadratic_form(_: &Lab) -> Result<Finding> {
+    let (mut printed, mut right) = (0.0f64, 0.0f64);
+    for (name, seed) in [
+        ("cube", 1),
+        ("torus:5x7", 2),
+        ("quad-sphere:2", 3),
+        ("irregular-quad:200", 4),
+    ] {
+        let subject = exact(name)?;
+        let system = subject.system(Scheme::CatmullClark)?;
+        let x: Vec<f64> = random_points(system.len(), seed)
+            .iter()
+            .map(|p| p.x)
+            .collect();
+        let form: f64 = (0..system.len())
+            .map(|i| x[i] * system.m.row_times_scalar(i, &x))
+            .sum();
+        let (mut sums, mut squares, mut own) = (0.0, 0.0, 0.0);
+        for face in subject.mesh.faces.iter() {
+            let sum: f64 = face.iter().map(|&v| x[v as usize]).sum();
+            sums += sum;
+            squares += sum * sum;
+            for k in 0..4 {
+                // Half of each edge from either face.
+                let edge = x[face[k] as usize] + x[face[(k + 1) % 4] as usize];
+                sums += 0.5 * edge;
+                squares += edge * edge;
+            }
+        }
+        for (v, x) in x.iter().enumerate() {
+            let n = subject.topology.incidence.face_count(v) as f64;
+            own += (n * n - 3.0 * n) * x * x;
+        }
+        printed = largest([printed, ((sums + own) / form - 1.0).abs()]);
+        right = largest([right, ((squares + own) / form - 1.0).abs()]);
+    }
+    Ok(Finding::corrected(
+        "largest relative deviation from xᵀMx, random x on four quad meshes",
+        printed,
+        right,
+        ROUNDING,
+    )
+    .remark("The terms of faces and edges are squares, and edges weigh 2."))
+}
+
+fn arbitrary_meshes(lab: &Lab) -> Result<Finding> {
+    let rows = each(lab.polygons(), |subject| {
+        let system = subject.system(Scheme::CatmullClark)?;
+        let ends = ends(&system)?;
+        let fast = ends.min > 1e-3;
+        let outcome = fast.then(|| {
+            solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-6, 60_000)
+                .report
+                .outcome
+        });
+        // The form of P8 for faces of any size, on a random vector.
+        let x: Vec<f64> = random_points(system.len(), 5).iter().map(|p| p.x).collect();
+        let form: f64 = (0..system.len())
+            .map(|i| x[i] * system.m.row_times_scalar(i, &x))
+            .sum();
+        let mut squares = 0.0;
+        for face in subject.mesh.faces.iter() {
+            let sum: f64 = face.iter().map(|&v| x[v as usize]).sum();
+            squares += 4.0 / face.len() as f64 * sum * sum;
+            for (k, &v) in face.iter().enumerate() {
+                let edge = x[v as usize] + x[face[(k + 1) % face.len()] as usize];
+                squares += edge * edge;
+            }
+        }
+        for (v, x) in x.iter().enumerate() {
+            let n = subject.topology.incidence.face_count(v) as f64;
+            squares += (n * n - 3.0 * n) * x * x;
+        }
+        let bound = ends.min - system.bounds.lambda_min;
+        Ok((ends.min, bound, (squares / form - 1.0).abs(), outcome))
+    })?;
+    let ran = rows.iter().filter_map(|r| r.3);
+    Ok(Finding::settled(vec![
+        Evidence::at_least(
+            "smallest eigenvalue of C, random polygon meshes",
+            smallest(rows.iter().map(|r| r.0)),
+            -ROUNDING,
+        ),
+        Evidence::at_most(
+            "largest relative deviation of Σ 4/|F| (Σx)² + 2Σ(x_i+x_j)² + Σ(n²−3n)x² from xᵀMx",
+            largest(rows.iter().map(|r| r.2)),
+            1e-10,
+        ),
+        Evidence::at_least(
+            "smallest λ_min less its bound min (n−3)/(n+5)",
+            smallest(rows.iter().map(|r| r.1)),
+            -ROUNDING,
+        ),
+        Evidence::equal(
+            "runs from random points that did not converge to 10⁻⁶, of those with λ_min > 10⁻³",
+            ran.clone().filter(|&o| o != Outcome::Converged).count(),
+            0.0,
+        ),
+        Evidence::shown("runs", ran.count()),
+    ])
+    .remark(
+        "The same sum of squares with weight 4/|F| covers faces of any size: convergence as in P7.",
+    ))
+}
+
+fn algorithm(_: &Lab) -> Result<Finding> {
+    let subject = exact("irregular-tri:233")?;
+    let limits = |points: Vec<DVec3>| -> Result<Vec<DVec3>> {
+        let mesh = limitlab::mesh::Mesh::new(points, subject.mesh.faces.clone());
+        Refinement::Loop.limit_positions(&mesh, &subject.topology)
+    };
+    let given = &subject.mesh.positions;
+    const PASSES: usize = 100;
+    // e = V − V^k moves every vertex to its own place: nothing ever changes.
+    let prose = given.clone();
+    let (mut box_points, mut reset, mut never) = (given.clone(), TOLERANCE + 1.0, TOLERANCE + 1.0);
+    let (mut passes_reset, mut passes_never) = (0usize, 0usize);
+    for _ in 0..PASSES {
+        let now = limits(box_points.clone())?;
+        let largest_error = largest(given.iter().zip(&now).map(|(p, q)| p.distance(*q)));
+        if reset > TOLERANCE {
+            passes_reset += 1;
+        }
+        if never > TOLERANCE {
+            passes_never += 1;
+        }
+        reset = largest_error;
+        never = never.max(largest_error);
+        for ((v, p), q) in box_points.iter_mut().zip(given).zip(&now) {
+            *v += *p - *q;
+        }
+    }
+    let error = |points: Vec<DVec3>| -> Result<f64> {
+        Ok(largest(
+            given
+                .iter()
+                .zip(limits(points)?)
+                .map(|(p, q)| p.distance(q)),
+        ))
+    };
+    Ok(Finding::corrected(
+        "maximum error after 100 passes with e = V − V^k (print), e = V − V_∞^k (right), irregular-tri:233",
+        error(prose)?,
+        error(box_points)?,
+        TOLERANCE,
+    )
+    .also([
+        Evidence::equal("passes of 100 in which the loop goes on without a reset of CurrentMaxError", passes_never, PASSES as f64),
+        Evidence::below("the same with a reset in every pass", passes_reset, PASSES as f64),
+    ])
+    .remark("The algorithm box has the right e; CurrentMaxError has to start from 0 in every pass."))
+}
+
+fn monotone(lab: &Lab) -> Result<Finding> {
+    struct Row {
+        name: String,
+        /// The largest e^{k+1}/e^k.
+        max_norm: f64,
+        energy: f64,
+    }
+    let rows = each(&lab.triangles()[..100], |subject| {
+        let system = subject.system(Scheme::Loop)?;
+        let points = random_points(system.len(), system.len() as u64);
+        let mut last: Option<(f64, f64)> = None;
+        let mut row = Row {
+            name: subject.name.clone(),
+            max_norm: 0.0,
+            energy: 0.0,
+        };
+        let stop = Stop {
+            tolerance: 1e-8,
+            max_iterations: 60,
+        };
+        run_watched(
+            &system,
+            &points,
+            Setup::Pia { omega: 1.0 },
+            &stop,
+            &mut |step| {
+                let energy: f64 = (0..system.len())
+                    .map(|i| {
+                        (points[i] - system.a.row_times(i, step.points)).length_squared()
+                            / system.h[i]
+                    })
+                    .sum();
+                if let Some((e, g)) = last {
+                    row.max_norm = row.max_norm.max(step.errors.max / e);
+                    row.energy = row.energy.max((energy / g).sqrt());
+                }
+                last = Some((step.errors.max, energy));
+                ControlFlow::Continue(())
+            },
+        );
+        Ok(row)
+    })?;
+    let worst = rows.iter().max_by(|a, b| a.max_norm.total_cmp(&b.max_norm));
+    let name = worst.map_or("", |r| r.name.as_str());
+    let growing = rows.iter().filter(|r| r.max_norm > 1.0).count();
+    Ok(Finding::refuted(vec![
+        Evidence::above(
+            format!("largest max e^{{k+1}} over max e^k under Loop, random points, {name}"),
+            worst.map_or(f64::NAN, |r| r.max_norm),
+            1.0,
+        ),
+        Evidence::shown("meshes of 100 on which the maximum error grows at some step", growing),
+        Evidence::below(
+            "largest ratio of ‖H^-½ e‖₂ at successive steps on all of them",
+            largest(rows.iter().map(|r| r.energy)),
+            1.0,
+        ),
+    ])
+    .remark(
+        "I − B is symmetric in the norm ‖H^-½·‖₂ with eigenvalues in [0, 1), so there every error shrinks; in the \
+         maximum norm ‖I − B‖_∞ = max 2(1 − β_n) > 1, and errors may grow for a step.",
+    ))
+}
+
+fn linear_time(lab: &Lab) -> Result<Finding> {
+    let (mut entries, mut counts) = (Vec::new(), Vec::new());
+    for level in 2..=6 {
+        let subject = lab.context.stand_in(&format!("icosphere:{level}"))?;
+        let system = subject.system(Scheme::Loop)?;
+        entries.push(entries_per_vertex(&system));
+        let count = iterations(&system, &subject, Setup::Pia { omega: 1.0 }, 1e-6);
+        counts.push(count.map_or(f64::NAN, |n| n as f64));
+    }
+    let spread = |v: &[f64]| largest(v.iter().copied()) / smallest(v.iter().copied());
+    let levels = (2..).zip(&counts).map(|(level, &count)| {
+        Evidence::shown(format!("iterations, icosphere:{level}"), count as usize)
+    });
+    Ok(Finding::reproduced(vec![
+        Evidence::at_most("entries of B a vertex, largest over smallest, icosphere:2 … 6 (162 to 40 962 vertices)", spread(&entries), 1.05),
+        Evidence::at_most("iterations to 10⁻⁶ L on them, largest over smallest", spread(&counts), 1.25),
+    ])
+    .also(levels)
+    .remark("λ_min(B) ≥ min (3β_n − 1)/2 > 0 bounds m whatever n is."))
+}

@@ -1,0 +1,77 @@
+use super::*;
+
+/// The list of the papers' statements, and those found beside it.
+const IDS: [(char, usize); 4] = [('T', 31), ('Z', 25), ('P', 12), ('L', 13)];
+
+#[test]
+fn every_statement_is_in_the_ledger_once_and_in_order() {
+    let wanted: Vec<String> = IDS
+        .iter()
+        .flat_map(|&(letter, count)| (1..=count).map(move |k| format!("{letter}{k}")))
+        .collect();
+    let found: Vec<&str> = all().map(|c| c.id).collect();
+    assert_eq!(found, wanted);
+    assert!(all().all(|c| !c.title.is_empty() && !c.place.is_empty() && c.printed.ends_with('.')));
+    assert!(all().all(|c| !paper(c).is_empty()));
+    // Items and claims share one name space.
+    assert!(find(LEDGER.id).is_none() && find(FINDINGS.id).is_none());
+}
+
+fn record(finding: Finding) -> Record {
+    Record {
+        claim: find("T1").unwrap(),
+        finding,
+    }
+}
+
+#[test]
+fn a_claim_without_numbers_still_has_its_row() {
+    let records = [record(Finding::not_reproducible("no model"))];
+    let csv = table(&records).to_csv();
+    let row = csv.lines().nth(1).unwrap();
+    assert!(
+        row.starts_with("T1,,") && row.ends_with("not reproducible,no model"),
+        "{row}"
+    );
+    assert!(section(&records[0]).contains("not reproducible"));
+    assert_eq!(json(&records)[0]["verdict"], "not reproducible");
+    assert_eq!(counts(&records), "1 not reproducible");
+}
+
+#[test]
+fn a_number_on_the_wrong_side_is_told_everywhere() {
+    let finding = Finding::reproduced(vec![
+        Evidence::at_most("deviation", 0.25, 1e-12),
+        Evidence::equal("misses", 0_usize, 0.0),
+        Evidence::shown("seconds", Value::Time(0.5)),
+    ]);
+    let records = [record(finding)];
+    assert!(section(&records[0]).contains("- deviation: 0.25 (to be ≤ 1.0e-12; it is not)\n"));
+    assert_eq!(json(&records)[0]["evidence"][0]["holds"], false);
+    let csv = table(&records).to_csv();
+    let rows: Vec<&str> = csv.lines().skip(1).collect();
+    assert!(
+        rows[0].contains(",0.25,,,≤,1e-12,no,not confirmed,"),
+        "{}",
+        rows[0]
+    );
+    assert!(
+        rows[1].contains(",,0,,=,0,yes,not confirmed,"),
+        "{}",
+        rows[1]
+    );
+    assert!(rows[2].contains(",,,0.5,,,,not confirmed,"), "{}", rows[2]);
+}
+
+/// The numbers of a mended claim carry its verdict, and those of a broken print do not.
+#[test]
+fn breaking_a_printed_value_changes_the_verdict() {
+    let printed = 9.0 / 4.0; // Thall Eq. 7
+    let deviation = |factor: f64| (factor * 4.0 / 9.0 - 1.0).abs();
+    let verdict = |factor: f64| {
+        let evidence = Evidence::at_most("deviation", deviation(factor), 1e-12);
+        Finding::reproduced(vec![evidence]).verdict()
+    };
+    assert_eq!(verdict(printed), Verdict::Reproduced);
+    assert_eq!(verdict(printed + 1e-3), Verdict::NotConfirmed);
+}
