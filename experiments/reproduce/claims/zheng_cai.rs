@@ -8,7 +8,7 @@ use faer::linalg::solvers::Solve;
 use glam::DVec3;
 
 use limitlab::Result;
-use limitlab::analysis::spectrum::sweep_radius;
+use limitlab::analysis::radius::sweep_radius;
 use limitlab::assemble::{LimitSystem, Scheme};
 use limitlab::interpolate::subset::Restriction;
 use limitlab::interpolate::thall::normal_deviations;
