@@ -154,7 +154,17 @@ impl Axis {
     }
 
     fn linear_ticks(&self, most: usize) -> Vec<Tick> {
-        let step = Step::at_least((self.hi / 2.0 - self.lo / 2.0) / most as f64 * 2.0);
+        let least = (self.hi / 2.0 - self.lo / 2.0) / most as f64 * 2.0;
+        let ticks = self.multiples(Step::at_least(least));
+        if ticks.is_empty() {
+            // A step of 5 may jump over a range that two steps of 2 divide.
+            return self.multiples(Step::at_least(0.5 * least));
+        }
+        ticks
+    }
+
+    /// The multiples of a step within the range.
+    fn multiples(&self, step: Step) -> Vec<Tick> {
         let size = step.value();
         let (first, last) = (
             (self.lo / size - 1e-9).ceil() as i64,
@@ -402,6 +412,13 @@ mod tests {
         assert_eq!(axis.position(f64::INFINITY), None);
         assert!((axis.position(1e-2).unwrap() - 0.5).abs() < 1e-12);
         assert!(axis.position(1e-8).unwrap() < 0.0);
+    }
+
+    #[test]
+    fn a_range_that_five_jumps_over_has_ticks() {
+        for (lo, hi) in [(238.77, 238.77 + 4.4e8), (144.286, 144.286 + 4.74e5)] {
+            assert!(!Axis::over(Scale::Linear, (lo, hi)).ticks(2).is_empty());
+        }
     }
 
     proptest! {
