@@ -26,7 +26,7 @@ struct Arguments {
     /// Methods, separated by commas; all unless told
     #[arg(long, value_name = "NAME,…")]
     method: Option<List<Method>>,
-    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, random or random:SEED
+    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
     #[command(flatten)]

@@ -18,6 +18,8 @@ use limitlab::cli::{
     self, CommonFlags, Input, MeshFlags, Progress, StopFlags, constraints, number,
 };
 use limitlab::error::Error;
+use limitlab::interpolate::automatic::control_points;
+use limitlab::interpolate::halstead::{self, Energies, Fairness, Weights, fit};
 use limitlab::interpolate::lin_luo;
 use limitlab::interpolate::normals::Rotation;
 use limitlab::interpolate::subset::Restriction;
@@ -25,8 +27,7 @@ use limitlab::interpolate::surface::{Request, Surface, surface};
 use limitlab::interpolate::zheng_cai::{self, Constraints, PhaseOne, Sweep};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, io};
-use limitlab::solvers::system::Rows;
-use limitlab::solvers::{Errors, Method, Outcome, Solution, Step, run_watched};
+use limitlab::solvers::{Errors, Method, Outcome, Report, Solution, Step, run_watched};
 use limitlab::subdivide::doo_sabin::{Rule, limit_positions};
 
 /// Computes the control mesh V with A V = P: the vertices P of the mesh become points of the limit surface. Unless
@@ -42,11 +43,12 @@ struct Arguments {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
-    /// pcg-ssor, pcg-ic0, or two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); auto is chebyshev with
-    /// proven bounds where there are any, else cg
+    /// pcg-ssor, pcg-ic0; two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); halstead (the fairest
+    /// surface, with --scheme catmull-clark: a control mesh two refinements down). auto is chebyshev in mixed
+    /// precision without a stored matrix, cg where that makes no progress, and ldlt where neither does
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice)]
     method: Choice,
-    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, random or random:SEED
+    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
     /// Print one JSON object on standard output, and nothing else there
@@ -105,6 +107,12 @@ struct ShapeFlags {
     /// --method two-phase stops at a largest update of this part of the bounding box's diagonal
     #[arg(long, value_name = "T", default_value_t = 0.003, value_parser = cli::positive)]
     eps: f64,
+    /// Weight of the thin-plate energy in --method halstead
+    #[arg(long, value_name = "W", default_value_t = 1.0)]
+    thin_plate: f64,
+    /// Weight of the membrane energy in --method halstead, positive
+    #[arg(long, value_name = "W", default_value_t = 1.0, value_parser = cli::positive)]
+    membrane: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,12 +120,14 @@ enum Choice {
     Auto,
     Solver(Method),
     TwoPhase,
+    Halstead,
 }
 
 fn choice(text: &str) -> Result<Choice> {
     match text {
         "auto" => Ok(Choice::Auto),
         "two-phase" => Ok(Choice::TwoPhase),
+        "halstead" => Ok(Choice::Halstead),
         _ => text.parse().map(Choice::Solver),
     }
 }
@@ -150,6 +160,19 @@ fn main() -> ExitCode {
     {
         conflict("--method two-phase belongs to --scheme zheng-cai");
     }
+    if arguments.method == Choice::Halstead {
+        if *arguments.mesh.scheme.get_or_insert(Scheme::CatmullClark) != Scheme::CatmullClark {
+            conflict("--method halstead belongs to --scheme catmull-clark");
+        }
+        if arguments.shape.vertices.is_some() || arguments.shape.shape_handle.is_some() {
+            conflict("--method halstead interpolates all vertices and has no shape handles");
+        }
+        if arguments.shape.subdivide == 1 {
+            conflict(
+                "--method halstead gives a mesh two refinements down: use --subdivide 2 or more, or leave it out",
+            );
+        }
+    }
     cli::exit(|| {
         arguments.common.apply()?;
         run(&arguments)
@@ -168,6 +191,9 @@ fn run(arguments: &Arguments) -> Result<()> {
     };
     let mut result = match &wishes.alpha {
         Some(alpha) => unified(arguments, &input, alpha).map_err(named)?,
+        None if arguments.method == Choice::Halstead => {
+            fairest(arguments, &input, &wishes).map_err(named)?
+        }
         None => {
             let control = control_mesh(arguments, &input, &wishes)?;
             refine(arguments, &input, &wishes, control).map_err(named)?
@@ -261,12 +287,31 @@ struct Finished {
     status: &'static str,
     errors: Errors,
     tolerance: f64,
+    fairness: Option<Energies>,
     seconds: Seconds,
 }
 
 fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
     if arguments.method == Choice::TwoPhase {
         return two_phase(arguments, input, wishes);
+    }
+    if input.mesh.diagonal() == 0.0 && arguments.stop.tol_absolute.is_none() {
+        return Err(Error::mesh(
+            &input.name,
+            "all points coincide, so no tolerance can be relative to their extent: give --tol-absolute",
+        ));
+    }
+    let mut chosen = match arguments.method {
+        Choice::Solver(method) => Some(method),
+        _ => None,
+    };
+    if arguments.method == Choice::Auto && wishes.interpolated.is_none() {
+        if let Some(control) = fastest(arguments, input)? {
+            return Ok(control);
+        }
+        // A factorization tells a nearly singular matrix, on which iterations may make no progress for long, from a
+        // singular one.
+        chosen = Some(Method::Ldlt);
     }
     let start = Instant::now();
     let system = input.system()?;
@@ -276,10 +321,7 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
     };
     let solved = part.as_ref().map_or(&system, |p| &p.system);
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
-    let method = match arguments.method {
-        Choice::Solver(method) => method,
-        _ => automatic(solved),
-    };
+    let mut method = chosen.unwrap_or_else(|| automatic(solved));
     let start = Instant::now();
     let order = arguments
         .order
@@ -287,21 +329,29 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
     let order = part
         .as_ref()
         .map_or_else(|| order.clone(), |p| p.order(&order));
-    let setup = standard_setup(solved, method, Some(&order), &|| spectrum(solved))?;
     let stop = arguments.stop.stop(&input.mesh);
     let progress = Progress::open("solving", arguments.common.quiet);
-    let watch = &mut |step: &Step| {
-        progress.step();
-        progress.message(format!("{method}: max error {:.2e}", step.errors.max));
-        ControlFlow::Continue(())
+    let solve = |method: Method| -> Result<Solution> {
+        let setup = standard_setup(solved, method, Some(&order), &|| spectrum(solved))?;
+        let watch = &mut |step: &Step| {
+            progress.step();
+            progress.message(format!("{method}: max error {:.2e}", step.errors.max));
+            ControlFlow::Continue(())
+        };
+        let points = &input.mesh.positions;
+        Ok(match &part {
+            Some(part) => part.solve(&system, points, setup, &stop, watch),
+            None => run_watched(&system, points, setup, &stop, watch),
+        })
     };
-    let points = &input.mesh.positions;
-    let solution = match &part {
-        Some(part) => part.solve(&system, points, setup, &stop, watch),
-        None => run_watched(&system, points, setup, &stop, watch),
-    };
+    let mut solution = solve(method)?;
+    let outcome = solution.report.outcome;
+    if arguments.method == Choice::Auto && no_progress(outcome) {
+        method = Method::Ldlt;
+        solution = solve(method)?;
+    }
     drop(progress);
-    check(input, method, &solution, stop.tolerance)?;
+    check(input, method, &solution.report, stop.tolerance)?;
     Ok(Control {
         method: method.name(),
         points: solution.points,
@@ -316,6 +366,41 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
             ..Seconds::default()
         },
     })
+}
+
+/// Whether an iteration ended without getting nearer.
+fn no_progress(outcome: Outcome) -> bool {
+    matches!(
+        outcome,
+        Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown
+    )
+}
+
+/// All vertices, by the library's choice of order, operator and method; `None` if that makes no progress.
+fn fastest(arguments: &Arguments, input: &Input) -> Result<Option<Control>> {
+    let stop = arguments.stop.stop(&input.mesh);
+    let progress = Progress::open("solving", arguments.common.quiet);
+    let (mesh, topology) = (&input.mesh, &input.topology);
+    let found = control_points(mesh, Some(topology), input.scheme, &stop)
+        .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
+    drop(progress);
+    if no_progress(found.report.outcome) {
+        return Ok(None);
+    }
+    check(input, found.method, &found.report, stop.tolerance)?;
+    Ok(Some(Control {
+        method: found.method.name(),
+        points: found.points,
+        iterations: found.report.iterations,
+        status: found.report.outcome.name(),
+        errors: found.report.last(),
+        tolerance: stop.tolerance,
+        seconds: Seconds {
+            assemble: input.check_seconds + found.curve_seconds + found.setup_seconds,
+            solve: found.solve_seconds,
+            ..Seconds::default()
+        },
+    }))
 }
 
 /// Zheng & Cai's phase one by its own rule.
@@ -354,14 +439,15 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
 /// How far the limit points of an auxiliary mesh are from those interpolated.
 fn auxiliary_errors(input: &Input, marks: Option<&[bool]>, auxiliary: &Mesh) -> Result<Errors> {
     let limits = limit_positions(Rule::ZhengCai, auxiliary, &input.topology)?;
-    let points = &input.mesh.positions;
-    let mut nothing = vec![(); points.len()];
-    let totals = Rows::new(points.len()).pass_one(&mut nothing, |v, (), tally| {
-        if marks.is_none_or(|m| m[v]) {
-            tally.error(points[v] - limits[v]);
-        }
-    });
-    Ok(totals.errors)
+    let pairs = input.mesh.positions.iter().zip(&limits).enumerate();
+    let distances: Vec<f64> = pairs
+        .filter(|(v, _)| marks.is_none_or(|m| m[*v]))
+        .map(|(_, (p, q))| p.distance(*q))
+        .collect();
+    Ok(Errors {
+        max: distances.iter().copied().fold(0.0, f64::max),
+        mean: distances.iter().sum::<f64>() / distances.len() as f64,
+    })
 }
 
 fn refine(
@@ -395,7 +481,47 @@ fn refine(
         status: control.status,
         errors: control.errors,
         tolerance: control.tolerance,
+        fairness: None,
         seconds,
+    })
+}
+
+/// The fairest control mesh, and its surface.
+fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Finished> {
+    let start = Instant::now();
+    let fairness = Fairness::new(&input.mesh)?;
+    let assemble = input.check_seconds + start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let flags = &arguments.shape;
+    let weights = Weights {
+        thin_plate: flags.thin_plate,
+        membrane: flags.membrane,
+    };
+    let points = &input.mesh.positions;
+    let found = fit(&fairness, points, wishes.normals.as_deref(), weights)?;
+    let solve = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let request = Request {
+        levels: usize::from(flags.subdivide).saturating_sub(halstead::LEVELS),
+        limit: flags.limit,
+        normals: flags.write_normals,
+        ..Request::default()
+    };
+    let surface = surface(found.mesh, &fairness.topology, input.scheme, &[], &request)?;
+    Ok(Finished {
+        method: "halstead",
+        surface,
+        iterations: 1,
+        status: "converged",
+        errors: found.errors,
+        tolerance: 0.0,
+        fairness: Some(found.energies),
+        seconds: Seconds {
+            assemble,
+            solve,
+            subdivide: start.elapsed().as_secs_f64(),
+            ..Seconds::default()
+        },
     })
 }
 
@@ -426,6 +552,7 @@ fn unified(arguments: &Arguments, input: &Input, alpha: &[f64]) -> Result<Finish
             mean: 0.0,
         },
         tolerance: 0.0,
+        fairness: None,
         seconds: Seconds {
             assemble: input.check_seconds,
             subdivide: start.elapsed().as_secs_f64(),
@@ -520,6 +647,10 @@ fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished
             "given": given(n),
             "set": surface.normals_set,
         })),
+        "fairness": result.fairness.map_or(Value::Null, |e| json!({
+            "thin_plate": number(e.thin_plate),
+            "membrane": number(e.membrane),
+        })),
         "seconds": {
             "read": number(input.read_seconds),
             "assemble": number(seconds.assemble),
@@ -532,8 +663,7 @@ fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished
 }
 
 /// A run that did not converge gives no control mesh.
-fn check(input: &Input, method: Method, solution: &Solution, tolerance: f64) -> Result<()> {
-    let report = &solution.report;
+fn check(input: &Input, method: Method, report: &Report, tolerance: f64) -> Result<()> {
     let what = match report.outcome {
         Outcome::Converged => return Ok(()),
         Outcome::Singular => {
@@ -543,7 +673,8 @@ fn check(input: &Input, method: Method, solution: &Solution, tolerance: f64) -> 
         Outcome::Diverged => "the iteration diverged; try --method auto",
         Outcome::MaxIterations => "the iterations ran out; raise --max-iter, or try --method auto",
         Outcome::Stagnated => {
-            "the error no longer shrinks: the tolerance is below rounding, or no control mesh exists; raise --tol"
+            "the error no longer shrinks: raise --tol if it is below rounding; else the matrix is nearly singular, or no \
+             control mesh exists: --method ldlt tells which"
         }
         Outcome::Breakdown | Outcome::Stopped => "the method broke down; try another --method",
     };

@@ -31,7 +31,7 @@ struct Arguments {
     /// Values of ω from A to B, both included; unless told, 0.05 to the first value beyond each method's threshold
     #[arg(long, value_name = "A:B:STEP")]
     omega: Option<Grid>,
-    /// Vertex order of SOR: file, reverse, bfs, rcm, morton, valence, random or random:SEED
+    /// Vertex order of SOR: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
     #[command(flatten)]

@@ -1,24 +1,16 @@
 //! Every mesh of `../shared/meshes` against its MANIFEST: sizes, shape, and what is wrong with it.
 
+#[path = "common/mod.rs"]
+mod common;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use common::collection::collection;
 use limitlab::mesh::Mesh;
 use limitlab::mesh::io::{self, Loaded};
 use limitlab::mesh::validate::{Boundary, DefectKind, Validation, validate};
-
-fn collection() -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
-    if root.is_dir() {
-        return Some(root);
-    }
-    // Not `eprintln!`, which the test runner swallows.
-    let mut stderr = std::io::stderr();
-    writeln!(stderr, "skipped: no {}", root.display()).unwrap();
-    None
-}
 
 /// One row of the MANIFEST.
 struct Row {

@@ -4,11 +4,17 @@ mod claims;
 #[path = "../common/sweep.rs"]
 mod common;
 mod context;
+mod figures;
+#[path = "../common/splitting.rs"]
+mod local_matrices;
 mod methods;
 mod omega;
+mod orders;
 mod pia;
 mod sparsity;
+mod splitting;
 mod thall;
+mod valences;
 mod zheng_cai;
 
 use std::path::PathBuf;
@@ -52,13 +58,17 @@ struct Arguments {
 }
 
 /// All items, in the order in which they run.
-const ITEMS: [Item; 8] = [
+const ITEMS: [Item; 12] = [
     pia::TABLE1,
     thall::ITERATIONS,
     zheng_cai::SECTION_3_5,
     omega::SWEEPS,
     methods::ALL,
     sparsity::PATTERNS,
+    splitting::LOCAL,
+    orders::ORDERS,
+    valences::VALENCES,
+    figures::ALL,
     claims::LEDGER,
     claims::FINDINGS,
 ];

@@ -3,7 +3,8 @@
 use faer::{Mat, Side};
 use glam::DVec3;
 
-use crate::assemble::LimitSystem;
+use super::spectrum::{Operator, symmetric};
+use crate::assemble::{Csr, LimitSystem};
 use crate::error::{Error, Result};
 
 /// Largest N for which dense eigenvalues are computed: cubic time, about a second here.
@@ -16,32 +17,66 @@ pub struct Eigenvalues {
     pub jacobi: Vec<f64>,
 }
 
+/// Largest N for which dense eigenvalues are computed when they are asked for by name: about half a minute and
+/// 300 MB.
+pub const LARGEST_FULL: usize = 4000;
+
 /// O(N³) time, O(N²) memory.
 ///
 /// # Errors
 /// If N exceeds [`LARGEST`], or the computation does not converge.
 pub fn eigenvalues(system: &LimitSystem) -> Result<Eigenvalues> {
-    within_limit(system.len())?;
-    let jacobi_scale: Vec<f64> = system.m.diagonal().iter().map(|d| 1.0 / d.sqrt()).collect();
-    let a_scale: Vec<f64> = system.h.iter().map(|h| h.sqrt()).collect();
+    within_limit(system.len(), LARGEST)?;
+    both(system)
+}
+
+/// As [`eigenvalues`], up to [`LARGEST_FULL`] vertices.
+///
+/// # Errors
+/// If N exceeds that, or the computation does not converge.
+pub fn full_eigenvalues(system: &LimitSystem) -> Result<Eigenvalues> {
+    within_limit(system.len(), LARGEST_FULL)?;
+    both(system)
+}
+
+fn both(system: &LimitSystem) -> Result<Eigenvalues> {
     Ok(Eigenvalues {
-        a: symmetric(system, &a_scale)?,
-        jacobi: symmetric(system, &jacobi_scale)?,
+        a: values(&symmetric(system, Operator::A))?,
+        jacobi: values(&symmetric(system, Operator::Jacobi))?,
     })
 }
 
-/// The eigenvalues of diag(s) M diag(s), ascending.
-fn symmetric(system: &LimitSystem, s: &[f64]) -> Result<Vec<f64>> {
-    let n = system.len();
-    let mut dense = Mat::<f64>::zeros(n, n);
-    for i in 0..n {
-        for (j, m) in system.m.row(i) {
-            dense[(i, j)] = s[i] * m * s[j];
+fn values(s: &Csr) -> Result<Vec<f64>> {
+    to_dense(s)
+        .self_adjoint_eigenvalues(Side::Lower)
+        .map_err(|e| Error::Computation(format!("dense eigenvalues: {e:?}")))
+}
+
+/// All eigenvalues, ascending, and the unit eigenvectors of the symmetric matrix `s`.
+///
+/// # Errors
+/// If N exceeds [`LARGEST_FULL`], or the computation does not converge.
+pub fn eigenpairs(s: &Csr) -> Result<(Vec<f64>, Vec<Vec<f64>>)> {
+    within_limit(s.len(), LARGEST_FULL)?;
+    let eigen = to_dense(s)
+        .self_adjoint_eigen(Side::Lower)
+        .map_err(|e| Error::Computation(format!("dense eigenvectors: {e:?}")))?;
+    let n = s.len();
+    let values = (0..n).map(|j| eigen.S().column_vector()[j]).collect();
+    let vectors = (0..n)
+        .map(|j| (0..n).map(|i| eigen.U()[(i, j)]).collect())
+        .collect();
+    Ok((values, vectors))
+}
+
+fn to_dense(s: &Csr) -> Mat<f64> {
+    let mut dense = Mat::<f64>::zeros(s.len(), s.len());
+    for i in 0..s.len() {
+        for (j, v) in s.row(i) {
+            dense[(i, j)] = v;
         }
     }
     dense
-        .self_adjoint_eigenvalues(Side::Lower)
-        .map_err(|e| Error::Computation(format!("dense eigenvalues: {e:?}")))
 }
 
 /// The spectral radius of the error matrix of a linear iteration on `system`, from its action on unit vectors.
@@ -51,7 +86,7 @@ fn symmetric(system: &LimitSystem, s: &[f64]) -> Result<Vec<f64>> {
 /// If N exceeds [`LARGEST`], or the computation does not converge.
 pub fn spectral_radius(system: &LimitSystem, mut step: impl FnMut(&mut [DVec3])) -> Result<f64> {
     let n = system.len();
-    within_limit(n)?;
+    within_limit(n, LARGEST)?;
     let mut dense = Mat::<f64>::zeros(n, n);
     let mut x = vec![DVec3::ZERO; n];
     for first in (0..n).step_by(3) {
@@ -72,10 +107,11 @@ pub fn spectral_radius(system: &LimitSystem, mut step: impl FnMut(&mut [DVec3]))
     Ok(all.iter().map(|z| z.norm()).fold(0.0, f64::max))
 }
 
-fn within_limit(n: usize) -> Result<()> {
-    if n > LARGEST {
+fn within_limit(n: usize, limit: usize) -> Result<()> {
+    if n > limit {
         return Err(Error::Computation(format!(
-            "dense eigenvalues of {n} vertices: at most {LARGEST} are computed; use the Krylov estimate"
+            "dense eigenvalues of {n} vertices: at most {limit} are computed; use a coarser mesh, or the extreme \
+             eigenvalues, which have no such limit"
         )));
     }
     Ok(())

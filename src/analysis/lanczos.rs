@@ -1,41 +1,75 @@
-//! Extreme eigenvalues of symmetric operators by the Lanczos process.
+//! Extreme eigenvalues of a sparse symmetric matrix by the Lanczos process, in three vectors.
+//!
+//! One vector's Krylov space needs far fewer products for an extreme value than a block, but shows a multiple
+//! eigenvalue once: [`eigen`](super::eigen) has the multiplicities and the vectors.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use rayon::prelude::*;
 
+use super::tridiagonal::Tridiagonal;
+use crate::assemble::Csr;
 use crate::error::{Error, Result};
 
-/// A Ritz value with the bound on its distance from an eigenvalue: ‖S x − λ x‖₂ of its unit Ritz vector.
+/// A Ritz value with what is known of its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ritz {
     pub value: f64,
+    /// ‖S x − λ x‖₂ of its unit Ritz vector x: an eigenvalue lies within this distance.
     pub residual: f64,
+    /// The estimated error of the value as an end of the spectrum: min over the Ritz values θ_j next to it of
+    /// `|θ_j − θ| + r²/|θ_{j+1} − θ|`, the width of the cluster that θ belongs to and the error of that cluster
+    /// (Temple, Kato); at most the residual.
+    pub error: f64,
     /// The squared part that the start vector has in the Ritz vector.
     pub weight: f64,
 }
 
-/// When the Lanczos process ends.
+/// When the Lanczos process ends, and what counts.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Residual of both extreme Ritz values at which to stop.
+    /// Relative accuracy T of the values looked at: error ≤ T|θ|, residual ≤ 10 T|θ|, and θ moved by no more than
+    /// T|θ| while the steps grew by a quarter. (The residual keeps a group of nearly equal values, which the error
+    /// estimate takes for one, from passing as its mean.)
     pub tolerance: f64,
     pub max_steps: usize,
+    /// Ritz values in which the start takes part with less weight do not count.
+    pub least_weight: f64,
+    /// Which ends need that accuracy.
+    pub ends: Wanted,
 }
 
-/// The smallest and largest Ritz value of the symmetric operator `apply` (y ← S x) from the start `x`, among those
-/// in which the start takes part with weight ≥ `least_weight`.
+/// The ends that a process waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    Lowest,
+    Highest,
+    Both,
+}
+
+/// The result of a Lanczos process.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Run {
+    pub low: Ritz,
+    pub high: Ritz,
+    /// Products with S.
+    pub steps: usize,
+    /// Whether the accuracy asked for was reached within the steps allowed.
+    pub converged: bool,
+}
+
+/// Rows of a task; sums are taken chunk by chunk in their order, whatever the number of threads.
+const CHUNK: usize = 4096;
+/// Ritz values beside an extreme one that its error estimate looks at.
+const NEIGHBOURS: usize = 24;
+
+/// The smallest and largest Ritz value of the symmetric matrix `s` from the start `x`.
 ///
-/// Plain three-term recurrence, three vectors: lost orthogonality repeats converged Ritz values but does not
-/// falsify extreme ones. Multiplicities are not found. The projected problem is solved each time the steps have
-/// grown by a quarter.
+/// Plain three-term recurrence: lost orthogonality repeats converged Ritz values but does not falsify extreme ones
+/// (Paige 1976). The projected problem is looked at each time the steps have grown by a quarter; values must have
+/// stood still since the last look.
 ///
 /// # Errors
-/// A start that is zero or not finite, or a projected problem whose eigenvalues do not converge.
-pub fn extremes(
-    mut apply: impl FnMut(&[f64], &mut [f64]),
-    start: Vec<f64>,
-    limits: Limits,
-    least_weight: f64,
-) -> Result<(Ritz, Ritz)> {
+/// A start that is zero or not finite.
+pub fn extremes(s: &Csr, start: Vec<f64>, limits: Limits) -> Result<Run> {
     let n = start.len();
     let mut v = start;
     let norm = norm2(&v);
@@ -45,113 +79,199 @@ pub fn extremes(
         ));
     }
     v.iter_mut().for_each(|x| *x /= norm);
-    let mut before = vec![0.0; n];
     let mut w = vec![0.0; n];
     let (mut alphas, mut betas): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
     let mut next_check = 8;
+    let mut before: Option<(f64, f64)> = None;
     loop {
-        apply(&v, &mut w);
-        let beta_before = betas.last().copied().unwrap_or(0.0);
-        let alpha: f64 = dot(&w, &v);
-        for ((w, v), b) in w.iter_mut().zip(&v).zip(&before) {
-            *w -= alpha * v + beta_before * b;
-        }
+        // w holds the vector before v.
+        let alpha = product(s, &v, &mut w, betas.last().copied().unwrap_or(0.0));
+        let beta = orthogonalize(&v, &mut w, alpha);
         alphas.push(alpha);
-        let beta = norm2(&w);
         betas.push(beta);
+        if !beta.is_finite() {
+            return Err(Error::Computation(
+                "the matrix holds entries that are not finite".into(),
+            ));
+        }
         let steps = alphas.len();
+        let scale = alphas.iter().fold(0.0f64, |m, a| m.max(a.abs()));
         // An invariant subspace: rounding leaves β at a few ε of the operator's norm.
-        let closed = beta <= 1e-14 * alphas.iter().fold(0.0f64, |m, a| m.max(a.abs()));
+        let closed = beta <= 1e-14 * scale;
         if steps >= next_check || closed || steps == limits.max_steps || steps == n {
             next_check = steps + steps.div_ceil(4);
-            let (low, high) = projected(&alphas, &betas, least_weight)?;
-            let settled = low.residual.max(high.residual) <= limits.tolerance;
-            if settled || closed || steps >= limits.max_steps {
-                return Ok((low, high));
+            let (low, high) = projected(&alphas, &betas, limits.least_weight)?;
+            let good = |r: Ritz, old: f64| {
+                let allowed = (limits.tolerance * r.value.abs()).max(8.0 * f64::EPSILON * scale);
+                r.error <= allowed
+                    && r.residual <= (10.0 * allowed).max(1e-13 * scale)
+                    && (r.value - old).abs() <= allowed
+            };
+            let settled = before.is_some_and(|(l, h)| {
+                (limits.ends == Wanted::Highest || good(low, l))
+                    && (limits.ends == Wanted::Lowest || good(high, h))
+            });
+            let run = Run {
+                low,
+                high,
+                steps,
+                converged: settled || closed,
+            };
+            if run.converged || steps >= limits.max_steps {
+                return Ok(run);
             }
+            before = Some((low.value, high.value));
         }
-        std::mem::swap(&mut before, &mut v);
         std::mem::swap(&mut v, &mut w);
-        v.iter_mut().for_each(|x| *x /= beta);
+        v.par_iter_mut()
+            .with_min_len(CHUNK)
+            .for_each(|x| *x /= beta);
     }
+}
+
+/// `w ← S v − β w` and vᵀw, in one pass.
+fn product(s: &Csr, v: &[f64], w: &mut [f64], beta: f64) -> f64 {
+    let parts: Vec<f64> = w
+        .par_chunks_mut(CHUNK)
+        .enumerate()
+        .map(|(k, w)| {
+            let mut dot = 0.0;
+            for (offset, w) in w.iter_mut().enumerate() {
+                let i = k * CHUNK + offset;
+                *w = s.row_times_scalar(i, v) - beta * *w;
+                dot += *w * v[i];
+            }
+            dot
+        })
+        .collect();
+    parts.iter().sum()
+}
+
+/// `w ← w − α v` and its norm, in one pass.
+fn orthogonalize(v: &[f64], w: &mut [f64], alpha: f64) -> f64 {
+    let parts: Vec<f64> = w
+        .par_chunks_mut(CHUNK)
+        .zip(v.par_chunks(CHUNK))
+        .map(|(w, v)| {
+            let mut square = 0.0;
+            for (w, v) in w.iter_mut().zip(v) {
+                *w -= alpha * v;
+                square += *w * *w;
+            }
+            square
+        })
+        .collect();
+    parts.iter().sum::<f64>().sqrt()
 }
 
 /// The extreme eigenvalues of the tridiagonal matrix so far.
 fn projected(alphas: &[f64], betas: &[f64], least_weight: f64) -> Result<(Ritz, Ritz)> {
     let k = alphas.len();
-    let mut t = DMatrix::zeros(k, k);
-    for i in 0..k {
-        t[(i, i)] = alphas[i];
-        if i + 1 < k {
-            t[(i, i + 1)] = betas[i];
-            t[(i + 1, i)] = betas[i];
-        }
-    }
-    let eigen = SymmetricEigen::try_new(t, f64::EPSILON, 200 * k).ok_or_else(|| {
-        Error::Computation("the eigenvalues of a projected matrix did not converge".into())
-    })?;
-    let ritz = |j: usize| Ritz {
-        value: eigen.eigenvalues[j],
-        residual: betas[k - 1] * eigen.eigenvectors[(k - 1, j)].abs(),
-        weight: eigen.eigenvectors[(0, j)].powi(2),
+    let t = Tridiagonal {
+        alphas,
+        betas: &betas[..k - 1],
     };
-    let mut all: Vec<Ritz> = (0..k)
-        .map(ritz)
-        .filter(|r| r.weight >= least_weight)
-        .collect();
-    all.sort_by(|a, b| a.value.total_cmp(&b.value));
-    match (all.first(), all.last()) {
-        (Some(&low), Some(&high)) => Ok((low, high)),
-        _ => Err(Error::Computation(
+    let end = |from_below: bool| {
+        let index = |j: usize| if from_below { j } else { k - 1 - j };
+        for j in 0..k {
+            let value = t.eigenvalue(index(j));
+            let ends = t.vector_ends(value);
+            let weight = ends.first.powi(2);
+            if weight < least_weight {
+                continue;
+            }
+            let residual = betas[k - 1] * ends.last.abs();
+            let mut error = residual;
+            let mut width = 0.0;
+            for next in j + 1..(j + 1 + NEIGHBOURS).min(k) {
+                let gap = (t.eigenvalue(index(next)) - value).abs();
+                if width >= error {
+                    break;
+                }
+                error = error.min(width + residual * residual / gap);
+                width = gap;
+            }
+            return Ok(Ritz {
+                value,
+                residual,
+                error,
+                weight,
+            });
+        }
+        Err(Error::Computation(
             "no Ritz value has the least weight asked for".into(),
-        )),
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+        ))
+    };
+    Ok((end(true)?, end(false)?))
 }
 
 fn norm2(x: &[f64]) -> f64 {
-    dot(x, x).sqrt()
+    let parts: Vec<f64> = x
+        .par_chunks(CHUNK)
+        .map(|x| x.iter().map(|x| x * x).sum())
+        .collect();
+    parts.iter().sum::<f64>().sqrt()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::sync::Arc;
 
-    fn diagonal(values: &[f64]) -> impl FnMut(&[f64], &mut [f64]) {
-        move |x, y| {
-            for ((y, x), d) in y.iter_mut().zip(x).zip(values) {
-                *y = d * x;
-            }
-        }
+    use super::*;
+    use crate::assemble::csr::Pattern;
+
+    fn diagonal(values: &[f64]) -> Csr {
+        let n = values.len() as u32;
+        let pattern = Pattern::new((0..=n).collect(), (0..n).collect());
+        Csr::new(Arc::new(pattern), values.to_vec())
     }
 
     const LIMITS: Limits = Limits {
-        tolerance: 1e-9,
+        tolerance: 1e-12,
         max_steps: 300,
+        least_weight: 0.0,
+        ends: Wanted::Both,
     };
 
     #[test]
     fn finds_both_ends_of_a_known_spectrum() {
         let values: Vec<f64> = (0..=400).map(|i| 0.1 + 0.9 * i as f64 / 400.0).collect();
         let start = (0..=400).map(|i| 1.0 + (i % 7) as f64).collect();
-        let (low, high) = extremes(diagonal(&values), start, LIMITS, 0.0).expect("a good start");
-        assert!((high.value - 1.0).abs() < 1e-12, "{high:?}");
-        assert!((low.value - 0.1).abs() < 1e-12, "{low:?}");
+        let run = extremes(&diagonal(&values), start, LIMITS).expect("a good start");
+        assert!(run.converged);
+        assert!((run.high.value - 1.0).abs() < 1e-12, "{run:?}");
+        assert!((run.low.value - 0.1).abs() < 1e-12, "{run:?}");
+    }
+
+    #[test]
+    fn the_error_estimate_covers_the_error_before_convergence() {
+        let values: Vec<f64> = (0..4000).map(|i| (i as f64 / 4000.0).powi(2)).collect();
+        let start: Vec<f64> = (0..4000).map(|i| 1.0 + (i % 7) as f64).collect();
+        for max_steps in [40, 80, 160, 320, 640] {
+            let limits = Limits {
+                max_steps,
+                tolerance: 1e-15,
+                ..LIMITS
+            };
+            let run = extremes(&diagonal(&values), start.clone(), limits).expect("a good start");
+            assert!(run.low.residual >= run.low.error);
+            assert!(run.low.value <= run.low.residual, "{run:?}");
+        }
     }
 
     #[test]
     fn sees_only_what_the_start_excites() {
-        let values = [0.1, 0.2, 0.5, 0.7, 3.0];
         let start = vec![0.0, 1.0, 1.0, 1.0, 0.0];
-        let (low, high) = extremes(diagonal(&values), start, LIMITS, 1e-20).expect("a good start");
-        assert!((low.value - 0.2).abs() < 1e-12 && (high.value - 0.7).abs() < 1e-12);
+        let limits = Limits {
+            least_weight: 1e-20,
+            ..LIMITS
+        };
+        let run = extremes(&diagonal(&[0.1, 0.2, 0.5, 0.7, 3.0]), start, limits).expect("a start");
+        assert!((run.low.value - 0.2).abs() < 1e-12 && (run.high.value - 0.7).abs() < 1e-12);
     }
 
     #[test]
     fn a_zero_start_is_an_error() {
-        assert!(extremes(diagonal(&[1.0, 2.0]), vec![0.0; 2], LIMITS, 0.0).is_err());
+        assert!(extremes(&diagonal(&[1.0, 2.0]), vec![0.0; 2], LIMITS).is_err());
     }
 }

@@ -1,13 +1,21 @@
 //! Why a method converges, stalls or fails: spectra, predicted and observed rates, ω sweeps.
 //! This room knows no plotting.
 
+pub mod certificate;
 pub mod comparison;
 pub mod dense;
+pub mod eigen;
 pub mod lanczos;
+pub mod order_study;
 pub mod predict;
+pub mod promise;
+pub mod radius;
 pub mod rate;
+pub mod singularity;
 pub mod spectrum;
 pub mod splitting;
 pub mod sweep;
+pub mod tridiagonal;
+pub mod valence_study;
 
 pub use spectrum::{Extremes, Spectrum};

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use super::spectrum::{Extremes, Spectrum, sweep_radius};
+use super::radius::sweep_radius;
+use super::spectrum::{Extremes, Spectrum};
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::solvers::Setup;

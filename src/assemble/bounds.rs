@@ -1,9 +1,14 @@
-//! Bounds on the spectrum of A that valences, face sizes and the diagonal alone prove.
+//! Bounds on the spectra of A and D⁻¹A that valences, face sizes and the diagonal alone prove.
+
+use rayon::prelude::*;
 
 use super::scheme::{Scheme, loop_beta, sqrt3_beta};
 
-/// Proven bounds: every eigenvalue of A lies in `[lambda_min, lambda_max]`, every eigenvalue of D⁻¹A is at most
-/// `jacobi_lambda_max`, D = diag A.
+/// Entries of one task.
+const CHUNK: usize = 8192;
+
+/// Proven bounds: every eigenvalue of A lies in `[lambda_min, lambda_max]`, every eigenvalue of D⁻¹A in
+/// `[jacobi_lambda_min, jacobi_lambda_max]`, D = diag A.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpectralBounds {
     /// A lower bound of the smallest eigenvalue of A. 0 says: non-negative, no more (a vertex of valence 3 under
@@ -11,39 +16,70 @@ pub struct SpectralBounds {
     pub lambda_min: f64,
     /// The largest eigenvalue of A, attained by the constant vector.
     pub lambda_max: f64,
+    /// A lower bound of the smallest eigenvalue of D⁻¹A, of the sign of `lambda_min` where that is not negative.
+    pub jacobi_lambda_min: f64,
     /// An upper bound of the largest eigenvalue of D⁻¹A.
     pub jacobi_lambda_max: f64,
 }
 
 impl SpectralBounds {
     /// Gershgorin's bounds for a matrix with rows that sum to 1, no negative entry and this diagonal:
-    /// `λ(A) ≥ min (2a_ii − 1)`, `λ(A) ≤ 1`, `λ(D⁻¹A) ≤ max 1/a_ii`.
+    /// `λ(A) ≥ min (2a_ii − 1)`, `λ(A) ≤ 1`, `2 − max 1/a_ii ≤ λ(D⁻¹A) ≤ max 1/a_ii`.
     pub fn gershgorin(diagonal: &[f64]) -> Self {
+        // Both are attained at the least entry.
+        let least = diagonal
+            .par_iter()
+            .with_min_len(CHUNK)
+            .copied()
+            .reduce(|| 1.0, f64::min);
+        let jacobi_lambda_max = 1.0 / least;
         SpectralBounds {
-            lambda_min: diagonal.iter().map(|a| 2.0 * a - 1.0).fold(1.0, f64::min),
+            lambda_min: 2.0 * least - 1.0,
             lambda_max: 1.0,
-            jacobi_lambda_max: diagonal.iter().map(|a| 1.0 / a).fold(1.0, f64::max),
+            jacobi_lambda_min: 2.0 - jacobi_lambda_max,
+            jacobi_lambda_max,
         }
+    }
+
+    /// The bounds on a closed mesh. All schemes have `M ⪰ H⁻¹ diag(b)` with b_i = [`lambda_min_at`] of the valence,
+    /// so `λ(A) ≥ min b_i` and, D being `H diag M`, `λ(D⁻¹A) ≥ min b_i/a_ii`. O(N).
+    pub fn closed(
+        scheme: Scheme,
+        valences: &[u32],
+        triangles_only: bool,
+        diagonal: &[f64],
+    ) -> Self {
+        let mut bounds = Self::gershgorin(diagonal);
+        let greatest = valences.iter().copied().max().unwrap_or(0) as usize;
+        let at: Vec<f64> = (0..=greatest)
+            .map(|n| lambda_min_at(scheme, n, triangles_only))
+            .collect();
+        let (a, jacobi) = valences
+            .par_iter()
+            .zip(diagonal)
+            .with_min_len(CHUNK)
+            .map(|(&n, a_ii)| (at[n as usize], at[n as usize] / a_ii))
+            .reduce(
+                || (f64::INFINITY, f64::INFINITY),
+                |(a, b), (c, d)| (a.min(c), b.min(d)),
+            );
+        bounds.lambda_min = a.min(1.0);
+        bounds.jacobi_lambda_min = jacobi.min(bounds.jacobi_lambda_max);
+        bounds
     }
 }
 
-/// A lower bound of λ_min(A) on a closed mesh, from its valences.
+/// What a vertex of valence n ≥ 3 allows λ_min(A) to be on a closed mesh.
 ///
-/// Catmull-Clark: `min (n−3)/(n+5)`, from the quadratic form
-/// `xᵀMx = Σ_F (4/|F|)(Σ_{i∈F} x_i)² + 2 Σ_ij (x_i+x_j)² + Σ n(n−3) x_i²`. Loop and √3: `min (3β_n − 1)/2`.
+/// Catmull-Clark: `(n−3)/(n+5)`, from the quadratic form
+/// `xᵀMx = Σ_F (4/|F|)(Σ_{i∈F} x_i)² + 2 Σ_ij (x_i+x_j)² + Σ n(n−3) x_i²`. Loop and √3: `(3β_n − 1)/2`.
 /// Nasri: the face circulants have the eigenvalues 1, ½, ½, ¼, …, so ¼, and ½ where all faces are triangles.
-/// Zheng-Cai: ½. O(N).
-pub fn lambda_min_bound(scheme: Scheme, valences: &[u32], triangles_only: bool) -> f64 {
-    let over_valences = |bound: fn(usize) -> f64| {
-        valences
-            .iter()
-            .map(|&n| bound(n as usize))
-            .fold(1.0, f64::min)
-    };
+/// Zheng-Cai: ½.
+pub fn lambda_min_at(scheme: Scheme, n: usize, triangles_only: bool) -> f64 {
     match scheme {
-        Scheme::CatmullClark => over_valences(|n| (n as f64 - 3.0) / (n as f64 + 5.0)),
-        Scheme::Loop => over_valences(|n| 0.5 * (3.0 * loop_beta(n) - 1.0)),
-        Scheme::Sqrt3 => over_valences(|n| 0.5 * (3.0 * sqrt3_beta(n) - 1.0)),
+        Scheme::CatmullClark => (n as f64 - 3.0) / (n as f64 + 5.0),
+        Scheme::Loop => 0.5 * (3.0 * loop_beta(n) - 1.0),
+        Scheme::Sqrt3 => 0.5 * (3.0 * sqrt3_beta(n) - 1.0),
         Scheme::Nasri if triangles_only => 0.5,
         Scheme::Nasri => 0.25,
         Scheme::ZhengCai => 0.5,

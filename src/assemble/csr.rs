@@ -3,6 +3,10 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use rayon::prelude::*;
+
+/// Rows of one task.
+const CHUNK: usize = 4096;
 
 /// Which entries of a square matrix are stored: row `i` holds `columns[offsets[i]..offsets[i + 1]]`, ascending
 /// and without repetition.
@@ -26,13 +30,13 @@ impl Pattern {
         );
         let n = offsets.len() - 1;
         let pattern = Pattern { offsets, columns };
-        for i in 0..n {
+        (0..n).into_par_iter().with_min_len(CHUNK).for_each(|i| {
             let row = pattern.row(i);
             assert!(
                 row.is_sorted_by(|a, b| a < b) && row.last().is_none_or(|&c| (c as usize) < n),
                 "the columns of row {i} ascend within the matrix"
             );
-        }
+        });
         pattern
     }
 
@@ -129,7 +133,11 @@ impl Csr {
 
     /// The main diagonal.
     pub fn diagonal(&self) -> Vec<f64> {
-        (0..self.len()).map(|i| self.get(i, i)).collect()
+        (0..self.len())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map(|i| self.get(i, i))
+            .collect()
     }
 
     /// `diag(scale) · self`, on the same pattern.
@@ -138,9 +146,41 @@ impl Csr {
     /// If `scale` does not hold one number a row.
     pub fn scale_rows(&self, scale: &[f64]) -> Csr {
         assert_eq!(scale.len(), self.len(), "one factor a row");
+        let mut values = vec![0.0; self.values.len()];
+        let mut parts = Vec::with_capacity(scale.len().div_ceil(CHUNK));
+        let mut rest = values.as_mut_slice();
+        for (k, scale) in scale.chunks(CHUNK).enumerate() {
+            let first = k * CHUNK;
+            let entries = self.pattern.offsets[first + scale.len()] - self.pattern.offsets[first];
+            let (part, after) = rest.split_at_mut(entries as usize);
+            parts.push((first, scale, part));
+            rest = after;
+        }
+        parts.into_par_iter().for_each(|(first, scale, mut part)| {
+            for (i, &s) in (first..).zip(scale) {
+                let row = self.row_values(i);
+                let (out, after) = part.split_at_mut(row.len());
+                for (out, &v) in out.iter_mut().zip(row) {
+                    *out = s * v;
+                }
+                part = after;
+            }
+        });
+        Csr {
+            pattern: Arc::clone(&self.pattern),
+            values,
+        }
+    }
+
+    /// `diag(scale) · self · diag(scale)`, on the same pattern; symmetric to the last bit if `self` is.
+    ///
+    /// # Panics
+    /// If `scale` does not hold one number a row.
+    pub fn scale_symmetrically(&self, scale: &[f64]) -> Csr {
+        assert_eq!(scale.len(), self.len(), "one factor a row");
         let mut values = Vec::with_capacity(self.values.len());
         for (i, &s) in scale.iter().enumerate() {
-            values.extend(self.row_values(i).iter().map(|&v| s * v));
+            values.extend(self.row(i).map(|(j, v)| v * (s * scale[j])));
         }
         Csr {
             pattern: Arc::clone(&self.pattern),

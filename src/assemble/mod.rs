@@ -5,9 +5,13 @@
 pub mod bounds;
 pub mod csr;
 pub mod matrix_market;
+pub mod operator;
 pub mod scheme;
+mod source;
+pub mod stencil;
 pub mod system;
 
 pub use csr::Csr;
+pub use operator::Operator;
 pub use scheme::{Masks, Scheme};
 pub use system::LimitSystem;

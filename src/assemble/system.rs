@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::bounds::{SpectralBounds, lambda_min_bound};
+use super::bounds::SpectralBounds;
 use super::csr::{Csr, Pattern};
 use super::scheme::{Masks, Scheme};
 use crate::error::{Error, Result};
@@ -56,26 +56,14 @@ impl LimitSystem {
     /// # Ok::<(), limitlab::Error>(())
     /// ```
     pub fn new(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Result<Self> {
-        if let Some(f) = scheme.first_unsuitable_face(&mesh.faces) {
-            return Err(Error::Computation(format!(
-                "face {f} has {} corners, and the scheme {scheme} is defined on triangles only; triangulate the \
-                 mesh or use --scheme catmull-clark, nasri or zheng-cai",
-                mesh.faces.face(f).len()
-            )));
-        }
-        if topology.boundary_edges() > 0 && !scheme.edges_only() {
-            return Err(Error::Computation(format!(
-                "{} boundary edges, and the masks of {scheme} need whole faces around every vertex; close the \
-                 holes, or use --boundary as-interior with --scheme loop or sqrt3 on triangles",
-                topology.boundary_edges()
-            )));
-        }
+        check_mesh(&mesh.faces, topology, scheme)?;
         let mut system = Self::with_masks(mesh, topology, &scheme)?;
         if topology.is_closed() {
-            system.bounds.lambda_min = lambda_min_bound(
+            system.bounds = SpectralBounds::closed(
                 scheme,
                 &valences(&mesh.faces, topology),
                 mesh.faces.uniform_size() == Some(3),
+                &system.diagonal,
             );
         }
         Ok(system)
@@ -131,6 +119,25 @@ impl LimitSystem {
         assert_eq!(points.len(), self.len(), "one point a vertex");
         points.iter().zip(&self.h).map(|(&p, &h)| p / h).collect()
     }
+}
+
+/// Refuses faces and boundaries that `scheme` is not defined on.
+pub(super) fn check_mesh(faces: &Faces, topology: &Topology, scheme: Scheme) -> Result<()> {
+    if let Some(f) = scheme.first_unsuitable_face(faces) {
+        return Err(Error::Computation(format!(
+            "face {f} has {} corners, and the scheme {scheme} is defined on triangles only; triangulate the \
+             mesh or use --scheme catmull-clark, nasri or zheng-cai",
+            faces.face(f).len()
+        )));
+    }
+    if topology.boundary_edges() > 0 && !scheme.edges_only() {
+        return Err(Error::Computation(format!(
+            "{} boundary edges, and the masks of {scheme} need whole faces around every vertex; close the \
+             holes, or use --boundary as-interior with --scheme loop or sqrt3 on triangles",
+            topology.boundary_edges()
+        )));
+    }
+    Ok(())
 }
 
 /// The number of edges at every vertex: the valence n of the masks, on a boundary too.

@@ -8,11 +8,15 @@
 //! | [`zheng_cai`] | Zheng & Cai's two phases: exact centroids, normals, shape handles |
 //! | [`nasri`] | Nasri's method, beside it |
 //! | [`lin_luo`] | Lin & Luo's unified schemes for curves and √3 surfaces |
+//! | [`halstead`] | fair interpolation as a sparse constrained least-squares problem; iterations watched by it |
 //! | [`surface`] | from a control mesh to the surface: levels, limit points, normals |
+//! | [`automatic`] | the control mesh by the fastest way: order, operator, mixed precision |
 //! | [`subset`] | some vertices only, for every scheme and solver |
 //!
 //! This room builds on meshes, subdivision, assembly, solvers and analysis, and knows no plotting.
 
+pub mod automatic;
+pub mod halstead;
 pub mod lin_luo;
 pub mod nasri;
 pub mod normals;

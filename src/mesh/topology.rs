@@ -1,6 +1,8 @@
 //! Who meets whom: corners at each vertex, opposite half-edges, edges, ordered stars, components, boundary
 //! loops, Euler characteristic. Built in linear time by counting sorts; no hashing.
 
+use rayon::prelude::*;
+
 use super::Faces;
 
 /// Marks an absent index in the arrays of this room.
@@ -67,6 +69,43 @@ impl Incidence {
     }
 }
 
+impl Incidence {
+    /// The opposite of every half-edge, if each has exactly one: the usual case, in parallel. O(Σ n²) over the
+    /// valences n, so vertices of more than [`MANY`] faces are left to the sorts.
+    fn pairs(&self, faces: &Faces) -> Option<Vec<u32>> {
+        // Among triangles, and among quads, the next corner takes no look at the face.
+        match faces.uniform_size() {
+            Some(3) => self.pairs_by(faces, |c| if c % 3 == 2 { c - 2 } else { c + 1 }),
+            Some(4) => self.pairs_by(faces, |c| if c % 4 == 3 { c - 3 } else { c + 1 }),
+            _ => self.pairs_by(faces, |c| next_in(&faces.range(self.face_of(c)), c)),
+        }
+    }
+
+    fn pairs_by(&self, faces: &Faces, next: impl Fn(u32) -> u32 + Sync) -> Option<Vec<u32>> {
+        let corners = faces.corners();
+        let end = |c: u32| corners[next(c) as usize];
+        (0..corners.len() as u32)
+            .into_par_iter()
+            .with_min_len(8192)
+            .map(|c| {
+                let (from, to) = (corners[c as usize], end(c));
+                let at = self.corners_at(to as usize);
+                if from == to || at.len() > MANY {
+                    return None;
+                }
+                let mut opposite = at.iter().copied().filter(|&d| end(d) == from);
+                match (opposite.next(), opposite.next()) {
+                    (Some(d), None) => Some(d),
+                    _ => None,
+                }
+            })
+            .collect()
+    }
+}
+
+/// Beyond this many faces at a vertex, a sort of its sides is faster than comparing each with each.
+const MANY: usize = 64;
+
 /// How the faces hang together. Half-edge `c` leaves corner `c` for the next corner of its face.
 #[derive(Clone, Debug)]
 pub struct Topology {
@@ -113,6 +152,15 @@ impl Topology {
     pub fn new(faces: &Faces, vertices: usize) -> Self {
         let incidence = Incidence::new(faces, vertices);
         let corners = faces.corners();
+        if let Some(twin) = incidence.pairs(faces) {
+            return Topology {
+                incidence,
+                edges: twin.len() / 2,
+                twin,
+                boundary: Vec::new(),
+                irregular_edges: Vec::new(),
+            };
+        }
         let mut twin = vec![NONE; corners.len()];
         let mut edges = 0;
         let mut boundary = Vec::new();

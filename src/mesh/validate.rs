@@ -337,7 +337,11 @@ fn examine_topology(mesh: &Mesh, isolated: usize, boundary: Boundary, report: &m
     {
         report.orientation = Some(examine_orientation(faces, &topology));
     }
-    let (min_valence, max_valence) = examine_vertices(faces, incidence, &mut report.defects);
+    // Components are found one after the other, vertices in parallel.
+    let ((min_valence, max_valence), components) = rayon::join(
+        || examine_vertices(faces, incidence, &mut report.defects),
+        || topology.components(faces).1,
+    );
     let boundary_edges = topology.boundary_edges();
     let boundary_loops = topology.irregular_edges().is_empty().then(|| {
         if boundary_edges == 0 {
@@ -370,7 +374,7 @@ fn examine_topology(mesh: &Mesh, isolated: usize, boundary: Boundary, report: &m
         vertices: mesh.len(),
         edges: topology.edges(),
         faces: faces.len(),
-        components: topology.components(faces).1 - isolated,
+        components: components - isolated,
         euler_characteristic: topology.euler_characteristic(faces),
         boundary_edges,
         boundary_loops,

@@ -8,7 +8,7 @@ use crate::{Error, Result};
 use plotters::backend::BitMapBackend;
 use plotters::coord::Shift;
 use plotters::drawing::{DrawingArea, IntoDrawingArea};
-use plotters::element::{Circle, Polygon, Rectangle};
+use plotters::element::{BitMapElement, Circle, Polygon, Rectangle};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{
     Color, FontDesc, FontFamily, FontStyle, FontTransform, IntoFont, WHITE, register_font,
@@ -284,6 +284,22 @@ impl Canvas<'_> {
         // The backend includes the last row and column.
         let corners = [(x0, y0), ((x1 - 1).max(x0), (y1 - 1).max(y0))];
         drawn(self.area.draw(&Rectangle::new(corners, colour.filled())))
+    }
+
+    /// Fills a rectangle with an image, made for its width and height in drawn pixels and the drawn pixels a point.
+    pub fn image(
+        &self,
+        rect: Rect,
+        make: impl FnOnce(u32, u32, f64) -> Result<Image>,
+    ) -> Result<()> {
+        let (x0, y0) = pixel((rect.left, rect.top));
+        let (x1, y1) = pixel((rect.right, rect.bottom));
+        let size = ((x1 - x0).max(1) as u32, (y1 - y0).max(1) as u32);
+        let image = make(size.0, size.1, SCALE)?;
+        match BitMapElement::with_owned_buffer((x0, y0), size, image.rgb) {
+            Some(bitmap) => drawn(self.area.draw(&bitmap)),
+            None => drawn(Err("an image of another size")),
+        }
     }
 
     /// Draws the outline of a rectangle, its middle on the rectangle's edge.

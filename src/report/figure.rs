@@ -1,9 +1,10 @@
 //! Panels arranged in a grid and rendered to an image.
 
-use super::axis::{Axis, Tick};
+use super::axis::{Axis, Scale, Tick};
 use super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Rect, paint, text_width};
 use super::plot::LinePlot;
 use super::png::Image;
+use super::render::Picture;
 use super::sparsity::SparsityPlot;
 use crate::{Error, Result};
 
@@ -33,6 +34,7 @@ const LEAST_FRAME: f64 = 40.0;
 pub enum Panel {
     Lines(LinePlot),
     Sparsity(SparsityPlot),
+    Picture(Picture),
 }
 
 impl From<LinePlot> for Panel {
@@ -47,11 +49,19 @@ impl From<SparsityPlot> for Panel {
     }
 }
 
+impl From<Picture> for Panel {
+    fn from(picture: Picture) -> Self {
+        Panel::Picture(picture)
+    }
+}
+
 impl Panel {
     fn x_axis(&self) -> Axis {
         match self {
             Panel::Lines(plot) => plot.x_axis(),
             Panel::Sparsity(plot) => plot.axis(),
+            // A picture has no axes.
+            Panel::Picture(_) => Axis::over(Scale::Linear, (0.0, 1.0)),
         }
     }
 
@@ -59,6 +69,7 @@ impl Panel {
         match self {
             Panel::Lines(plot) => plot.top(),
             Panel::Sparsity(plot) => title_room(&plot.caption),
+            Panel::Picture(picture) => picture.top(),
         }
     }
 
@@ -66,6 +77,7 @@ impl Panel {
         match self {
             Panel::Lines(plot) => plot.bottom(labelled),
             Panel::Sparsity(plot) => plot.bottom(),
+            Panel::Picture(picture) => picture.bottom(),
         }
     }
 
@@ -73,6 +85,7 @@ impl Panel {
         match self {
             Panel::Lines(plot) => plot.left(height),
             Panel::Sparsity(plot) => plot.left(height),
+            Panel::Picture(picture) => Ok(picture.left()),
         }
     }
 
@@ -80,6 +93,7 @@ impl Panel {
         match self {
             Panel::Lines(plot) => plot.right(),
             Panel::Sparsity(_) => Ok(BARE_RIGHT),
+            Panel::Picture(picture) => picture.right(),
         }
     }
 
@@ -87,7 +101,7 @@ impl Panel {
     fn has_x_range(&self) -> bool {
         match self {
             Panel::Lines(plot) => plot.x_range.is_some(),
-            Panel::Sparsity(_) => true,
+            Panel::Sparsity(_) | Panel::Picture(_) => true,
         }
     }
 
@@ -95,6 +109,7 @@ impl Panel {
         match self {
             Panel::Lines(plot) => plot.draw(canvas, slot),
             Panel::Sparsity(plot) => plot.draw(canvas, slot.frame),
+            Panel::Picture(picture) => picture.draw(canvas, slot),
         }
     }
 }

@@ -10,6 +10,7 @@
 //! - [`series`] and [`plot`]: line plots, scatter plots and histograms on linear or logarithmic axes, legend
 //!   beside the data;
 //! - [`sparsity`]: the pattern of a sparse matrix;
+//! - [`render`]: pictures of meshes, points and vectors;
 //! - [`png`]: images and their files;
 //! - [`index`]: the page that lists what a folder of reports holds.
 
@@ -21,6 +22,7 @@ pub mod index;
 mod number;
 pub mod plot;
 pub mod png;
+pub mod render;
 pub mod series;
 pub mod sparsity;
 pub mod table;
@@ -32,6 +34,9 @@ pub use figure::{Figure, Panel};
 pub use number::readable;
 pub use plot::LinePlot;
 pub use png::Image;
+pub use render::{
+    ColourMap, ColourScale, Finish, Paint, Picture, Points, Stroke, Surface, Vectors, View,
+};
 pub use series::{Rule, Series, palette};
 pub use sparsity::SparsityPlot;
 pub use table::{Cell, Column, Table};

@@ -156,12 +156,19 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
             .pass_one(&mut self.direction, |i, p, _| *p = work[i] + beta * *p);
         // q ← A p
         let (system, direction) = (self.system, &self.direction);
+        let mut nothing = vec![(); direction.len()];
         let curvature = self
             .rows
-            .pass_one(&mut self.work, |i, q, tally| {
-                *q = system.row(i, direction);
-                tally.dot(direction[i].dot(*q) / h[i]);
-            })
+            .product(
+                system,
+                direction,
+                &mut self.work,
+                &mut nothing,
+                |i, ap, q, (), tally| {
+                    *q = ap;
+                    tally.dot(direction[i].dot(ap) / h[i]);
+                },
+            )
             .dot;
         if !(curvature > 0.0 && curvature.is_finite()) {
             return Err(breakdown(format!(

@@ -68,7 +68,8 @@ pub struct Report {
     pub outcome: Outcome,
     /// Updates of all vertices made.
     pub iterations: usize,
-    /// The errors of every iterate; entry 0 is the start, so there are `iterations + 1`.
+    /// The errors of every iterate; entry 0 is the start, so there are `iterations + 1`. A method that knows its
+    /// errors every few iterations only ([`mixed`](super::mixed)) has an entry for each time.
     pub history: Vec<Errors>,
     /// What was found where the outcome needs a reason.
     pub detail: Option<String>,

@@ -8,10 +8,13 @@ pub mod gauss_seidel;
 pub mod incomplete_cholesky;
 pub mod iteration;
 pub mod jacobi;
+pub mod local;
 pub mod method;
+pub mod mixed;
 pub mod pia;
 pub mod ssor;
 pub mod system;
+pub mod wavefront;
 
 pub use iteration::{Errors, Iterate, Outcome, Report, Step, Stop, solve};
 pub use method::{Method, Setup, Solution, run, run_watched};

@@ -1,10 +1,12 @@
 //! What a method may ask of a system, and the parallel loop over rows that every fused update uses.
 
+use std::ops::Range;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::iteration::Errors;
-use crate::assemble::LimitSystem;
+use crate::assemble::{LimitSystem, Operator};
 
 /// The matrix A of a limit system: A = H·M with H = diag(weights) positive, M symmetric, and rows of A that sum
 /// to 1.
@@ -24,7 +26,29 @@ pub trait System: Sync {
 
     /// Row `i` of the product, (A x)_i. In-place relaxation calls it while `x` changes.
     fn row(&self, i: usize, x: &[DVec3]) -> DVec3;
+
+    /// Sums over `x` that the rows of one whole product share; none unless the system has some.
+    fn prepare(&self, _x: &[DVec3], shared: &mut Vec<Shared>) {
+        shared.clear();
+    }
+
+    /// Calls `visit(k, (A x)_i)` for the k-th row i of `rows`; `shared` comes from [`prepare`](Self::prepare).
+    #[inline(always)]
+    fn rows(
+        &self,
+        rows: Range<usize>,
+        x: &[DVec3],
+        _shared: &[Shared],
+        mut visit: impl FnMut(usize, DVec3),
+    ) {
+        for (k, i) in rows.enumerate() {
+            visit(k, self.row(i, x));
+        }
+    }
 }
+
+/// What rows of one product may share: three points.
+pub type Shared = [DVec3; 3];
 
 impl System for LimitSystem {
     fn len(&self) -> usize {
@@ -42,6 +66,40 @@ impl System for LimitSystem {
     #[inline]
     fn row(&self, i: usize, x: &[DVec3]) -> DVec3 {
         self.a.row_times(i, x)
+    }
+}
+
+impl System for Operator {
+    fn len(&self) -> usize {
+        Operator::len(self)
+    }
+
+    fn weights(&self) -> &[f64] {
+        Operator::weights(self)
+    }
+
+    fn diagonal(&self) -> &[f64] {
+        Operator::diagonal(self)
+    }
+
+    #[inline]
+    fn row(&self, i: usize, x: &[DVec3]) -> DVec3 {
+        Operator::row(self, i, x)
+    }
+
+    fn prepare(&self, x: &[DVec3], shared: &mut Vec<Shared>) {
+        self.moments(x, shared);
+    }
+
+    #[inline(always)]
+    fn rows(
+        &self,
+        rows: Range<usize>,
+        x: &[DVec3],
+        shared: &[Shared],
+        visit: impl FnMut(usize, DVec3),
+    ) {
+        Operator::rows(self, rows, (x, 0), shared, visit);
     }
 }
 
@@ -96,6 +154,7 @@ pub struct Totals {
 pub struct Rows {
     tallies: Vec<Tally>,
     n: usize,
+    shared: Vec<Shared>,
 }
 
 impl Rows {
@@ -103,6 +162,7 @@ impl Rows {
         Rows {
             tallies: vec![Tally::default(); n.div_ceil(CHUNK)],
             n,
+            shared: Vec::new(),
         }
     }
 
@@ -113,11 +173,46 @@ impl Rows {
         b: &mut [B],
         visit: impl Fn(usize, &mut A, &mut B, &mut Tally) + Sync,
     ) -> Totals {
-        let chunk = |k: usize, a: &mut [A], b: &mut [B], tally: &mut Tally| {
-            let mut local = Tally::default();
+        self.chunks(a, b, |first, a, b, tally| {
             for (offset, (a, b)) in a.iter_mut().zip(b).enumerate() {
-                visit(k * CHUNK + offset, a, b, &mut local);
+                visit(first + offset, a, b, tally);
             }
+        })
+    }
+
+    /// Calls `visit(i, (A x)_i, &mut a[i], &mut b[i], tally)` for every row.
+    pub fn product<S: System, A: Send, B: Send>(
+        &mut self,
+        system: &S,
+        x: &[DVec3],
+        a: &mut [A],
+        b: &mut [B],
+        visit: impl Fn(usize, DVec3, &mut A, &mut B, &mut Tally) + Sync,
+    ) -> Totals {
+        let mut shared = std::mem::take(&mut self.shared);
+        system.prepare(x, &mut shared);
+        let totals = self.chunks(a, b, |first, a, b, tally| {
+            let mut slots = a.iter_mut().zip(b);
+            system.rows(first..first + slots.len(), x, &shared, |k, ax| {
+                if let Some((a, b)) = slots.next() {
+                    visit(first + k, ax, a, b, tally);
+                }
+            });
+        });
+        self.shared = shared;
+        totals
+    }
+
+    /// Calls `chunk(first row, its part of a, its part of b, tally)` for chunks of 4096 rows.
+    fn chunks<A: Send, B: Send>(
+        &mut self,
+        a: &mut [A],
+        b: &mut [B],
+        chunk: impl Fn(usize, &mut [A], &mut [B], &mut Tally) + Sync,
+    ) -> Totals {
+        let run = |k: usize, a: &mut [A], b: &mut [B], tally: &mut Tally| {
+            let mut local = Tally::default();
+            chunk(k * CHUNK, a, b, &mut local);
             *tally = local;
         };
         let tallies = &mut self.tallies;
@@ -126,9 +221,9 @@ impl Rows {
                 .zip(b.par_chunks_mut(CHUNK))
                 .zip(tallies)
                 .enumerate()
-                .for_each(|(k, ((a, b), tally))| chunk(k, a, b, tally));
+                .for_each(|(k, ((a, b), tally))| run(k, a, b, tally));
         } else if let Some(tally) = tallies.first_mut() {
-            chunk(0, a, b, tally);
+            run(0, a, b, tally);
         }
         let total = self
             .tallies
@@ -156,8 +251,10 @@ impl Rows {
         out: &mut [B],
         visit: impl Fn(usize, DVec3, &mut B, &mut Tally) + Sync,
     ) -> Totals {
-        self.pass_one(out, |i, out, tally| {
-            let e = points[i] - system.row(i, x);
+        // A vector of () takes no memory.
+        let mut nothing = vec![(); out.len()];
+        self.product(system, x, out, &mut nothing, |i, ax, out, (), tally| {
+            let e = points[i] - ax;
             tally.error(e);
             visit(i, e, out, tally);
         })
@@ -169,9 +266,7 @@ impl Rows {
         a: &mut [A],
         visit: impl Fn(usize, &mut A, &mut Tally) + Sync,
     ) -> Totals {
-        let n = a.len();
-        // A vector of () takes no memory.
-        let mut nothing = vec![(); n];
+        let mut nothing = vec![(); a.len()];
         self.pass(a, &mut nothing, |i, a, (), tally| visit(i, a, tally))
     }
 

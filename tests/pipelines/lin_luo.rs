@@ -216,8 +216,8 @@ fn the_volume_grows_from_shrinking_to_bulging() {
         assert!(rows[10].center_outward > 0.0 && rows[10].vertex_max == 0.0);
         let limits = sqrt3::limit_positions(&mesh, &topology(&mesh)).unwrap();
         let shrink = distance(&limits, &mesh.positions) / mesh.diagonal();
-        // A vertex keeps 2/3 − a_n ≤ 1/3 of its way to the limit a step.
-        assert!((rows[0].vertex_max - shrink).abs() < 3f64.powi(-6) * shrink);
+        // A vertex keeps 2/3 − a_n of its way to the limit a step: 1/3 at valence 6, less below.
+        assert!((rows[0].vertex_max - shrink).abs() < (1.0 + ROUNDING) * 3f64.powi(-6) * shrink);
     }
 }
 

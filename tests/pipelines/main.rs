@@ -1,6 +1,8 @@
 //! The papers' whole methods held against exact identities, real refinement, and a second way to the same result.
 
+mod halstead;
 mod lin_luo;
+mod program;
 mod thall;
 mod zheng_cai;
 

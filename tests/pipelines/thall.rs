@@ -141,7 +141,7 @@ fn medial_metrics_in_closed_form() {
     let shift = DVec3::new(0.3, 0.0, 0.4);
     let moved = medial_shifts(&involutes, (&at(2.0, shift), &normals), (&given, &normals));
     assert!((moved[0].unwrap() - 0.25).abs() < ROUNDING);
-    let scaled = scaled_distances(&at(2.0, shift), &given, &vec![2.0; 12]);
+    let scaled = scaled_distances(&at(2.0, shift), &given, &[2.0; 12]);
     assert!(scaled.iter().all(|d| (d - 0.25).abs() < ROUNDING));
 }
 

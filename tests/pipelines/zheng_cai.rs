@@ -464,8 +464,8 @@ fn a_subset_is_interpolated_by_every_scheme_and_method() {
                 Outcome::Converged,
                 "{scheme} {setup:?}"
             );
-            for v in 0..mesh.len() {
-                let value = if some[v] {
+            for (v, &marked) in some.iter().enumerate() {
+                let value = if marked {
                     full.a.row_times(v, &solution.points)
                 } else {
                     solution.points[v]

@@ -65,6 +65,19 @@ impl Net {
         self.scheme.layout().faces(self.valence, self.rings)
     }
 
+    /// The innermost rings alone.
+    ///
+    /// # Panics
+    /// If the net has not so many.
+    pub fn inner(&self, rings: usize) -> Net {
+        assert!(rings <= self.rings, "the net has so many rings");
+        Net {
+            rings,
+            points: self.points[..self.layout().len(self.valence, rings)].to_vec(),
+            ..self.clone()
+        }
+    }
+
     /// The net after `rounds` rounds of refinement, as far as these rings determine it: 2r−1 rings from r, with √3
     /// 3r−3, and with α ≠ 0 3r−6. O(refined points).
     ///

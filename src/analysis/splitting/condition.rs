@@ -6,12 +6,8 @@ use rayon::prelude::*;
 
 use super::matrix::SplittingMatrix;
 use super::scheme::LocalScheme;
-use super::spectrum::{Mode, all_eigenvalues, eigenvalues};
+use super::spectrum::{LEAD, Mode, all_eigenvalues, eigenvalues};
 use crate::error::Result;
-
-/// Moduli closer than this count as equal. Simple eigenvalues of these blocks are good to 1e-14; near a collision of
-/// two, which is where the pair turns complex, to the square root of that.
-pub const TIE: f64 = 1e-7;
 
 /// The leading eigenvalues of S̃ = R·S·S on three rings at one α.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +24,7 @@ pub struct Condition {
     pub margin: f64,
     /// 1 > λ_1 = λ_2 > λ_3 in modulus, λ_1 and λ_2 real.
     pub holds: bool,
-    /// |λ_3| = |λ_4|, as claimed for n > 3.
+    /// λ_3 is at least double, as claimed for n > 3; a conjugate does not count.
     pub third_equals_fourth: bool,
 }
 
@@ -108,8 +104,8 @@ impl Blend {
             leading_frequency,
             next_frequency: next.frequency,
             margin,
-            holds: margin > TIE && pair.norm() < 1.0 - TIE && pair.im.abs() < TIE,
-            third_equals_fourth: (lambda[2].norm() - lambda[3].norm()).abs() < TIE,
+            holds: margin > LEAD && pair.norm() < 1.0 - LEAD && pair.im.abs() < LEAD,
+            third_equals_fourth: values[3..].iter().any(|z| (z - lambda[2]).norm() < LEAD),
         })
     }
 }

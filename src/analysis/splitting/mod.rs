@@ -36,4 +36,4 @@ pub use row::{Row, rows};
 pub use scheme::{LocalScheme, VALENCES};
 pub use spectrum::{Eigenspace, Mode, distance_to_space};
 pub use star::Layout;
-pub use thall::thall_tables;
+pub use thall::{ThallTables, thall_tables};

@@ -33,6 +33,8 @@ pub struct Row {
     /// max ‖S·X − X·(XᵀSX)‖ over all invariant subspaces, right and left.
     pub residual_right: f64,
     pub residual_left: f64,
+    /// λ_0 = 1 > λ_1 = λ_2 > λ_3, the pair real and of frequency 1.
+    pub pair_leads: bool,
     /// The characteristic map, refined [`MAP_ROUNDS`] times; `None` where there is none.
     pub map: Option<Check>,
 }
@@ -43,7 +45,7 @@ pub const MAP_ROUNDS: usize = 3;
 /// Rows of a scheme for several valences, in parallel.
 ///
 /// # Errors
-/// [`Error::Unknown`] for a valence outside [`VALENCES`](super::VALENCES).
+/// [`Error::Unknown`](crate::Error::Unknown) for a valence outside [`VALENCES`](super::VALENCES).
 pub fn rows(scheme: LocalScheme, valences: &[usize]) -> Result<Vec<Row>> {
     valences.par_iter().map(|&n| row(scheme, n)).collect()
 }
@@ -77,6 +79,7 @@ fn row(scheme: LocalScheme, valence: usize) -> Result<Row> {
             false => None,
         },
         tangent_mask_distance,
+        pair_leads: matrix.pair_leads()?,
         residual_right,
         residual_left,
         map: match has_pair {

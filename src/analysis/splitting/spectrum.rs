@@ -15,6 +15,10 @@ const CLUSTER: f64 = 1e-4;
 /// Means of clusters closer than this, in different blocks, are one eigenvalue; means are good to rounding.
 const EQUAL: f64 = 1e-9;
 
+/// Moduli closer than this count as equal. Simple eigenvalues of the blocks are good to 1e-14; near a collision of two,
+/// to the square root of that.
+pub const LEAD: f64 = 1e-7;
+
 /// An eigenvalue with the frequency k ≤ n/2 of its block. For 0 < k < n/2 its conjugate belongs to block n−k.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
@@ -87,8 +91,9 @@ impl SplittingMatrix {
 
     /// The invariant subspaces of all eigenvalues, by falling modulus. Their dimensions add up to N.
     ///
-    /// Within a block, the values λ_i of a cluster have as invariant subspace the kernel of Π(B − λ_i), which is
-    /// found by a singular value decomposition; defective eigenvalues need no special case.
+    /// Within a block, one eigenvector of a cluster is found and the block reduced to its orthogonal complement, as
+    /// often as the cluster has members: a Schur form with the cluster first. Defective eigenvalues need no special
+    /// case, and residuals stay at rounding.
     ///
     /// # Errors
     /// As [`modes`](Self::modes).
@@ -103,18 +108,14 @@ impl SplittingMatrix {
         for frequency in 0..=self.valence / 2 {
             let block = self.block(frequency);
             for cluster in clusters(eigenvalues(&block)?) {
-                let identity = DMatrix::identity(block.nrows(), block.nrows());
-                let product = cluster.iter().fold(identity.clone(), |product, &value| {
-                    product * (&block - &identity * value)
-                });
-                let [right, left] = kernels(product, cluster.len(), self.is_real(frequency));
+                let [right, left] = self.invariant_subspaces(&block, frequency, &cluster)?;
                 let size = cluster.len() as f64;
                 let real = cluster.iter().map(|z| z.re).sum::<f64>() / size;
                 let imaginary = cluster.iter().map(|z| z.im.abs()).sum::<f64>() / size;
-                let columns = |vectors: Vec<DVector<Complex<f64>>>, side| {
+                let columns = |basis: DMatrix<Complex<f64>>, side| {
+                    let vectors = basis.column_iter();
                     vectors
-                        .iter()
-                        .flat_map(|v| self.real_columns(frequency, v, side))
+                        .flat_map(|v| self.real_columns(frequency, &v.into_owned(), side))
                         .collect()
                 };
                 parts.push(Part {
@@ -153,8 +154,8 @@ impl SplittingMatrix {
     /// As [`modes`](Self::modes).
     pub fn limit_mask(&self) -> Result<DVector<f64>> {
         let block = self.block(0);
-        let vector = eigenvector(&block, 1.0.into(), true, Side::Left);
-        // Real, and so its first column is the vector itself.
+        let [_, basis] = self.invariant_subspaces(&block, 0, &[1.0.into()])?;
+        let vector = basis.column(0).into_owned();
         let mask = self.real_columns(0, &vector, Side::Left).swap_remove(0);
         let sum = mask.sum();
         Ok(mask / sum)
@@ -178,6 +179,25 @@ impl SplittingMatrix {
             )));
         }
         Ok(leading.re)
+    }
+
+    /// Whether the [`leading_pair`](Self::leading_pair) is real and beats all other eigenvalues but λ_0 = 1 by more
+    /// than [`LEAD`]: Reif's condition λ_0 > λ_1 = λ_2 > λ_3, without which characteristic map and tangent masks say
+    /// nothing about the surface.
+    ///
+    /// # Errors
+    /// As [`modes`](Self::modes).
+    pub fn pair_leads(&self) -> Result<bool> {
+        let modes = self.modes()?;
+        let Some(at) = modes.iter().position(|m| m.frequency == 1) else {
+            return Ok(false);
+        };
+        let pair = modes[at].value;
+        // The first is λ_0; of the others none may come close, and the sort puts the largest first.
+        let next = (1..modes.len())
+            .find(|&i| i != at)
+            .map_or(0.0, |i| modes[i].value.norm());
+        Ok(at > 0 && pair.im.abs() < EQUAL && pair.norm() - next > LEAD)
     }
 
     /// The tangent masks, cosine and sine: a basis of the left eigenspace of the [`leading_pair`](Self::leading_pair),
@@ -210,7 +230,9 @@ impl SplittingMatrix {
     /// The eigenvector of block 1 for the leading eigenvalue, 1 at the first orbit.
     fn frequency_one(&self, side: Side) -> Result<DVector<Complex<f64>>> {
         let lambda = self.leading_pair()?;
-        let vector = eigenvector(&self.block(1), lambda.into(), false, side);
+        let [right, left] = self.invariant_subspaces(&self.block(1), 1, &[lambda.into()])?;
+        let basis = if side == Side::Right { right } else { left };
+        let vector = basis.column(0);
         let first = vector[0];
         if first.norm() < EQUAL {
             return Err(Error::Computation(format!(
@@ -219,6 +241,22 @@ impl SplittingMatrix {
             )));
         }
         Ok(vector.map(|z| z / first))
+    }
+
+    /// Orthonormal bases of the right and the left invariant subspace of a cluster of block `k`, real where the block
+    /// is.
+    fn invariant_subspaces(
+        &self,
+        block: &DMatrix<Complex<f64>>,
+        k: usize,
+        cluster: &[Complex<f64>],
+    ) -> Result<[DMatrix<Complex<f64>>; 2]> {
+        let right = invariant_subspace(block, cluster)?;
+        let left = invariant_subspace(&block.adjoint(), cluster)?;
+        if self.is_real(k) {
+            return Ok([real_basis(&right)?, real_basis(&left)?]);
+        }
+        Ok([right, left])
     }
 
     /// Whether block k is real: e^{2πik/n} = ±1.
@@ -302,7 +340,6 @@ fn falling(a: &Complex<f64>, b: &Complex<f64>) -> std::cmp::Ordering {
 
 /// Groups of values within [`CLUSTER`] of another of the group; λ and λ̄ count as close.
 fn clusters(values: Vec<Complex<f64>>) -> Vec<Vec<Complex<f64>>> {
-    let folded = |z: &Complex<f64>| Complex::new(z.re, z.im.abs());
     let mut groups: Vec<Vec<Complex<f64>>> = Vec::new();
     for value in values {
         let near = |group: &Vec<Complex<f64>>| {
@@ -317,52 +354,63 @@ fn clusters(values: Vec<Complex<f64>>) -> Vec<Vec<Complex<f64>>> {
     groups
 }
 
-/// Orthonormal bases of the right and the left kernel of a matrix whose kernel has this dimension; real where the
-/// matrix is.
-fn kernels(
-    matrix: DMatrix<Complex<f64>>,
-    dimension: usize,
-    real: bool,
-) -> [Vec<DVector<Complex<f64>>>; 2] {
-    if real {
-        let svd = matrix.map(|z| z.re).svd(true, true);
-        let last = smallest(&svd.singular_values, dimension);
-        let (u, v) = (svd.u.unwrap_or_default(), svd.v_t.unwrap_or_default());
-        return [
-            last.iter()
-                .map(|&i| v.row(i).transpose().map(Complex::from))
-                .collect(),
-            last.iter()
-                .map(|&i| u.column(i).map(Complex::from))
-                .collect(),
-        ];
-    }
-    let svd = matrix.svd(true, true);
-    let last = smallest(&svd.singular_values, dimension);
-    let (u, v) = (svd.u.unwrap_or_default(), svd.v_t.unwrap_or_default());
-    [
-        last.iter().map(|&i| v.row(i).adjoint()).collect(),
-        last.iter().map(|&i| u.column(i).into_owned()).collect(),
-    ]
-}
-
-fn smallest(values: &DVector<f64>, count: usize) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..values.len()).collect();
-    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
-    order.truncate(count);
-    order
-}
-
-fn eigenvector(
+/// An orthonormal basis of the right invariant subspace that belongs to the eigenvalues nearest to the mean of a
+/// cluster (λ and λ̄ being one), as many as the cluster has.
+///
+/// Each step takes the last right singular vector of B − λ as eigenvector and goes on with B on the other ones. λ is
+/// computed anew each time: the values of a defective eigenvalue move when one of them is taken away.
+fn invariant_subspace(
     block: &DMatrix<Complex<f64>>,
-    value: Complex<f64>,
-    real: bool,
-    side: Side,
-) -> DVector<Complex<f64>> {
-    let shifted = block - DMatrix::identity(block.nrows(), block.nrows()) * value;
-    let [right, left] = kernels(shifted, 1, real);
-    let mut vectors = if side == Side::Right { right } else { left };
-    vectors.swap_remove(0)
+    cluster: &[Complex<f64>],
+) -> Result<DMatrix<Complex<f64>>> {
+    let failed = |e: &dyn std::fmt::Debug| {
+        Error::Computation(format!("singular values of a Fourier block: {e:?}"))
+    };
+    let size = block.nrows();
+    let mean = cluster.iter().map(folded).sum::<Complex<f64>>() / cluster.len() as f64;
+    let distance = |z: &Complex<f64>| (folded(z) - mean).norm();
+    let mut basis = DMatrix::zeros(size, cluster.len());
+    let mut complement: DMatrix<Complex<f64>> = DMatrix::identity(size, size);
+    for mut column in basis.column_iter_mut() {
+        let reduced = complement.adjoint() * block * &complement;
+        let values = eigenvalues(&reduced)?;
+        let nearest = values
+            .iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let Some(&lambda) = nearest else { break };
+        let order = reduced.nrows();
+        let shifted = Mat::from_fn(order, order, |i, j| {
+            reduced[(i, j)] - if i == j { lambda } else { 0.0.into() }
+        });
+        let svd = shifted.svd().map_err(|e| failed(&e))?;
+        let vectors = DMatrix::from_fn(order, order, |i, j| svd.V()[(i, j)]);
+        column.copy_from(&(&complement * vectors.column(order - 1)));
+        complement *= vectors.columns(0, order - 1);
+    }
+    Ok(basis)
+}
+
+/// A real orthonormal basis of a subspace that contains the conjugates of its vectors.
+fn real_basis(basis: &DMatrix<Complex<f64>>) -> Result<DMatrix<Complex<f64>>> {
+    let dimension = basis.ncols();
+    let parts = Mat::from_fn(basis.nrows(), 2 * dimension, |i, j| {
+        if j < dimension {
+            basis[(i, j)].re
+        } else {
+            basis[(i, j - dimension)].im
+        }
+    });
+    let svd = parts
+        .svd()
+        .map_err(|e| Error::Computation(format!("singular values of a basis: {e:?}")))?;
+    Ok(DMatrix::from_fn(basis.nrows(), dimension, |i, j| {
+        svd.U()[(i, j)].into()
+    }))
+}
+
+/// λ and λ̄ as one.
+fn folded(z: &Complex<f64>) -> Complex<f64> {
+    Complex::new(z.re, z.im.abs())
 }
 
 /// ‖v − QQᵀv‖/‖v‖: how far a vector is from the subspace spanned by the orthonormal columns of Q.

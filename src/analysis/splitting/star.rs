@@ -61,6 +61,24 @@ impl Layout {
         (self.centre() + orbit * n + sector % n) as u32
     }
 
+    /// The name of position `index`: `v` for the middle, else `sector:i,j`, sectors from 0.
+    pub fn label(self, n: usize, index: usize) -> String {
+        let Some(rest) = index.checked_sub(self.centre()) else {
+            return "v".into();
+        };
+        let (orbit, sector) = (rest / n, rest % n);
+        let inner = (0..).take_while(|&r| self.orbits(r + 1) <= orbit).count();
+        let place = orbit - self.orbits(inner);
+        let (i, j) = match self {
+            Layout::Triangles => (inner + 1 - place, place),
+            _ => {
+                let ring = inner + self.centre();
+                (ring.min(2 * ring - place), place.min(ring))
+            }
+        };
+        format!("{sector}:{i},{j}")
+    }
+
     /// The faces of the disc, counter-clockwise. Corner 0 is the middle, followed by (0, 1, 0); about a face, the
     /// middle face comes first.
     pub fn faces(self, n: usize, rings: usize) -> Faces {
@@ -310,6 +328,29 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn labels_name_the_positions_in_order() {
+        for layout in LAYOUTS {
+            let (n, rings) = (5, 4);
+            for index in layout.centre()..layout.len(n, rings) {
+                let label = layout.label(n, index);
+                let numbers: Vec<usize> = label
+                    .split([':', ','])
+                    .map(|x| x.parse().expect("a number"))
+                    .collect();
+                let &[sector, i, j] = numbers.as_slice() else {
+                    panic!("{label}");
+                };
+                assert_eq!(
+                    layout.index(n, sector, i, j) as usize,
+                    index,
+                    "{layout:?} {label}"
+                );
+            }
+        }
+        assert_eq!(Layout::Quads.label(5, 0), "v");
     }
 
     #[test]

@@ -1,0 +1,122 @@
+//! Local edits beside solving anew, and the decay of the inverse that they live on.
+
+use std::time::Instant;
+
+use glam::DVec3;
+use limitlab::Result;
+use limitlab::assemble::operator::gather;
+use limitlab::assemble::{Operator, Scheme};
+use limitlab::mesh::{Mesh, Topology};
+use limitlab::report::{Column, Table};
+use limitlab::solvers::local::{Editor, decay};
+use limitlab::solvers::{Stop, mixed};
+
+/// Rings that the table of the decay shows.
+const RINGS: usize = 20;
+
+/// An empty table of edits.
+pub fn edits_table(tol: f64) -> Table {
+    let mut table = Table::new(
+        "scaling-edits",
+        "Local edits beside solving anew",
+        vec![
+            Column::key("scheme"),
+            Column::key("mesh"),
+            Column::key("points_moved"),
+            Column::count("vertices"),
+            Column::number("vertices_touched", 0.05, 6),
+            Column::number("relaxations", 0.05, 6),
+            Column::time("edit_seconds"),
+            Column::time("anew_seconds"),
+            Column::number("difference_over_tolerance", 0.5, 3),
+        ],
+    );
+    table.note(format!(
+        "Points far apart are moved by a hundredth of the bounding box's diagonal L, and control points relaxed around \
+         them until no residual is above {tol:e}·L. Anew: mixed precision on the same operator from V = P. The \
+         difference is the largest between the two results."
+    ));
+    table
+}
+
+/// Edits of one mesh, for 1, 10 and 100 points.
+pub fn edits(
+    name: &str,
+    mesh: &Mesh,
+    scheme: Scheme,
+    tol: f64,
+    table: &mut Table,
+) -> Result<Operator> {
+    let n = mesh.len();
+    let topology = Topology::new(&mesh.faces, n);
+    let operator = Operator::new(&mesh.faces, &topology, scheme)?;
+    let order = operator.front_order();
+    let operator = operator.renumbered(&order);
+    let points = gather(&mesh.positions, &order);
+    let length = mesh.diagonal();
+    let stop = Stop {
+        tolerance: tol * length,
+        max_iterations: 10_000,
+    };
+    let bound = operator.bounds().lambda_min;
+    let (control, _) = mixed::solve(&operator, &points, bound, &stop);
+    let mut editor = Editor::new(&operator, points, control);
+    for count in [1, 10, 100] {
+        let shift = DVec3::new(0.01, 0.0, 0.0) * length;
+        let moves: Vec<(u32, DVec3)> = (0..count)
+            .map(|k| (2 * k + 1) * n / (2 * count))
+            .map(|v| (v as u32, editor.points()[v] + shift))
+            .collect();
+        let start = Instant::now();
+        let edit = editor.edit(&moves, stop.tolerance, usize::MAX);
+        let edit_seconds = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let (anew, _) = mixed::solve(&operator, editor.points(), bound, &stop);
+        let anew_seconds = start.elapsed().as_secs_f64();
+        let pairs = editor.control().iter().zip(&anew);
+        let difference = pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        table.push(vec![
+            scheme.name().into(),
+            name.into(),
+            count.to_string().into(),
+            n.into(),
+            (edit.touched as f64).into(),
+            (edit.relaxations as f64).into(),
+            edit_seconds.into(),
+            anew_seconds.into(),
+            (difference / stop.tolerance).into(),
+        ]);
+    }
+    Ok(operator)
+}
+
+/// The largest entry of the middle column of A⁻¹ ring by ring, each with its ratio to the one before.
+pub fn decay_table(columns: &[(String, Operator)]) -> Table {
+    let mut table = Table::new(
+        "scaling-decay",
+        "Decay of the inverse of A from ring to ring",
+        vec![
+            Column::key("mesh"),
+            Column::key("ring"),
+            Column::number("largest_entry", 0.01, 4),
+            Column::number("ratio", 0.01, 4),
+        ],
+    );
+    table.note(
+        "Largest entry of one column of A⁻¹ among the vertices of each ring of neighbours. On an infinite regular quad \
+         grid it is 3·(2 − √3)^ring under Catmull-Clark: ratio 0.2679.",
+    );
+    for (name, operator) in columns {
+        let rings = decay(operator, operator.len() / 2, 1e-12);
+        for (ring, &entry) in rings.iter().enumerate().take(RINGS) {
+            let ratio = ring.checked_sub(1).map(|before| entry / rings[before]);
+            table.push(vec![
+                name.as_str().into(),
+                ring.to_string().into(),
+                entry.into(),
+                ratio.into(),
+            ]);
+        }
+    }
+    table
+}

@@ -1,0 +1,468 @@
+//! How time and memory grow with the mesh: `scaling` writes `scaling.{md,csv,png}`, `scaling-profile`, `scaling-edits`
+//! and `scaling-decay.{md,csv}`.
+
+mod baseline;
+mod edits;
+mod machine;
+mod profile;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Parser;
+use limitlab::Result;
+use limitlab::analysis::spectrum::spectrum;
+use limitlab::assemble::{LimitSystem, Operator, Scheme};
+use limitlab::cli::{self, CommonFlags, List, Progress};
+use limitlab::interpolate::automatic::control_points;
+use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
+use limitlab::mesh::noise::add_noise;
+use limitlab::mesh::order::Order;
+use limitlab::mesh::{Mesh, Topology, builtin::builtin};
+use limitlab::report::{
+    Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette,
+};
+use limitlab::solvers::chebyshev::Chebyshev;
+use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
+use limitlab::solvers::iteration::Iterate;
+use limitlab::solvers::{Method, Setup, Stop, run, solve};
+
+/// Measures time, memory and iterations of the methods over growing meshes, from faces in memory to control points,
+/// everything counted.
+#[derive(Parser)]
+#[command(name = "scaling", version)]
+struct Arguments {
+    /// Numbers of vertices
+    #[arg(
+        long,
+        value_name = "N,N,…",
+        default_value = "1000,10000,100000,1000000"
+    )]
+    sizes: List<usize>,
+    /// Schemes
+    #[arg(
+        long,
+        value_name = "NAME,…",
+        default_value = "catmull-clark,loop,sqrt3,nasri,zheng-cai"
+    )]
+    scheme: List<Scheme>,
+    /// Cholesky up to this many vertices
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    most_cholesky: usize,
+    /// LU up to this many vertices: it takes 4.5 GB at a million
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    most_lu: usize,
+    /// Methods with a stored matrix up to this many vertices
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    most_stored: usize,
+    /// Stop at max_i ‖p_i − (A v)_i‖ ≤ T·L, L the diagonal of the bounding box
+    #[arg(long, value_name = "T", default_value_t = 1e-10, value_parser = cli::positive)]
+    tol: f64,
+    /// Runs of which the fastest counts, where a run takes less than a second
+    #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
+    runs: u16,
+    /// Vertices of the profile's mesh; 0 for no profile
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    profile: usize,
+    /// Folder for the CSV, Markdown and PNG files
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    #[command(flatten)]
+    common: CommonFlags,
+}
+
+/// The smallest mesh that every generator makes.
+const LEAST: usize = 100;
+/// Vertices of the mesh that the interval of Chebyshev iterations is estimated on.
+const ESTIMATE: usize = 4000;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    cli::exit(|| {
+        arguments.common.apply()?;
+        limitlab::output::create_dir(&arguments.out)?;
+        measure(&arguments)
+    })
+}
+
+fn measure(arguments: &Arguments) -> Result<()> {
+    let threads = rayon::current_num_threads();
+    let bandwidth = machine::triad();
+    let mut table = Table::new(
+        "scaling",
+        "Time and memory from faces in memory to control points",
+        vec![
+            Column::key("scheme"),
+            Column::key("mesh"),
+            Column::key("order"),
+            Column::key("method"),
+            Column::count("vertices"),
+            Column::count("iterations"),
+            Column::text("status"),
+            Column::time("seconds"),
+            Column::time("solve_seconds"),
+            Column::time("nanoseconds_per_vertex"),
+            Column::time("peak_megabytes"),
+        ],
+    );
+    table.note(format!(
+        "{threads} threads, STREAM triad {:.1} GB/s in this run. Noise 0.1 on every mesh; start V = P; stop at max_i ‖p_i − \
+         (A v)_i‖ ≤ {:e}·L. Seconds count topology, order, set-up and solve; the memory is what is needed beyond the \
+         mesh. Order random: vertices and faces shuffled.",
+        bandwidth / 1e9,
+        arguments.tol
+    ));
+    table.note(
+        "plain-chebyshev is the yardstick: index-only, double precision, one pass over the arrays an operation, no \
+         renumbering.",
+    );
+    let mut panels = Vec::new();
+    for &scheme in &arguments.scheme.0 {
+        panels.extend(of_scheme(arguments, scheme, bandwidth, &mut table)?);
+    }
+    table.write(&arguments.out)?;
+    if !panels.is_empty() {
+        let rows = panels.len() as u32 / 2;
+        let mut figure = Figure::row(panels);
+        figure.columns = 2;
+        (figure.width, figure.height) = (900, 40 + 230 * rows);
+        figure.render()?.save(&arguments.out.join("scaling.png"))?;
+    }
+    local_edits(arguments)?;
+    if arguments.profile >= LEAST {
+        let name = family(Scheme::CatmullClark, arguments.profile);
+        let mesh = noisy(&name)?;
+        let profile = profile::profile(&name, &mesh, Scheme::CatmullClark, threads)?;
+        profile.write(&arguments.out)?;
+        cli::print(&profile.to_markdown())?;
+    }
+    cli::print(&table.to_markdown())?;
+    arguments
+        .common
+        .remark(format_args!("tables and plot: {}", arguments.out.display()));
+    Ok(())
+}
+
+/// Local edits on the meshes of all schemes and sizes, and the decay on the largest.
+fn local_edits(arguments: &Arguments) -> Result<()> {
+    let mut table = edits::edits_table(arguments.tol);
+    let mut largest = Vec::new();
+    for &scheme in &arguments.scheme.0 {
+        for (k, &n) in arguments.sizes.0.iter().enumerate() {
+            let name = family(scheme, n);
+            let mesh = noisy(&name)?;
+            let operator = edits::edits(&name, &mesh, scheme, arguments.tol, &mut table)?;
+            if k + 1 == arguments.sizes.0.len() {
+                largest.push((format!("{name}, {scheme}"), operator));
+            }
+        }
+    }
+    table.write(&arguments.out)?;
+    edits::decay_table(&largest).write(&arguments.out)?;
+    cli::print(&table.to_markdown())
+}
+
+/// The built-in mesh of about `n` vertices that suits the scheme.
+fn family(scheme: Scheme, n: usize) -> String {
+    let n = n.max(LEAST);
+    match scheme {
+        Scheme::CatmullClark => format!("irregular-quad:{}", n & !1),
+        Scheme::Loop | Scheme::Sqrt3 => format!("irregular-tri:{n}"),
+        Scheme::Nasri | Scheme::ZhengCai => format!("irregular-poly:{n}"),
+    }
+}
+
+fn noisy(name: &str) -> Result<Mesh> {
+    let mut mesh = builtin(name)?;
+    add_noise(&mut mesh, 0.1, 1);
+    Ok(mesh)
+}
+
+/// A way from faces to control points.
+#[derive(Clone, Copy, PartialEq)]
+enum Way {
+    Auto,
+    Plain,
+    Free(Method),
+    Stored(Method),
+}
+
+impl Way {
+    const ALL: [Way; 9] = [
+        Way::Auto,
+        Way::Plain,
+        Way::Free(Method::Chebyshev),
+        Way::Free(Method::Cg),
+        Way::Stored(Method::Chebyshev),
+        Way::Stored(Method::GaussSeidel),
+        Way::Stored(Method::PcgIc0),
+        Way::Stored(Method::Cholesky),
+        Way::Stored(Method::Lu),
+    ];
+
+    fn name(self) -> String {
+        match self {
+            Way::Auto => "auto".into(),
+            Way::Plain => "plain-chebyshev".into(),
+            Way::Free(method) => format!("{method} (matrix-free)"),
+            Way::Stored(method) => method.name().into(),
+        }
+    }
+
+    fn most(self, arguments: &Arguments) -> usize {
+        match self {
+            Way::Stored(Method::Cholesky) => arguments.most_cholesky,
+            Way::Stored(Method::Lu) => arguments.most_lu,
+            Way::Stored(_) => arguments.most_stored,
+            _ => usize::MAX,
+        }
+    }
+}
+
+/// Time per vertex of one way over the sizes.
+struct Curve {
+    way: Way,
+    random: bool,
+    points: Vec<(f64, f64)>,
+}
+
+struct Outcome {
+    iterations: usize,
+    status: &'static str,
+    solve_seconds: f64,
+}
+
+fn of_scheme(
+    arguments: &Arguments,
+    scheme: Scheme,
+    bandwidth: f64,
+    table: &mut Table,
+) -> Result<[LinePlot; 2]> {
+    let small = noisy(&family(scheme, ESTIMATE))?;
+    let topology = Topology::new(&small.faces, small.len());
+    let system = LimitSystem::new(&small, &topology, scheme)?;
+    let estimate = 0.98 * spectrum(&system)?.a.min;
+    let mut curves: Vec<Curve> = Vec::new();
+    let mut bound = Vec::new();
+    let progress = Progress::open(scheme.name(), arguments.common.quiet);
+    for &n in &arguments.sizes.0 {
+        let name = family(scheme, n);
+        let good = noisy(&name)?;
+        for random in [false, true] {
+            let scattered;
+            let mesh = if random {
+                let topology = Topology::new(&good.faces, good.len());
+                let order = Order::Random(7).order(&good, &topology.incidence);
+                scattered = shuffle_faces(&permute_vertices(&good, &order), 7);
+                &scattered
+            } else {
+                &good
+            };
+            for way in Way::ALL {
+                if n > way.most(arguments) {
+                    continue;
+                }
+                progress.message(format!("{name}: {}", way.name()));
+                let Some((seconds, outcome, memory)) =
+                    timed(arguments, mesh, scheme, way, estimate)?
+                else {
+                    continue;
+                };
+                progress.step();
+                table.push(vec![
+                    scheme.name().into(),
+                    name.clone().into(),
+                    if random { "random" } else { "good" }.into(),
+                    way.name().into(),
+                    mesh.len().into(),
+                    outcome.iterations.into(),
+                    outcome.status.into(),
+                    seconds.into(),
+                    outcome.solve_seconds.into(),
+                    (1e9 * seconds / mesh.len() as f64).into(),
+                    memory.map(|m| m as f64 / 1e6).into(),
+                ]);
+                let at = (mesh.len() as f64, 1e9 * seconds / mesh.len() as f64);
+                let known = curves
+                    .iter_mut()
+                    .find(|c| c.way == way && c.random == random);
+                match known {
+                    Some(curve) => curve.points.push(at),
+                    None => curves.push(Curve {
+                        way,
+                        random,
+                        points: vec![at],
+                    }),
+                }
+                if way == Way::Free(Method::Chebyshev) && !random {
+                    // What a fused iteration in double precision must move, as often.
+                    let bytes = 4.0 * 24.0 + 37.0;
+                    bound.push((at.0, 1e9 * bytes * outcome.iterations as f64 / bandwidth));
+                }
+            }
+        }
+    }
+    drop(progress);
+    Ok([false, true].map(|random| plot(scheme, random, &curves, &bound)))
+}
+
+/// Time per vertex over the number of vertices, in one of the two orders. The legend stands beside the second.
+fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) -> LinePlot {
+    const GREY: Colour = Colour(120, 120, 120);
+    let look = |way: Way| match way {
+        Way::Auto => (palette(0), Marker::Circle),
+        Way::Plain => (palette(1), Marker::Square),
+        Way::Free(Method::Chebyshev) => (palette(2), Marker::Circle),
+        Way::Free(_) => (palette(3), Marker::Diamond),
+        Way::Stored(Method::Chebyshev) => (palette(4), Marker::Circle),
+        Way::Stored(Method::GaussSeidel) => (palette(5), Marker::Square),
+        Way::Stored(Method::PcgIc0) => (palette(6), Marker::Diamond),
+        Way::Stored(Method::Cholesky) => (GREY, Marker::Triangle),
+        Way::Stored(_) => (GREY, Marker::InvertedTriangle),
+    };
+    let mut series: Vec<Series> = curves
+        .iter()
+        .filter(|c| c.random == random)
+        .map(|c| {
+            let (colour, marker) = look(c.way);
+            let name = if random { c.way.name() } else { String::new() };
+            Series::line(name, c.points.iter().copied())
+                .colour(colour)
+                .marker(marker)
+                .dash(Dash::Solid)
+        })
+        .collect();
+    if bound.len() > 1 {
+        let name = if random { "bandwidth bound" } else { "" };
+        series.push(
+            Series::line(name, bound.iter().copied())
+                .colour(Colour(0, 0, 0))
+                .dash(Dash::Dotted),
+        );
+    }
+    LinePlot {
+        title: format!("{scheme}, {} order", if random { "random" } else { "good" }),
+        x_label: "vertices".into(),
+        y_label: "nanoseconds a vertex".into(),
+        x_scale: Scale::Log,
+        y_scale: Scale::Log,
+        y_range: Some((20.0, 2e4)),
+        series,
+        ..LinePlot::default()
+    }
+}
+
+/// The fastest of several runs, with the memory of the first.
+fn timed(
+    arguments: &Arguments,
+    mesh: &Mesh,
+    scheme: Scheme,
+    way: Way,
+    estimate: f64,
+) -> Result<Option<(f64, Outcome, Option<u64>)>> {
+    let once = || {
+        let start = Instant::now();
+        let outcome = go(mesh, scheme, way, estimate, arguments.tol)?;
+        Ok::<_, limitlab::Error>(outcome.map(|o| (start.elapsed().as_secs_f64(), o)))
+    };
+    let (first, memory) = machine::peak_memory(once);
+    let Some((mut seconds, mut outcome)) = first? else {
+        return Ok(None);
+    };
+    for _ in 1..arguments.runs {
+        if seconds > 1.0 {
+            break;
+        }
+        if let Some((again, o)) = once()?
+            && again < seconds
+        {
+            (seconds, outcome) = (again, o);
+        }
+    }
+    Ok(Some((seconds, outcome, memory)))
+}
+
+/// One run from faces in memory to control points; `None` if the way does not suit the mesh.
+fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<Option<Outcome>> {
+    let points = &mesh.positions;
+    let stop = Stop {
+        tolerance: tol * mesh.diagonal(),
+        max_iterations: 10_000,
+    };
+    let start = |seconds: &mut f64, since: Instant| *seconds = since.elapsed().as_secs_f64();
+    let mut solve_seconds = 0.0;
+    let outcome = match way {
+        Way::Auto => {
+            let found = control_points(mesh, None, scheme, &stop)?;
+            Outcome {
+                iterations: found.report.iterations,
+                status: found.report.outcome.name(),
+                solve_seconds: found.solve_seconds,
+            }
+        }
+        Way::Plain => {
+            let Some(plain) = baseline::Plain::new(mesh, scheme) else {
+                return Ok(None);
+            };
+            let since = Instant::now();
+            let (_, iterations, converged) =
+                plain.chebyshev(points, (estimate, 1.0), stop.tolerance, stop.max_iterations);
+            start(&mut solve_seconds, since);
+            Outcome {
+                iterations,
+                status: if converged {
+                    "converged"
+                } else {
+                    "max-iterations"
+                },
+                solve_seconds,
+            }
+        }
+        Way::Free(method) => {
+            let topology = Topology::new(&mesh.faces, mesh.len());
+            let operator = Operator::new(&mesh.faces, &topology, scheme)?;
+            let since = Instant::now();
+            let mut iterate: Box<dyn Iterate> = if method == Method::Cg {
+                let h = Preconditioner::weights(&operator);
+                Box::new(ConjugateGradient::new(&operator, points, h))
+            } else {
+                Box::new(Chebyshev::new(&operator, points, (estimate, 1.0)))
+            };
+            let report = solve(iterate.as_mut(), &stop, &mut |_| {
+                std::ops::ControlFlow::Continue(())
+            });
+            start(&mut solve_seconds, since);
+            Outcome {
+                iterations: report.iterations,
+                status: report.outcome.name(),
+                solve_seconds,
+            }
+        }
+        Way::Stored(method) => {
+            let topology = Topology::new(&mesh.faces, mesh.len());
+            let system = LimitSystem::new(mesh, &topology, scheme)?;
+            let setup = match method {
+                Method::Chebyshev => Setup::Chebyshev {
+                    spectrum: (estimate, 1.0),
+                },
+                Method::GaussSeidel => Setup::Sor {
+                    omega: 1.0,
+                    order: None,
+                },
+                Method::PcgIc0 => Setup::PcgIc0,
+                Method::Lu => Setup::Lu,
+                _ => Setup::Cholesky,
+            };
+            let since = Instant::now();
+            let solution = run(&system, points, setup, &stop);
+            start(&mut solve_seconds, since);
+            Outcome {
+                iterations: solution.report.iterations,
+                status: solution.report.outcome.name(),
+                solve_seconds,
+            }
+        }
+    };
+    Ok(Some(outcome))
+}

@@ -1,0 +1,283 @@
+//! Whether a system is singular, why, whether the data notice, and what each method makes of it.
+//!
+//! Theory, on closed meshes with all valences ≥ 3: under Catmull-Clark A is singular exactly when some connected
+//! component has all valences 3 and a bipartite edge graph; its null vector is the ±1 colouring. This follows from
+//! `xᵀMx = Σ_F (4/|F|)(Σ_{i∈F} x_i)² + 2 Σ_ij (x_i+x_j)² + Σ n(n−3) x_i²`: the edge terms vanish only for x_j = −x_i
+//! along every edge, the last only where n = 3, and the face terms then vanish by themselves, as all faces are even.
+//! The other schemes have positive lower bounds and are never singular.
+
+use glam::DVec3;
+
+use super::certificate::eigenvalues_below;
+use super::eigen::{self, End, Request};
+use super::spectrum::{Operator, scales, symmetric};
+use super::{dense, eigen::Eigenvalue};
+use crate::assemble::{LimitSystem, Scheme};
+use crate::error::Result;
+use crate::mesh::topology::{next_in, prev_in};
+use crate::mesh::{Mesh, Topology};
+use crate::solvers::Method;
+
+/// A component on which A is singular.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SingularComponent {
+    pub first_vertex: usize,
+    pub vertices: usize,
+    /// The mean of ±p_i over the component, signed by the colouring: the constant part of the error that no control
+    /// points can remove. In mesh units.
+    pub unreachable: DVec3,
+}
+
+/// The verdict of theory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Singularity {
+    /// Connected components of the mesh.
+    pub components: usize,
+    pub singular: Vec<SingularComponent>,
+    /// The null vectors, all in one: ±1 on singular components, 0 elsewhere. Restricted to one component it is
+    /// that component's null vector, of A and of D⁻¹A.
+    pub colouring: Vec<i8>,
+    /// Whether the points have a part that no control points reach, beyond rounding: then there is no solution.
+    pub excited: bool,
+}
+
+/// What a method will do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Prediction {
+    /// Non-singular: the solution.
+    Converges,
+    /// Singular, not excited: the solution of least ‖H^-½V‖₂, whose null part is that of the points, zero.
+    MinimumNorm,
+    /// Singular, not excited: one of the solutions; which one depends on the method.
+    SomeSolution,
+    /// Singular and excited: the error stalls at the unreachable part while V grows along the null vector.
+    Drifts,
+    /// Singular: a factorization that looks at its pivots, or at the smallest eigenvalue, says so.
+    Refuses,
+}
+
+impl Prediction {
+    pub fn name(self) -> &'static str {
+        match self {
+            Prediction::Converges => "converges",
+            Prediction::MinimumNorm => "converges to the minimum-norm solution",
+            Prediction::SomeSolution => "converges to some solution",
+            Prediction::Drifts => "drifts",
+            Prediction::Refuses => "refuses",
+        }
+    }
+}
+
+impl Singularity {
+    /// Decides from the mesh alone. The points are the mesh's positions. O(corners).
+    pub fn detect(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Self {
+        let (component, components) = topology.components(&mesh.faces);
+        let mut verdict = Singularity {
+            components,
+            singular: Vec::new(),
+            colouring: vec![0; mesh.len()],
+            excited: false,
+        };
+        if scheme != Scheme::CatmullClark {
+            return verdict;
+        }
+        let mut colour = colour(mesh, topology);
+        let mut regular = vec![false; components];
+        for v in 0..mesh.len() {
+            let bad = topology.incidence.face_count(v) != 3
+                || neighbours(mesh, topology, v).any(|w| colour[w] == colour[v]);
+            if bad {
+                regular[component[v] as usize] = true;
+            }
+        }
+        let mut found: Vec<Option<usize>> = vec![None; components];
+        let largest = mesh
+            .positions
+            .iter()
+            .fold(0.0f64, |m, p| m.max(p.abs().max_element()));
+        for v in 0..mesh.len() {
+            let c = component[v] as usize;
+            if regular[c] {
+                colour[v] = 0;
+                continue;
+            }
+            let at = *found[c].get_or_insert_with(|| {
+                verdict.singular.push(SingularComponent {
+                    first_vertex: v,
+                    vertices: 0,
+                    unreachable: DVec3::ZERO,
+                });
+                verdict.singular.len() - 1
+            });
+            let here = &mut verdict.singular[at];
+            here.vertices += 1;
+            here.unreachable += f64::from(colour[v]) * mesh.positions[v];
+        }
+        for here in &mut verdict.singular {
+            here.unreachable /= here.vertices as f64;
+            // The mean of n numbers by a plain sum: rounding errors of a small multiple of ε times their size.
+            let rounding = 64.0 * f64::EPSILON * largest;
+            verdict.excited |= here.unreachable.abs().max_element() > rounding;
+        }
+        verdict.colouring = colour;
+        verdict
+    }
+
+    /// The number of independent null vectors.
+    pub fn kernel_dimension(&self) -> usize {
+        self.singular.len()
+    }
+
+    pub fn is_singular(&self) -> bool {
+        !self.singular.is_empty()
+    }
+
+    /// What `method` will do from V = P, its parameters within their limits: an ω below the critical one, for
+    /// Chebyshev an interval that begins at the least positive eigenvalue.
+    ///
+    /// Simultaneous and sweeping relaxations of a semidefinite system converge if it is soluble (Keller 1965), and
+    /// else move by the same step along the null space in each iteration.
+    pub fn prediction(&self, method: Method) -> Prediction {
+        match method {
+            _ if !self.is_singular() => Prediction::Converges,
+            Method::Lu | Method::Cholesky | Method::Ldlt => Prediction::Refuses,
+            _ if self.excited => Prediction::Drifts,
+            // Updates lie in the range of A = H M, which is H^-1-orthogonal to the null space.
+            Method::Pia | Method::WPia | Method::Chebyshev | Method::Cg => Prediction::MinimumNorm,
+            _ => Prediction::SomeSolution,
+        }
+    }
+}
+
+/// ±1 by breadth-first levels along edges.
+fn colour(mesh: &Mesh, topology: &Topology) -> Vec<i8> {
+    let mut colour = vec![0i8; mesh.len()];
+    let mut queue: Vec<usize> = Vec::with_capacity(mesh.len());
+    for seed in 0..mesh.len() {
+        if colour[seed] != 0 {
+            continue;
+        }
+        colour[seed] = 1;
+        let mut next = queue.len();
+        queue.push(seed);
+        while let Some(&v) = queue.get(next) {
+            next += 1;
+            for w in neighbours(mesh, topology, v) {
+                if colour[w] == 0 {
+                    colour[w] = -colour[v];
+                    queue.push(w);
+                }
+            }
+        }
+    }
+    colour
+}
+
+/// The other ends of the edges at `v`; on closed meshes each comes twice.
+fn neighbours<'a>(
+    mesh: &'a Mesh,
+    topology: &'a Topology,
+    v: usize,
+) -> impl Iterator<Item = usize> + 'a {
+    let corners = mesh.faces.corners();
+    topology.incidence.corners_at(v).iter().flat_map(move |&c| {
+        let range = mesh.faces.range(topology.incidence.face_of(c));
+        [next_in(&range, c), prev_in(&range, c)].map(|d| corners[d as usize] as usize)
+    })
+}
+
+/// Eigenvalues of A below this count as zero: far above rounding, far below any eigenvalue that is not zero on meshes
+/// of fewer than some ten thousand vertices in a chain of prisms.
+pub const ZERO: f64 = 1e-10;
+
+/// The number of eigenvalues of A that are zero to [`ZERO`], by numbers alone: dense for small systems, else the
+/// inertia of A − [`ZERO`]. Holds for any matrix with λ_min ≥ 0.
+///
+/// # Errors
+/// As [`eigenvalues_below`].
+pub fn numerical_kernel_dimension(system: &LimitSystem) -> Result<usize> {
+    if system.len() <= dense::LARGEST {
+        let all = dense::eigenvalues(system)?.a;
+        return Ok(all.iter().filter(|l| l.abs() <= ZERO).count());
+    }
+    Ok(eigenvalues_below(system, Operator::A, ZERO)?.below)
+}
+
+/// A slow mode: an eigenvector of A or D⁻¹A at an end of the spectrum.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mode {
+    pub eigenvalue: Eigenvalue,
+    /// The eigenvector at the vertices, of largest entry 1: what a control net's error looks like.
+    pub values: Vec<f64>,
+    /// (Σ x²)²/(N Σ x⁴) of the symmetric matrix' eigenvector: 1 if spread evenly, 1/N on a single vertex.
+    pub participation: f64,
+}
+
+/// The `count` modes at one end, with multiplicity: null and near-null vectors at the lowest. In a multiple
+/// eigenvalue's space the vectors are an arbitrary orthonormal basis. Dense up to 600 vertices.
+///
+/// # Errors
+/// As [`eigen::extreme`] and [`dense::eigenpairs`].
+pub fn modes(
+    system: &LimitSystem,
+    operator: Operator,
+    end: End,
+    count: usize,
+) -> Result<Vec<Mode>> {
+    let s = symmetric(system, operator);
+    let pairs: Vec<(Eigenvalue, Vec<f64>)> = if system.len() <= dense::LARGEST {
+        let (values, vectors) = dense::eigenpairs(&s)?;
+        let mut pairs: Vec<_> = values.into_iter().zip(vectors).collect();
+        if end == End::Highest {
+            pairs.reverse();
+        }
+        pairs.truncate(count);
+        pairs
+            .into_iter()
+            .map(|(value, x)| {
+                let (_, residual) = super::spectrum::rayleigh(&s, &x);
+                let error = residual;
+                (
+                    Eigenvalue {
+                        value,
+                        residual,
+                        error,
+                    },
+                    x,
+                )
+            })
+            .collect()
+    } else {
+        let b = &system.bounds;
+        let spectrum = match operator {
+            Operator::A => (b.lambda_min, b.lambda_max),
+            Operator::Jacobi => (b.jacobi_lambda_min, b.jacobi_lambda_max),
+        };
+        let request = Request {
+            end,
+            count,
+            tolerance: 1e-9,
+            spectrum,
+        };
+        let found = eigen::extreme(&s, &request)?;
+        found.values.into_iter().zip(found.vectors).collect()
+    };
+    let scale = scales(system, operator);
+    Ok(pairs
+        .into_iter()
+        .map(|(eigenvalue, x)| {
+            let squares: f64 = x.iter().map(|x| x * x).sum();
+            let fourth: f64 = x.iter().map(|x| x.powi(4)).sum();
+            let mut values: Vec<f64> = x.iter().zip(&scale).map(|(x, s)| x * s).collect();
+            let largest = values
+                .iter()
+                .fold(0.0f64, |m, &v| if v.abs() > m.abs() { v } else { m });
+            values.iter_mut().for_each(|v| *v /= largest);
+            Mode {
+                eigenvalue,
+                values,
+                participation: squares * squares / (x.len() as f64 * fourth),
+            }
+        })
+        .collect())
+}

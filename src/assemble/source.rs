@@ -1,0 +1,353 @@
+//! From faces to the rows of the matrix-free [`Operator`](super::Operator).
+
+use rayon::prelude::*;
+
+use super::scheme::{Masks, Scheme};
+use super::stencil::{Code, Kind, LargeFaces, Listed, Ring, Rings};
+use crate::mesh::topology::{NONE, next_in, prev_in};
+use crate::mesh::{Faces, Topology};
+
+/// Rows of one task.
+const CHUNK: usize = 4096;
+/// Faces with more corners are summed as a whole: their corners are stored once, not once a pair.
+const LARGE: usize = 8;
+
+/// What a large face adds between the places s and t: `identity·δ + constant + cosine·cos(2π(s−t)/m)`.
+#[derive(Clone, Copy, Debug, Default)]
+struct Modes {
+    identity: f64,
+    constant: f64,
+    cosine: f64,
+}
+
+impl Modes {
+    /// The modes of the scheme's circulant, if it has these only.
+    fn of(scheme: Scheme, size: usize) -> Option<Modes> {
+        let turn = |k: usize| (std::f64::consts::TAU * k as f64 / size as f64).cos();
+        let f = |k| scheme.face_weight(size, k);
+        // The two places furthest apart on the wave lose fewest digits.
+        let half = size / 2;
+        let cosine = (f(1) - f(half)) / (turn(1) - turn(half));
+        let constant = f(1) - cosine * turn(1);
+        let modes = Modes {
+            identity: f(0) - constant - cosine,
+            constant,
+            cosine,
+        };
+        let rounding = 64.0 * f64::EPSILON * f(0).abs();
+        let fits = (1..size).all(|k| (constant + cosine * turn(k) - f(k)).abs() <= rounding);
+        fits.then_some(modes)
+    }
+}
+
+/// What the rows are built from.
+pub(super) struct Source<'a> {
+    faces: &'a Faces,
+    topology: &'a Topology,
+    scheme: Scheme,
+    pub(super) valences: Vec<u32>,
+    /// By face size; `None` for faces whose corners are coupled one by one.
+    modes: Vec<Option<Modes>>,
+    /// The number of every large face; empty if there are none.
+    large: Vec<u32>,
+    half_edge: f64,
+}
+
+/// A neighbour's code in a row, if it has one.
+pub(super) trait Encode: Code + Default {
+    fn encode(row: usize, neighbour: u32) -> Option<Self>;
+}
+
+impl Encode for u32 {
+    fn encode(_row: usize, neighbour: u32) -> Option<u32> {
+        Some(neighbour)
+    }
+}
+
+impl Encode for i16 {
+    fn encode(row: usize, neighbour: u32) -> Option<i16> {
+        i16::try_from(i64::from(neighbour) - row as i64).ok()
+    }
+}
+
+/// Fills the neighbours of all rows in parallel, unless `fill` of some row says `None`.
+pub(super) fn fill_rows<C: Encode>(
+    offsets: &[u32],
+    fill: impl Fn(usize, &mut [C], &mut Vec<(u32, f64)>) -> Option<()> + Sync,
+) -> Option<Vec<C>> {
+    let n = offsets.len() - 1;
+    let mut codes = vec![C::default(); offsets[n] as usize];
+    let mut tasks = Vec::with_capacity(n.div_ceil(CHUNK));
+    let mut rest = codes.as_mut_slice();
+    for first in (0..n).step_by(CHUNK) {
+        let rows = first..(first + CHUNK).min(n);
+        let (part, after) = rest.split_at_mut((offsets[rows.end] - offsets[first]) as usize);
+        tasks.push((rows, part));
+        rest = after;
+    }
+    tasks
+        .into_par_iter()
+        .map_init(Vec::new, |scratch, (rows, mut part)| {
+            for i in rows {
+                let (row, after) = part.split_at_mut((offsets[i + 1] - offsets[i]) as usize);
+                fill(i, row, scratch)?;
+                part = after;
+            }
+            Some(())
+        })
+        .collect::<Option<()>>()?;
+    Some(codes)
+}
+
+impl<'a> Source<'a> {
+    pub(super) fn new(faces: &'a Faces, topology: &'a Topology, scheme: Scheme) -> Self {
+        let mut source = Source {
+            faces,
+            topology,
+            scheme,
+            valences: super::system::valences(faces, topology),
+            modes: Vec::new(),
+            large: Vec::new(),
+            half_edge: 0.5 * scheme.edge_weight(),
+        };
+        if scheme.edges_only() || faces.uniform_size().is_some_and(|size| size <= LARGE) {
+            return source;
+        }
+        let largest = faces.iter().map(<[u32]>::len).max().unwrap_or(0);
+        let mut occurs = vec![false; largest + 1];
+        faces.iter().for_each(|f| occurs[f.len()] = true);
+        source.modes = occurs
+            .iter()
+            .enumerate()
+            .map(|(size, &occurs)| {
+                if occurs && size > LARGE {
+                    Modes::of(scheme, size)
+                } else {
+                    None
+                }
+            })
+            .collect();
+        if source.modes.iter().any(Option::is_some) {
+            let mut count = 0;
+            source.large = faces
+                .iter()
+                .map(|f| match source.modes[f.len()] {
+                    Some(_) => {
+                        count += 1;
+                        count - 1
+                    }
+                    None => NONE,
+                })
+                .collect();
+        }
+        source
+    }
+
+    fn modes(&self, size: usize) -> Option<Modes> {
+        self.modes.get(size).copied().flatten()
+    }
+
+    /// The kind of every row.
+    pub(super) fn kinds(&self) -> Vec<Kind> {
+        let n = self.valences.len();
+        let of_size = |size: usize| match size {
+            _ if self.scheme.edges_only() => Kind::Edges,
+            3 => Kind::Edges,
+            4 => Kind::Quads,
+            _ => Kind::Listed,
+        };
+        if let Some(size) = self.faces.uniform_size() {
+            return vec![of_size(size); n];
+        }
+        let incidence = &self.topology.incidence;
+        (0..n)
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map(|v| {
+                let mut kinds = incidence
+                    .corners_at(v)
+                    .iter()
+                    .map(|&c| of_size(self.faces.range(incidence.face_of(c)).len()));
+                let first = kinds.next().unwrap_or(Kind::Edges);
+                if kinds.all(|k| k == first) {
+                    first
+                } else {
+                    Kind::Listed
+                }
+            })
+            .collect()
+    }
+
+    pub(super) fn offsets(&self, kinds: &[Kind]) -> Vec<u32> {
+        let lengths: Vec<u32> = kinds
+            .par_iter()
+            .enumerate()
+            .with_min_len(CHUNK)
+            .map_init(Vec::new, |scratch, (v, kind)| match kind {
+                Kind::Quads => 2 * self.valences[v],
+                Kind::Edges => self.valences[v],
+                Kind::Listed => {
+                    self.list(v, scratch);
+                    scratch.len() as u32
+                }
+            })
+            .collect();
+        let mut offsets = Vec::with_capacity(lengths.len() + 1);
+        offsets.push(0);
+        let mut end = 0;
+        offsets.extend(lengths.iter().map(|length| {
+            end += length;
+            end
+        }));
+        offsets
+    }
+
+    pub(super) fn fill<C: Encode>(&self, kinds: &[Kind], offsets: &[u32]) -> Option<Vec<C>> {
+        let incidence = &self.topology.incidence;
+        let corners = self.faces.corners();
+        let open = self.topology.boundary_edges() > 0;
+        fill_rows(offsets, |v, row: &mut [C], scratch| {
+            let encode = |neighbour: u32| C::encode(v, neighbour);
+            match kinds[v] {
+                Kind::Quads => {
+                    let (edge, opposite) = row.split_at_mut(row.len() / 2);
+                    let at = incidence.corners_at(v).iter();
+                    for ((edge, opposite), &c) in edge.iter_mut().zip(opposite).zip(at) {
+                        let face = self.faces.face(incidence.face_of(c));
+                        let start = self.faces.range(incidence.face_of(c)).start;
+                        let place = c as usize - start;
+                        *edge = encode(face[(place + 1) % 4])?;
+                        *opposite = encode(face[(place + 2) % 4])?;
+                    }
+                }
+                Kind::Edges => {
+                    // Every edge leaves v in one of its faces; on a boundary it may only enter.
+                    let mut slots = row.iter_mut();
+                    for &c in incidence.corners_at(v) {
+                        let range = self.faces.range(incidence.face_of(c));
+                        let into = prev_in(&range, c);
+                        if let Some(slot) = slots.next() {
+                            *slot = encode(corners[next_in(&range, c) as usize])?;
+                        }
+                        if open
+                            && self.topology.twin(into).is_none()
+                            && let Some(slot) = slots.next()
+                        {
+                            *slot = encode(corners[into as usize])?;
+                        }
+                    }
+                }
+                Kind::Listed => {
+                    self.list(v, scratch);
+                    for (slot, &(w, _)) in row.iter_mut().zip(scratch.iter()) {
+                        *slot = encode(w)?;
+                    }
+                }
+            }
+            Some(())
+        })
+    }
+
+    /// The entries of row `v` of M off the diagonal, large faces aside, ascending; returns the part of the diagonal
+    /// that is no part of a large face's sum.
+    fn list(&self, v: usize, entries: &mut Vec<(u32, f64)>) -> f64 {
+        entries.clear();
+        let incidence = &self.topology.incidence;
+        let mut own = self.scheme.vertex_weight(self.valences[v] as usize);
+        for &c in incidence.corners_at(v) {
+            let f = incidence.face_of(c);
+            let face = self.faces.face(f);
+            let size = face.len();
+            let place = c as usize - self.faces.range(f).start;
+            let at = |steps: usize| face[(place + steps) % size];
+            if let Some(modes) = self.modes(size) {
+                own += modes.identity;
+                if self.half_edge != 0.0 {
+                    entries.push((at(1), self.half_edge));
+                    entries.push((at(size - 1), self.half_edge));
+                }
+                continue;
+            }
+            own += self.scheme.face_weight(size, 0);
+            for steps in 1..size {
+                let side = steps == 1 || steps + 1 == size;
+                let edge = if side { self.half_edge } else { 0.0 };
+                entries.push((at(steps), self.scheme.face_weight(size, steps) + edge));
+            }
+        }
+        entries.sort_by_key(|e| e.0);
+        entries.dedup_by(|later, kept| {
+            let same = later.0 == kept.0;
+            if same {
+                kept.1 += later.1;
+            }
+            same
+        });
+        own
+    }
+
+    /// The weights of rows whose faces are all quads, or all triangles.
+    pub(super) fn rings(&self) -> Rings<f64> {
+        let greatest = self.valences.iter().copied().max().unwrap_or(0) as usize;
+        let s = self.scheme;
+        let ring = |n: usize, size: usize| {
+            let (x, h) = (n as f64, s.h(n.max(1)));
+            let (face, opposite) = if s.edges_only() {
+                ([0.0; 3], 0.0)
+            } else {
+                let at = |steps| s.face_weight(size, steps);
+                ([at(0), at(1), at(size - 1)], at(2))
+            };
+            Ring::new(
+                h * (s.vertex_weight(n.max(1)) + x * face[0]),
+                h * (s.edge_weight() + face[1] + face[2]),
+                h * opposite,
+            )
+        };
+        let rings = |size| (0..=greatest).map(|n| ring(n, size)).collect();
+        Rings {
+            quads: rings(4),
+            edges: rings(3),
+        }
+    }
+
+    pub(super) fn listed(&self, kinds: &[Kind], h: &[f64]) -> (Listed, LargeFaces) {
+        let mut large = LargeFaces {
+            offsets: vec![0],
+            ..LargeFaces::default()
+        };
+        for face in self.faces.iter().filter(|_| !self.large.is_empty()) {
+            if let Some(modes) = self.modes(face.len()) {
+                large.corners.extend_from_slice(face);
+                large.offsets.push(large.corners.len() as u32);
+                large.constant.push(modes.constant);
+                large.cosine.push(modes.cosine);
+            }
+        }
+        let mut listed = Listed::default();
+        if !kinds.contains(&Kind::Listed) {
+            return (listed, large);
+        }
+        listed.large_starts.push(0);
+        listed.slots = vec![NONE; kinds.len()];
+        let incidence = &self.topology.incidence;
+        let mut scratch = Vec::new();
+        for v in (0..kinds.len()).filter(|&v| kinds[v] == Kind::Listed) {
+            listed.slots[v] = listed.own.len() as u32;
+            let own = self.list(v, &mut scratch);
+            listed.own.push(h[v] * own);
+            listed.h.push(h[v]);
+            listed.starts.push(listed.weights.len() as u32);
+            listed.weights.extend(scratch.iter().map(|e| h[v] * e.1));
+            for &c in incidence.corners_at(v) {
+                let f = incidence.face_of(c);
+                if let Some(&number) = self.large.get(f).filter(|&&number| number != NONE) {
+                    let place = c as usize - self.faces.range(f).start;
+                    listed.corners.push((number, place as u32));
+                }
+            }
+            listed.large_starts.push(listed.corners.len() as u32);
+        }
+        (listed, large)
+    }
+}

@@ -1,0 +1,93 @@
+//! Iterative methods watched by the fairness: how much the surface ripples while its error falls, and whether stopping
+//! early helps.
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+
+use super::energy::{Energies, Fairness};
+use crate::assemble::LimitSystem;
+use crate::interpolate::thall::normal_deviations;
+use crate::mesh::{Mesh, Topology};
+use crate::solvers::{Errors, Setup, Solution, Stop, run_watched};
+use crate::subdivide::catmull_clark;
+use crate::{Error, Result};
+
+/// One iterate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    pub iteration: usize,
+    /// Interpolation error, in mesh units.
+    pub errors: Errors,
+    pub energies: Energies,
+    /// The angle between the surface's normals at the given points and the wanted ones, in radians.
+    pub deviation_max: f64,
+    pub deviation_mean: f64,
+}
+
+/// Runs a method on the Catmull-Clark system of `mesh` and measures every iterate, the start first: its errors, the
+/// energies of its surface, its normals against `normals`. Each measurement refines twice.
+///
+/// # Errors
+/// As the refinement.
+///
+/// # Panics
+/// As [`run_watched`], and if `fairness` is not that of a mesh with the same faces or there is not one normal a
+/// vertex.
+pub fn follow(
+    mesh: &Mesh,
+    topology: &Topology,
+    system: &LimitSystem,
+    fairness: &Fairness,
+    normals: &[DVec3],
+    setup: Setup,
+    stop: &Stop,
+) -> Result<(Vec<Row>, Solution)> {
+    let mut rows = Vec::new();
+    let mut failure: Option<Error> = None;
+    let mut iterate = mesh.clone();
+    let solution = run_watched(system, &mesh.positions, setup, stop, &mut |step| {
+        iterate.positions.copy_from_slice(step.points);
+        match measure(&iterate, topology, fairness, normals) {
+            Ok((energies, deviation_max, deviation_mean)) => {
+                rows.push(Row {
+                    iteration: step.iteration,
+                    errors: step.errors,
+                    energies,
+                    deviation_max,
+                    deviation_mean,
+                });
+                ControlFlow::Continue(())
+            }
+            Err(e) => {
+                failure = Some(e);
+                ControlFlow::Break(())
+            }
+        }
+    });
+    match failure {
+        Some(e) => Err(e),
+        None => Ok((rows, solution)),
+    }
+}
+
+/// The energies of a control mesh's surface, and the largest and the mean deviation of its normals.
+///
+/// # Errors
+/// As the refinement.
+///
+/// # Panics
+/// As [`follow`].
+pub fn measure(
+    control: &Mesh,
+    topology: &Topology,
+    fairness: &Fairness,
+    normals: &[DVec3],
+) -> Result<(Energies, f64, f64)> {
+    let energies = fairness.energies_of(control)?;
+    let found = catmull_clark::limit_normals(control, topology)?;
+    let deviations = normal_deviations(&found, normals);
+    let max = deviations.iter().copied().fold(0.0, f64::max);
+    let mean = deviations.iter().sum::<f64>() / deviations.len() as f64;
+    Ok((energies, max, mean))
+}

@@ -1,0 +1,196 @@
+//! Several Chebyshev iterations in one pass over memory.
+//!
+//! Iterate k + 1 of a row needs iterate k of its neighbours only. Where the vertex order keeps neighbours within a
+//! narrow band, the vertices are cut into bands as long as a row reaches: band j of iterate k + 1 can be made as
+//! soon as band j + 1 of iterate k is there, long before that iterate is complete. A wave therefore advances band
+//! w − 2k of every iterate k at once; these updates touch disjoint parts of two arrays and run in parallel, and all
+//! that they touch stays in cache from one wave to the next. Every number is computed from the same operands as in
+//! iterations one after the other, so results do not depend on the number of threads, nor on the length of a group
+//! of iterations (Wonnacott's time skewing, 2000).
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::chebyshev::Recurrence;
+use crate::assemble::Operator;
+use crate::assemble::stencil::Point;
+
+/// Iterations of one group: they share a pass over memory. Tuned: twice as many no longer fit the last-level cache
+/// of the machine at hand for 10⁶ vertices.
+const GROUP: usize = 8;
+/// Rows of one task where iterations go one after the other, and of a band at the least.
+const CHUNK: usize = 4096;
+/// Below, all arrays stay in cache anyhow, and iterations go one after the other.
+const SMALL: usize = 100_000;
+
+/// Chebyshev iterations for `A x = r` from x = 0.
+pub struct Wavefront<'a> {
+    operator: &'a Operator,
+    /// Length of a band; `None` for iterations one after the other.
+    band: Option<usize>,
+}
+
+/// The part of an iteration on one band.
+struct Task<'b, P> {
+    rows: Range<usize>,
+    /// The iterate, from vertex `start` on.
+    window: &'b [P],
+    start: usize,
+    /// The iterate before it, replaced by the one after it.
+    out: &'b mut [P],
+    coefficients: (f64, f64),
+}
+
+impl<'a> Wavefront<'a> {
+    /// Bands by the reach of the operator's rows: groups of iterations pay where there are many.
+    pub fn new(operator: &'a Operator) -> Self {
+        let n = operator.len();
+        let band = operator
+            .reach()
+            .map(|reach| reach.max(CHUNK))
+            .filter(|band| n >= SMALL && n / band >= 2 * GROUP);
+        Wavefront { operator, band }
+    }
+
+    /// Bands of a given length; `None` for iterations one after the other.
+    ///
+    /// # Panics
+    /// If rows reach further than a band.
+    pub fn in_bands(operator: &'a Operator, band: Option<usize>) -> Self {
+        assert!(
+            band.is_none_or(|band| operator.reach().is_some_and(|reach| reach <= band)),
+            "rows reach no further than a band"
+        );
+        Wavefront { operator, band }
+    }
+
+    /// `count` ≥ 1 iterations for eigenvalues within the interval of `recurrence`, from x = 0. The first of them is
+    /// a multiple of `r` and must be in `x` already: `x = τ₀ r` with the recurrence's first coefficient. The last
+    /// iterate is returned in `x`; `other` is overwritten.
+    ///
+    /// Reads, for each group of `GROUP` iterations, the operator, `r` and both iterates once from memory.
+    ///
+    /// # Panics
+    /// If the arrays have not one point a vertex.
+    pub fn iterate<P: Point>(
+        &self,
+        mut recurrence: Recurrence,
+        count: usize,
+        r: &[P],
+        x: &mut Vec<P>,
+        other: &mut Vec<P>,
+    ) {
+        let n = self.operator.len();
+        assert!(
+            r.len() == n && x.len() == n && other.len() == n,
+            "one point a vertex"
+        );
+        other.par_chunks_mut(CHUNK).for_each(|c| c.fill(P::ZERO));
+        let coefficients: Vec<(f64, f64)> = (1..count)
+            .map(|_| {
+                recurrence.step();
+                recurrence.coefficients()
+            })
+            .collect();
+        let length = if self.band.is_some() { GROUP } else { 1 };
+        for group in coefficients.chunks(length) {
+            match self.band {
+                Some(band) => self.group(band, group, r, x, other),
+                None => self.plain(group[0], r, x, other),
+            }
+            if group.len() % 2 == 1 {
+                std::mem::swap(x, other);
+            }
+        }
+    }
+
+    /// One iteration: `other` becomes the next one after `x`.
+    fn plain<P: Point>(&self, coefficients: (f64, f64), r: &[P], x: &[P], other: &mut [P]) {
+        let mut moments = Vec::new();
+        self.operator.moments(x, &mut moments);
+        other
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .for_each(|(k, out)| {
+                let task = Task {
+                    rows: k * CHUNK..k * CHUNK + out.len(),
+                    window: x,
+                    start: 0,
+                    out,
+                    coefficients,
+                };
+                self.run(task, r, &moments);
+            });
+    }
+
+    /// A group of iterations, band by band. After an odd number of them the last is in `other`, else in `x`.
+    fn group<P: Point>(
+        &self,
+        band: usize,
+        group: &[(f64, f64)],
+        r: &[P],
+        x: &mut [P],
+        other: &mut [P],
+    ) {
+        let n = r.len();
+        let bands = n.div_ceil(band);
+        let at = |j: usize| (j * band).min(n);
+        for wave in 0..bands + 2 * (group.len() - 1) {
+            let mut tasks = Vec::with_capacity(group.len());
+            // What is left of the two arrays, with its first vertex. The last iteration of the group is at the
+            // foremost band: later ones come in ascending order of bands.
+            let mut rest = [(&mut *x, 0), (&mut *other, 0)];
+            for (k, &coefficients) in group.iter().enumerate().rev() {
+                let Some(j) = wave.checked_sub(2 * k).filter(|&j| j < bands) else {
+                    continue;
+                };
+                let rows = at(j)..at(j + 1);
+                let seen = at(j.saturating_sub(1))..at(j + 2);
+                let start = seen.start;
+                let window = cut(&mut rest[k % 2], seen);
+                let out = cut(&mut rest[(k + 1) % 2], rows.clone());
+                tasks.push(Task {
+                    rows,
+                    window,
+                    start,
+                    out,
+                    coefficients,
+                });
+            }
+            tasks
+                .into_par_iter()
+                .with_max_len(1)
+                .for_each(|task| self.run(task, r, &[]));
+        }
+    }
+
+    /// `out ← v + γ (v − out) + τ (r − A v)` on the rows of the task.
+    fn run<P: Point>(&self, task: Task<P>, r: &[P], moments: &[[P; 3]]) {
+        let (gamma, tau) = task.coefficients;
+        let (gamma, tau) = (P::weight(gamma), P::weight(tau));
+        let r = &r[task.rows.clone()];
+        let own = &task.window[task.rows.start - task.start..][..r.len()];
+        let mut slots = task.out.iter_mut().zip(r).zip(own);
+        self.operator.rows(
+            task.rows.clone(),
+            (task.window, task.start),
+            moments,
+            |_, ax| {
+                if let Some(((out, &r), &v)) = slots.next() {
+                    *out = v + (v - *out).times(gamma) + (r - ax).times(tau);
+                }
+            },
+        );
+    }
+}
+
+/// Cuts the vertices `range` out of what is `rest`, which begins at its second component; what comes before is let
+/// go.
+fn cut<'b, P>(rest: &mut (&'b mut [P], usize), range: Range<usize>) -> &'b mut [P] {
+    let (slice, start) = (std::mem::take(&mut rest.0), rest.1);
+    let (_, from) = slice.split_at_mut(range.start - start);
+    let (part, after) = from.split_at_mut(range.len());
+    *rest = (after, range.end);
+    part
+}

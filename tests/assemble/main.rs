@@ -1,0 +1,11 @@
+//! The limit systems held against brute-force subdivision, the formulas through other libraries, identities, closed
+//! forms and dense eigenvalues; their files against other readers.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod brute_force;
+mod files;
+mod formulas;
+mod refusals;
+mod spectra;

@@ -1,0 +1,87 @@
+//! Meshes that a scheme refuses, and open ones under the papers' treatment of the boundary.
+
+use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::mesh::validate::{Boundary, validate};
+use limitlab::mesh::{Faces, Mesh};
+
+use crate::common::formulas::assemble;
+use crate::common::meshes::*;
+use crate::common::tol;
+
+fn refused(mesh: &Mesh, scheme: Scheme) -> String {
+    let error = LimitSystem::new(mesh, &topology(mesh), scheme).unwrap_err();
+    let line = error.to_string();
+    assert!(!line.contains('\n'), "{line}");
+    line
+}
+
+#[test]
+fn loop_and_sqrt3_name_the_first_face_that_is_no_triangle() {
+    for scheme in [Scheme::Loop, Scheme::Sqrt3] {
+        for seed in 0..40 {
+            let mesh = small_polygons(seed);
+            let Some(first) = mesh.faces.iter().position(|f| f.len() != 3) else {
+                assert!(LimitSystem::new(&mesh, &topology(&mesh), scheme).is_ok());
+                continue;
+            };
+            let line = refused(&mesh, scheme);
+            let size = mesh.faces.face(first).len();
+            assert!(
+                line.contains(&format!("face {first} has {size} corners")),
+                "{line}"
+            );
+            assert!(line.contains("--scheme catmull-clark"), "{line}");
+        }
+    }
+}
+
+/// A triangulated torus without the faces around a vertex and one more: boundary vertices of several valences.
+fn open_torus() -> Mesh {
+    let mesh = built_in("tri-torus:7x6");
+    let kept: Vec<Vec<u32>> = (mesh.faces.iter().enumerate())
+        .filter(|(f, face)| *f > 2 && !face.contains(&40))
+        .map(|(_, face)| face.to_vec())
+        .collect();
+    // Vertex 40 has no face left: it goes.
+    let faces = kept
+        .iter()
+        .map(|f| f.iter().map(|&v| v - u32::from(v > 40)).collect::<Vec<_>>());
+    let mut positions = mesh.positions;
+    positions.remove(40);
+    Mesh::new(positions, Faces::from_lists(faces))
+}
+
+#[test]
+fn an_open_mesh_needs_masks_of_edges_alone() {
+    let mesh = open_torus();
+    for scheme in [Scheme::CatmullClark, Scheme::Nasri, Scheme::ZhengCai] {
+        let line = refused(&mesh, scheme);
+        assert!(
+            line.contains("boundary edges") && line.contains("--boundary as-interior"),
+            "{line}"
+        );
+    }
+    let line = validate(&mesh, None, Boundary::Refuse).summary_line();
+    assert!(line.contains("--boundary as-interior"), "{line}");
+
+    let report = validate(&mesh, None, Boundary::AsInterior);
+    assert!(report.is_valid(), "{}", report.summary_line());
+    for scheme in [Scheme::Loop, Scheme::Sqrt3] {
+        let system = LimitSystem::new(&mesh, &topology(&mesh), scheme).unwrap();
+        let plain = assemble(scheme, &mesh);
+        for (i, theirs) in plain.a.row_iter().enumerate() {
+            let sum: f64 = system.a.row_values(i).iter().sum();
+            assert!((sum - 1.0).abs() <= tol::rounding(8), "{scheme}, row {i}");
+            assert_eq!(system.a.row(i).len(), theirs.nnz());
+            for (&j, &a) in theirs.col_indices().iter().zip(theirs.values()) {
+                assert!(
+                    (system.a.get(i, j) - a).abs() <= tol::rounding(2),
+                    "{scheme}"
+                );
+                assert_eq!(system.m.get(i, j).to_bits(), system.m.get(j, i).to_bits());
+            }
+        }
+        let values = plain.eigenvalues();
+        assert!(values[0] >= system.bounds.lambda_min - tol::eigenvalues(mesh.len(), 1.0));
+    }
+}

@@ -1,0 +1,592 @@
+//! The matrix-free operator and everything fast that is built on it, held against the explicit matrix: all schemes;
+//! regular, irregular, mixed, large-faced, multi-component and open meshes.
+
+use std::ops::ControlFlow;
+
+use glam::{DVec3, Vec3A};
+use limitlab::assemble::{LimitSystem, Operator, Scheme};
+use limitlab::interpolate::automatic::control_points;
+use limitlab::mesh::generate::{dual, permute_vertices, random_polygons, shuffle_faces, union};
+use limitlab::mesh::order::{Order, along_curve, inverse, is_scattered};
+use limitlab::mesh::{Faces, Mesh, Topology, builtin::builtin, noise::add_noise};
+use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
+use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
+use limitlab::solvers::gauss_seidel::Sor;
+use limitlab::solvers::iteration::{Iterate, Report};
+use limitlab::solvers::jacobi::Jacobi;
+use limitlab::solvers::local::{Editor, decay};
+use limitlab::solvers::pia::Pia;
+use limitlab::solvers::ssor::Ssor;
+use limitlab::solvers::system::{Rows, System};
+use limitlab::solvers::wavefront::Wavefront;
+use limitlab::solvers::{Outcome, Setup, Stop, mixed, run, solve};
+
+fn mesh(name: &str) -> Mesh {
+    let mut mesh = builtin(name).expect("a built-in mesh");
+    add_noise(&mut mesh, 0.1, 1);
+    mesh
+}
+
+/// Every kind of closed mesh: each face kind alone and mixed, faces of up to 300 corners, several components.
+fn meshes() -> Vec<(String, Mesh)> {
+    let mut meshes: Vec<(String, Mesh)> = [
+        "tetrahedron",
+        "cube",
+        "torus:5x4",
+        "quad-sphere:3",
+        "icosphere:2",
+        "prism:5",
+        "prism:8",
+        "prism:9",
+        "prism:300",
+        "bipyramid:30",
+        "tri-torus:6x5",
+        "irregular-tri:500",
+        "irregular-poly:500",
+        "irregular-quad:600",
+        "cubes:4",
+    ]
+    .iter()
+    .map(|name| (name.to_string(), mesh(name)))
+    .collect();
+    let several = union(&[mesh("prism:12"), mesh("torus:4x3"), mesh("icosphere:1")]);
+    meshes.push(("three components".into(), several));
+    meshes.push(("dual of a bipyramid".into(), dual(&mesh("bipyramid:40"))));
+    meshes.extend((0..20).map(|seed| (format!("random polygons {seed}"), random_polygons(seed))));
+    meshes
+}
+
+struct Both {
+    name: String,
+    mesh: Mesh,
+    explicit: LimitSystem,
+    operator: Operator,
+}
+
+fn both(name: &str, mesh: Mesh, scheme: Scheme) -> Both {
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    Both {
+        name: format!("{name}, {scheme}"),
+        explicit: LimitSystem::new(&mesh, &topology, scheme).expect("an explicit system"),
+        operator: Operator::new(&mesh.faces, &topology, scheme).expect("an operator"),
+        mesh,
+    }
+}
+
+fn all() -> impl Iterator<Item = Both> {
+    meshes().into_iter().flat_map(|(name, mesh)| {
+        Scheme::ALL
+            .into_iter()
+            .filter(|s| s.first_unsuitable_face(&mesh.faces).is_none())
+            .map(|scheme| both(&name, mesh.clone(), scheme))
+            .collect::<Vec<_>>()
+    })
+}
+
+/// Points without any smoothness, of length below 2.
+fn rough(n: usize) -> Vec<DVec3> {
+    (0..n)
+        .map(|i| {
+            let t = i as f64;
+            DVec3::new((12.9898 * t).sin(), (78.233 * t).cos(), (37.719 * t).sin())
+        })
+        .collect()
+}
+
+/// The rounding of a mean of a thousand points of length below 2: the greatest valences here.
+const ROUNDING: f64 = 1000.0 * f64::EPSILON;
+
+fn assert_close(what: &str, a: &[DVec3], b: &[DVec3], tolerance: f64) {
+    assert_eq!(a.len(), b.len(), "{what}");
+    for (i, (a, b)) in a.iter().zip(b).enumerate() {
+        assert!(
+            (*a - *b).length() <= tolerance,
+            "{what}, vertex {i}: {a} against {b}"
+        );
+    }
+}
+
+fn product<S: System>(system: &S, x: &[DVec3]) -> Vec<DVec3> {
+    let mut out = vec![DVec3::ZERO; x.len()];
+    let mut nothing = vec![(); x.len()];
+    Rows::new(x.len()).product(system, x, &mut out, &mut nothing, |_, ax, out, (), _| {
+        *out = ax
+    });
+    out
+}
+
+#[test]
+fn rows_equal_the_explicit_matrix() {
+    for case in all() {
+        let Both {
+            name,
+            explicit,
+            operator,
+            ..
+        } = &case;
+        let x = rough(explicit.len());
+        let expected = product(explicit, &x);
+        assert_close(name, &product(operator, &x), &expected, ROUNDING);
+        let single: Vec<DVec3> = (0..x.len()).map(|i| operator.row(i, &x)).collect();
+        assert_close(name, &single, &expected, ROUNDING);
+        for (i, ax) in expected.iter().enumerate() {
+            let (h, d) = (explicit.h[i], explicit.diagonal[i]);
+            assert!((operator.weights()[i] - h).abs() <= ROUNDING * h, "{name}");
+            assert!((operator.diagonal()[i] - d).abs() <= ROUNDING, "{name}");
+            let m = explicit.m.row_times(i, &x);
+            let difference = (operator.symmetric_row(i, &x) - m).length();
+            assert!(difference <= ROUNDING / h, "{name}");
+            let jacobi = (operator.jacobi_row(i, &x) - *ax / d).length();
+            assert!(jacobi <= 4.0 * ROUNDING / d, "{name}");
+        }
+        assert_eq!(operator.bounds().lambda_min, explicit.bounds.lambda_min);
+    }
+}
+
+#[test]
+fn single_precision_rows_agree_to_single_rounding() {
+    for case in all() {
+        let x = rough(case.operator.len());
+        let expected = product(&case.explicit, &x);
+        let single: Vec<Vec3A> = x.iter().map(|p| p.as_vec3a()).collect();
+        let mut moments = Vec::new();
+        case.operator.moments(&single, &mut moments);
+        let n = x.len();
+        case.operator.rows(0..n, (&single, 0), &moments, |i, ax| {
+            let difference = (ax.as_dvec3() - expected[i]).length();
+            assert!(difference <= 4e-6, "{}: {difference}", case.name);
+        });
+    }
+}
+
+#[test]
+fn renumbering_permutes_rows_and_the_front_order_is_a_permutation() {
+    for case in all() {
+        let n = case.operator.len();
+        let x = rough(n);
+        let expected = product(&case.explicit, &x);
+        let front = case.operator.front_order();
+        let shuffled =
+            Order::Random(5).order(&case.mesh, &Topology::new(&case.mesh.faces, n).incidence);
+        for order in [front, shuffled] {
+            let place = inverse(&order);
+            let moved = case.operator.renumbered(&order);
+            let moved_x: Vec<DVec3> = order.iter().map(|&v| x[v as usize]).collect();
+            let product = product(&moved, &moved_x);
+            let back: Vec<DVec3> = place.iter().map(|&k| product[k as usize]).collect();
+            assert_close(&case.name, &back, &expected, ROUNDING);
+            let again = moved.renumbered(&place);
+            assert_eq!(again.reach(), case.operator.reach());
+            assert_eq!(again.diagonal(), case.operator.diagonal());
+        }
+    }
+}
+
+#[test]
+fn distances_beyond_16_bits_are_stored_in_full() {
+    // 40 002 vertices in random order: most neighbours are further than 2¹⁵ apart in one row or another.
+    let ordered = mesh("torus:200x201");
+    let n = ordered.len();
+    let topology = Topology::new(&ordered.faces, n);
+    let order = Order::Random(3).order(&ordered, &topology.incidence);
+    for scheme in [Scheme::CatmullClark, Scheme::Nasri] {
+        let case = both("shuffled torus", permute_vertices(&ordered, &order), scheme);
+        assert!(case.operator.reach() > Some(1 << 15));
+        let x = rough(n);
+        assert_close(
+            &case.name,
+            &product(&case.operator, &x),
+            &product(&case.explicit, &x),
+            ROUNDING,
+        );
+        let near = case.operator.renumbered(&case.operator.front_order());
+        assert!(near.reach() < Some(1 << 11));
+        assert!(near.sweep_bytes() < case.operator.sweep_bytes());
+    }
+}
+
+#[test]
+fn a_boundary_treated_as_interior_is_the_same_in_both() {
+    // An open fan and a strip: 7 triangles.
+    let faces = Faces::from_lists([
+        [0u32, 1, 2],
+        [0, 2, 3],
+        [0, 3, 4],
+        [0, 4, 5],
+        [2, 1, 6],
+        [2, 6, 3],
+        [3, 6, 7],
+    ]);
+    let open = Mesh::new(rough(8), faces);
+    for scheme in [Scheme::Loop, Scheme::Sqrt3] {
+        let case = both("open", open.clone(), scheme);
+        let x = rough(8);
+        let expected = product(&case.explicit, &x);
+        assert_close(
+            &case.name,
+            &product(&case.operator, &x),
+            &expected,
+            ROUNDING,
+        );
+    }
+    let topology = Topology::new(&open.faces, 8);
+    assert!(Operator::new(&open.faces, &topology, Scheme::CatmullClark).is_err());
+}
+
+#[test]
+fn every_iteration_runs_on_both_alike() {
+    let stop = Stop {
+        tolerance: 1e-9,
+        max_iterations: 300,
+    };
+    fn reports<S: System>(system: &S, points: &[DVec3], stop: &Stop) -> Vec<Report> {
+        let mut methods: Vec<Box<dyn Iterate + '_>> = vec![
+            Box::new(Pia::new(system, points, 1.0)),
+            Box::new(Jacobi::new(system, points, 0.5)),
+            Box::new(Sor::new(system, points, 1.1, None)),
+            Box::new(Ssor::new(system, points, 1.0, None)),
+            Box::new(Chebyshev::new(system, points, (0.1, 1.0))),
+            Box::new(ConjugateGradient::new(
+                system,
+                points,
+                Preconditioner::weights(system),
+            )),
+            Box::new(ConjugateGradient::new(
+                system,
+                points,
+                Preconditioner::Ssor { omega: 1.0 },
+            )),
+        ];
+        let watch = &mut |_: &limitlab::solvers::Step| ControlFlow::Continue(());
+        methods
+            .iter_mut()
+            .map(|m| solve(m.as_mut(), stop, watch))
+            .collect()
+    }
+    for case in all().filter(|c| c.explicit.bounds.lambda_min > 0.05) {
+        let points = &case.mesh.positions;
+        let explicit = reports(&case.explicit, points, &stop);
+        let free = reports(&case.operator, points, &stop);
+        for (k, (a, b)) in explicit.iter().zip(&free).enumerate() {
+            let what = format!("{}, method {k}", case.name);
+            assert_eq!(a.outcome, b.outcome, "{what}");
+            assert!(a.iterations.abs_diff(b.iterations) <= 1, "{what}");
+            for (a, b) in a.history.iter().zip(&b.history).take(5) {
+                // Rounding of coordinates of size up to some tens.
+                assert!((a.max - b.max).abs() <= 1e-11 * (1.0 + a.max), "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn bands_change_no_bit() {
+    for (name, count) in [
+        ("torus:60x40", 21),
+        ("irregular-quad:3000", 8),
+        ("icosphere:4", 2),
+    ] {
+        let mesh = mesh(name);
+        let topology = Topology::new(&mesh.faces, mesh.len());
+        for scheme in Scheme::ALL {
+            if scheme.first_unsuitable_face(&mesh.faces).is_some() {
+                continue;
+            }
+            let operator = Operator::new(&mesh.faces, &topology, scheme).expect("an operator");
+            let operator = operator.renumbered(&operator.front_order());
+            let r = rough(mesh.len());
+            let recurrence = Recurrence::new((0.1, 1.0));
+            let first = recurrence.coefficients().1;
+            let iterate = |band| {
+                let mut x: Vec<DVec3> = r.iter().map(|&r| first * r).collect();
+                let mut other = vec![DVec3::ONE; r.len()];
+                let wavefront = Wavefront::in_bands(&operator, band);
+                wavefront.iterate(recurrence, count, &r, &mut x, &mut other);
+                x
+            };
+            let plain = iterate(None);
+            let reach = operator.reach().expect("no large faces");
+            for band in [reach, reach + 17, 2 * reach, 10 * mesh.len()] {
+                assert!(
+                    iterate(Some(band)) == plain,
+                    "{name}, {scheme}, bands of {band}"
+                );
+            }
+            // The same iterates as by the method that works with residuals from x = r's own start.
+            let zero = vec![DVec3::ZERO; r.len()];
+            let mut before = zero.clone();
+            let mut x = zero;
+            let mut steps = recurrence;
+            for _ in 0..count {
+                let (gamma, tau) = steps.coefficients();
+                let ax = product(&operator, &x);
+                let next: Vec<DVec3> = (0..r.len())
+                    .map(|i| x[i] + gamma * (x[i] - before[i]) + tau * (r[i] - ax[i]))
+                    .collect();
+                before = std::mem::replace(&mut x, next);
+                steps.step();
+            }
+            assert_close(name, &plain, &x, 1e-11);
+        }
+    }
+}
+
+fn in_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .expect("threads")
+        .install(work)
+}
+
+#[test]
+fn mixed_precision_meets_the_tolerance_with_any_number_of_threads() {
+    for case in all() {
+        let points = &case.mesh.positions;
+        let stop = Stop {
+            tolerance: 1e-11 * case.mesh.diagonal(),
+            max_iterations: 10_000,
+        };
+        let bound = case.explicit.bounds.lambda_min;
+        let solve = || mixed::solve(&case.operator, points, bound, &stop);
+        let (control, report) = in_threads(1, solve);
+        // Where the bound is 0, λ_min may be too small, or 0 (the cube).
+        if bound > 0.0 {
+            assert_eq!(report.outcome, Outcome::Converged, "{}", case.name);
+        }
+        if report.outcome == Outcome::Converged {
+            let error = Rows::new(points.len()).errors(&case.explicit, points, &control);
+            assert!(error.max <= stop.tolerance * (1.0 + 1e-2), "{}", case.name);
+        }
+        assert!(in_threads(2, solve) == (control, report), "{}", case.name);
+    }
+}
+
+#[test]
+fn large_meshes_take_the_banded_way_with_the_same_result_as_the_explicit_method() {
+    // 163 842 vertices: above the size from which iterations are grouped.
+    let case = both("icosphere:7", mesh("icosphere:7"), Scheme::Loop);
+    let order = case.operator.front_order();
+    let operator = case.operator.renumbered(&order);
+    let points = limitlab::assemble::operator::gather(&case.mesh.positions, &order);
+    let stop = Stop {
+        tolerance: 1e-10 * case.mesh.diagonal(),
+        max_iterations: 1000,
+    };
+    let bound = operator.bounds().lambda_min;
+    let solve = || mixed::solve(&operator, &points, bound, &stop);
+    let one = in_threads(1, solve);
+    assert!(one == in_threads(2, solve));
+    assert_eq!(one.1.outcome, Outcome::Converged);
+    let setup = Setup::Chebyshev {
+        spectrum: (bound, 1.0),
+    };
+    let reference = run(&case.explicit, &case.mesh.positions, setup, &stop);
+    let expected = limitlab::assemble::operator::gather(&reference.points, &order);
+    // Both are within tolerance/λ_min of the solution, in a norm close to the greatest difference.
+    assert_close(
+        "icosphere:7",
+        &one.0,
+        &expected,
+        2.0 * stop.tolerance / bound,
+    );
+    assert!(one.1.iterations <= reference.report.iterations + 8);
+}
+
+#[test]
+fn mixed_precision_stalls_on_inconsistent_data_of_a_singular_matrix() {
+    let case = both("cube", mesh("cube"), Scheme::CatmullClark);
+    let stop = Stop {
+        tolerance: 1e-10,
+        max_iterations: 10_000,
+    };
+    let (_, report) = mixed::solve(&case.operator, &case.mesh.positions, 0.0, &stop);
+    assert_eq!(report.outcome, Outcome::Stagnated);
+    // The cube's own points have no part in the kernel.
+    let exact = both(
+        "cube",
+        builtin("cube").expect("a mesh"),
+        Scheme::CatmullClark,
+    );
+    let (_, report) = mixed::solve(&exact.operator, &exact.mesh.positions, 0.0, &stop);
+    assert_eq!(report.outcome, Outcome::Converged);
+}
+
+#[test]
+fn an_interval_that_is_too_short_is_corrected() {
+    // Odd prisms have λ_min ≈ 0.82/k² and no proven bound.
+    let mut prism = mesh("prism:7");
+    add_noise(&mut prism, 0.2, 9);
+    let case = both("prism:7", prism, Scheme::CatmullClark);
+    let stop = Stop {
+        tolerance: 1e-10,
+        max_iterations: 10_000,
+    };
+    let (control, report) = mixed::solve(&case.operator, &case.mesh.positions, 0.0, &stop);
+    assert_eq!(report.outcome, Outcome::Converged, "{report:?}");
+    let lu = run(&case.explicit, &case.mesh.positions, Setup::Lu, &stop);
+    assert_close("prism:7", &control, &lu.points, 1e-8);
+}
+
+#[test]
+fn scatter_is_recognised_and_mended() {
+    for name in [
+        "torus:300x300",
+        "irregular-quad:90000",
+        "irregular-tri:90000",
+        "icosphere:6",
+    ] {
+        let mesh = mesh(name);
+        assert!(!is_scattered(&mesh.faces), "{name}");
+        let topology = Topology::new(&mesh.faces, mesh.len());
+        let order = Order::Random(2).order(&mesh, &topology.incidence);
+        for scattered in [
+            permute_vertices(&mesh, &order),
+            shuffle_faces(&permute_vertices(&mesh, &order), 4),
+        ] {
+            assert!(is_scattered(&scattered.faces), "{name}");
+            let (mended, order) = along_curve(&scattered).expect("good indices");
+            assert!(!is_scattered(&mended.faces), "{name}");
+            for (k, &v) in order.iter().enumerate() {
+                assert_eq!(mended.positions[k], scattered.positions[v as usize]);
+            }
+            // The same faces, in another order.
+            let sorted = |faces: &Faces, name: &dyn Fn(u32) -> u32| {
+                let mut list: Vec<Vec<u32>> = faces
+                    .iter()
+                    .map(|f| f.iter().map(|&v| name(v)).collect())
+                    .collect();
+                list.sort_unstable();
+                list
+            };
+            let theirs = sorted(&mended.faces, &|v| order[v as usize]);
+            assert!(theirs == sorted(&scattered.faces, &|v| v), "{name}");
+        }
+    }
+    let wrong = Mesh::new(rough(3), Faces::from_lists([[0u32, 1, 7]]));
+    assert!(along_curve(&wrong).is_none());
+}
+
+#[test]
+fn the_inverse_decays_as_on_the_infinite_grid() {
+    // T⁻¹ of T = [1 4 1]/6 has the entries √3 (−q)^|k|, q = 2 − √3, and A = T ⊗ T; largest in ring m: 3 q^m.
+    let case = both("torus:64x64", mesh("torus:64x64"), Scheme::CatmullClark);
+    let rings = decay(&case.operator, 1000, 1e-10);
+    let q = 2.0 - 3f64.sqrt();
+    assert!(rings.len() >= 17, "{rings:?}");
+    for (m, &entry) in rings.iter().enumerate() {
+        let exact = 3.0 * q.powi(m as i32);
+        assert!(
+            (entry - exact).abs() <= 2e-11,
+            "ring {m}: {entry} against {exact}"
+        );
+    }
+}
+
+#[test]
+fn local_edits_give_what_solving_anew_gives() {
+    for case in all().filter(|c| c.explicit.bounds.lambda_min > 0.05) {
+        let points = &case.mesh.positions;
+        let n = points.len();
+        let tolerance = 1e-11 * case.mesh.diagonal();
+        let stop = Stop {
+            tolerance,
+            max_iterations: 1000,
+        };
+        let bound = case.explicit.bounds.lambda_min;
+        let (control, _) = mixed::solve(&case.operator, points, bound, &stop);
+        let mut editor = Editor::new(&case.operator, points.clone(), control);
+        let moves: Vec<(u32, DVec3)> = [0, n / 3, n - 1]
+            .map(|v| (v as u32, points[v] + DVec3::new(0.1, -0.2, 0.05)))
+            .to_vec();
+        // Twice: an edit leaves a solution to edit.
+        for moves in [&moves[..1], &moves[1..]] {
+            let edit = editor.edit(moves, tolerance, usize::MAX);
+            assert!(edit.max_error <= tolerance, "{}", case.name);
+        }
+        let errors = Rows::new(n).errors(&case.explicit, editor.points(), editor.control());
+        assert!(errors.max <= 1.01 * tolerance, "{}: {errors:?}", case.name);
+        assert_eq!(
+            editor.points()[n - 1],
+            points[n - 1] + DVec3::new(0.1, -0.2, 0.05)
+        );
+        let lu = run(&case.explicit, editor.points(), Setup::Lu, &stop);
+        // The residuals of both, times ‖A⁻¹‖ ≤ √κ(H)/λ_min.
+        let h = &case.explicit.h;
+        let (low, high) = h
+            .iter()
+            .fold((f64::MAX, 0.0f64), |(l, u), &h| (l.min(h), u.max(h)));
+        let factor = (n as f64 * high / low).sqrt() / bound;
+        assert_close(
+            &case.name,
+            editor.control(),
+            &lu.points,
+            2.0 * factor * tolerance,
+        );
+    }
+}
+
+#[test]
+fn the_work_of_an_edit_does_not_grow_with_the_mesh() {
+    let work = |name| {
+        let case = both(name, mesh(name), Scheme::Loop);
+        let points = case.mesh.positions.clone();
+        let stop = Stop {
+            tolerance: 1e-10,
+            max_iterations: 1000,
+        };
+        let (control, _) = mixed::solve(&case.operator, &points, 0.1, &stop);
+        let mut editor = Editor::new(&case.operator, points.clone(), control);
+        let edit = editor.edit(&[(20, points[20] + DVec3::X)], 1e-8, usize::MAX);
+        (edit.touched, case.mesh.len())
+    };
+    let (small, _) = work("icosphere:5");
+    let (large, n) = work("icosphere:7");
+    assert!(
+        large <= 2 * small && 50 * large < n,
+        "{small} and {large} of {n}"
+    );
+}
+
+#[test]
+fn auto_returns_to_file_order_and_meets_the_tolerance() {
+    // Above and below the size from which vertices are renumbered, in good and in random order.
+    for name in [
+        "irregular-quad:3000",
+        "irregular-quad:60000",
+        "icosphere:6",
+        "irregular-poly:60000",
+    ] {
+        let good = mesh(name);
+        let topology = Topology::new(&good.faces, good.len());
+        let order = Order::Random(2).order(&good, &topology.incidence);
+        let scattered = shuffle_faces(&permute_vertices(&good, &order), 4);
+        for mesh in [&good, &scattered] {
+            let scheme = Scheme::default_for(&mesh.faces);
+            let stop = Stop {
+                tolerance: 1e-10 * mesh.diagonal(),
+                max_iterations: 1000,
+            };
+            let found = control_points(mesh, None, scheme, &stop).expect("a system");
+            assert_eq!(found.report.outcome, Outcome::Converged, "{name}");
+            let case = both(name, mesh.clone(), scheme);
+            let errors =
+                Rows::new(mesh.len()).errors(&case.explicit, &mesh.positions, &found.points);
+            assert!(errors.max <= 1.01 * stop.tolerance, "{name}: {errors:?}");
+        }
+    }
+    // Nearly singular: κ grows like k², beyond what corrections of the interval reach. Conjugate gradients finish.
+    let mut prism = mesh("prism:401");
+    add_noise(&mut prism, 0.1, 3);
+    let stop = Stop {
+        tolerance: 1e-9,
+        max_iterations: 10_000,
+    };
+    let found = control_points(&prism, None, Scheme::CatmullClark, &stop).expect("a system");
+    assert_eq!(
+        found.report.outcome,
+        Outcome::Converged,
+        "{:?}",
+        found.report
+    );
+}

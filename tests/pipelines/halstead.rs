@@ -1,0 +1,217 @@
+//! Fair interpolation: constraints, minimality, affine maps, singular meshes, errors per iteration.
+
+use glam::DVec3;
+use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::interpolate::halstead::{Fairness, LEVELS, Weights, fit, follow};
+use limitlab::mesh::{Mesh, Topology, builtin};
+use limitlab::solvers::{Outcome, Setup, Stop, run};
+use limitlab::subdivide::{Refinement, catmull_clark};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::{distance, noisy, topology};
+
+/// Rounding of a system of some thousand unknowns, for points of size 1.
+const SOLVED: f64 = 1e-10;
+
+fn limits_and_normals(mesh: &Mesh, originals: usize) -> (Vec<DVec3>, Vec<DVec3>) {
+    let topology = topology(mesh);
+    let mut limits = catmull_clark::limit_positions(mesh, &topology).unwrap();
+    let mut normals = catmull_clark::limit_normals(mesh, &topology).unwrap();
+    limits.truncate(originals);
+    normals.truncate(originals);
+    (limits, normals)
+}
+
+const MESHES: [&str; 4] = ["torus:4x5", "icosahedron", "irregular-poly:30", "cube"];
+
+#[test]
+fn the_fit_meets_points_and_normals() {
+    for name in MESHES {
+        let mesh = noisy(name);
+        let fairness = Fairness::new(&mesh).unwrap();
+        let plain = fit(&fairness, &mesh.positions, None, Weights::default()).unwrap();
+        let (limits, before) = limits_and_normals(&plain.mesh, mesh.len());
+        assert!(distance(&limits, &mesh.positions) < SOLVED, "{name}");
+        let wanted: Vec<Option<DVec3>> = before
+            .iter()
+            .enumerate()
+            .map(|(v, n)| {
+                (v % 2 == 0).then(|| *n + 0.3 * DVec3::new((v as f64).sin(), 0.5, (v as f64).cos()))
+            })
+            .collect();
+        let with = fit(
+            &fairness,
+            &mesh.positions,
+            Some(&wanted),
+            Weights::default(),
+        )
+        .unwrap();
+        let (limits, found) = limits_and_normals(&with.mesh, mesh.len());
+        assert!(distance(&limits, &mesh.positions) < SOLVED);
+        for (n, wanted) in found.iter().zip(&wanted) {
+            assert!(
+                wanted.is_none_or(|w| n.cross(w.normalize()).length() < 1e-8),
+                "{name}"
+            );
+        }
+        // A further constraint costs energy.
+        let weights = Weights::default();
+        assert!(with.energies.weighted(weights) > plain.energies.weighted(weights));
+    }
+}
+
+/// xᵀKx is least among all x that meet the points: the derivative along every direction in the null space of the
+/// limit masks vanishes, and the interpolating control mesh of the given faces, where there is one, costs more.
+#[test]
+fn the_fit_is_the_fairest() {
+    for (name, weights) in MESHES.iter().zip([
+        Weights::default(),
+        Weights {
+            thin_plate: 1.0,
+            membrane: 0.01,
+        },
+        Weights {
+            thin_plate: 0.0,
+            membrane: 1.0,
+        },
+        Weights::default(),
+    ]) {
+        let mesh = noisy(name);
+        let fairness = Fairness::new(&mesh).unwrap();
+        let best = fit(&fairness, &mesh.positions, None, weights).unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let fine = topology(&best.mesh);
+        for _ in 0..5 {
+            let mut step = best.mesh.clone();
+            step.positions.iter_mut().for_each(|p| {
+                *p = DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))
+            });
+            // The own weight n/(n+5) takes the limit of each original vertex to zero; rings are disjoint.
+            let limits = catmull_clark::limit_positions(&step, &fine).unwrap();
+            for (v, limit) in limits[..mesh.len()].iter().enumerate() {
+                let n = fine.incidence.face_count(v) as f64;
+                step.positions[v] -= (n + 5.0) / n * *limit;
+            }
+            let gradient = |k: &limitlab::assemble::Csr| -> f64 {
+                (0..best.mesh.len())
+                    .map(|i| step.positions[i].dot(k.row_times(i, &best.mesh.positions)))
+                    .sum()
+            };
+            let (thin, membrane) = (gradient(&fairness.thin_plate), gradient(&fairness.membrane));
+            let slope = weights.thin_plate * thin + weights.membrane * membrane;
+            let scale = best.energies.weighted(weights)
+                + fairness.energies(&step.positions).weighted(weights);
+            assert!(slope.abs() < SOLVED * scale, "{name} {slope:e} {scale:e}");
+        }
+        let system = LimitSystem::new(&mesh, &topology(&mesh), Scheme::CatmullClark).unwrap();
+        let solution = run(
+            &system,
+            &mesh.positions,
+            Setup::Lu,
+            &Stop {
+                tolerance: 1e-12,
+                max_iterations: 10,
+            },
+        );
+        if solution.report.outcome == Outcome::Converged {
+            let control = Mesh::new(solution.points, mesh.faces.clone());
+            let other = fairness.energies_of(&control).unwrap();
+            assert!(
+                best.energies.weighted(weights) <= other.weighted(weights),
+                "{name}"
+            );
+        } else {
+            assert_eq!(*name, "cube");
+        }
+    }
+}
+
+#[test]
+fn the_fit_follows_affine_maps() {
+    let mesh = noisy("irregular-poly:30");
+    let map = |p: &DVec3| DVec3::new(p.x + 2.0 * p.y, p.z - 3.0, 0.5 * p.x - p.y + 4.0 * p.z);
+    let moved: Vec<DVec3> = mesh.positions.iter().map(map).collect();
+    let fairness = Fairness::new(&mesh).unwrap();
+    let here = fit(&fairness, &mesh.positions, None, Weights::default()).unwrap();
+    let there = fit(&fairness, &moved, None, Weights::default()).unwrap();
+    let here: Vec<DVec3> = here.mesh.positions.iter().map(map).collect();
+    assert!(distance(&here, &there.mesh.positions) < 10.0 * SOLVED);
+}
+
+#[test]
+fn weights_and_normals_without_sense_are_errors() {
+    let mesh = builtin::icosahedron();
+    let fairness = Fairness::new(&mesh).unwrap();
+    for (thin_plate, membrane) in [
+        (1.0, 0.0),
+        (-1.0, 1.0),
+        (f64::NAN, 1.0),
+        (1.0, f64::INFINITY),
+    ] {
+        let weights = Weights {
+            thin_plate,
+            membrane,
+        };
+        let text = fit(&fairness, &mesh.positions, None, weights)
+            .unwrap_err()
+            .to_string();
+        assert!(text.contains("fairness weights"), "{text}");
+    }
+    let mut normals = vec![None; 12];
+    normals[3] = Some(DVec3::ZERO);
+    let text = fit(
+        &fairness,
+        &mesh.positions,
+        Some(&normals),
+        Weights::default(),
+    )
+    .unwrap_err()
+    .to_string();
+    assert!(text.contains("vertex 3"), "{text}");
+}
+
+#[test]
+fn every_iterate_is_measured_and_the_last_is_the_control_mesh() {
+    let mesh = noisy("quad-sphere:2");
+    let topology: Topology = topology(&mesh);
+    let system = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark).unwrap();
+    let fairness = Fairness::new(&mesh).unwrap();
+    let normals: Vec<DVec3> = mesh.positions.iter().map(|p| p.normalize()).collect();
+    let stop = Stop {
+        tolerance: 1e-8,
+        max_iterations: 2000,
+    };
+    let (rows, solution) = follow(
+        &mesh,
+        &topology,
+        &system,
+        &fairness,
+        &normals,
+        Setup::Pia { omega: 1.0 },
+        &stop,
+    )
+    .unwrap();
+    assert_eq!(solution.report.outcome, Outcome::Converged);
+    assert_eq!(rows.len(), solution.report.iterations + 1);
+    let errors: Vec<_> = rows.iter().map(|r| r.errors).collect();
+    assert_eq!(errors, solution.report.history);
+    // The start is the plain surface of the given mesh, the end interpolates: two ways to the same numbers.
+    let fine = Refinement::CatmullClark.refine_n(&mesh, LEVELS).unwrap();
+    assert_eq!(rows[0].energies, fairness.energies(&fine.positions));
+    let control = Mesh::new(solution.points, mesh.faces.clone());
+    let last = rows[rows.len() - 1];
+    assert_eq!(last.energies, fairness.energies_of(&control).unwrap());
+    let (_, found) = limits_and_normals(&control, mesh.len());
+    let worst = found
+        .iter()
+        .zip(&normals)
+        .map(|(a, b)| a.angle_between(*b))
+        .fold(0.0, f64::max);
+    assert!((last.deviation_max - worst).abs() < 1e-7);
+    // Interpolating noise ripples: the energy grows from the start, and the fairest surface lies below the end.
+    let weights = Weights::default();
+    let fair = fit(&fairness, &mesh.positions, None, weights).unwrap();
+    assert!(last.energies.weighted(weights) > rows[0].energies.weighted(weights));
+    assert!(fair.energies.weighted(weights) < last.energies.weighted(weights));
+}

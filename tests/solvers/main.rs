@@ -1,0 +1,13 @@
+//! The methods held against manufactured solutions, direct solves, loops made by hand with dense matrices, closed-form
+//! rates; and what they say of singular systems and other impossible tasks.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod handmade;
+mod invariance;
+mod outcomes;
+mod rates;
+mod setups;
+mod singular;
+mod solutions;

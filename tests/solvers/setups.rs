@@ -1,0 +1,128 @@
+//! All methods with their parameters on one system, and runs that hold what every run must.
+
+use glam::DVec3;
+use limitlab::analysis::dense;
+use limitlab::assemble::LimitSystem;
+use limitlab::solvers::{Outcome, Setup, Solution, Stop, run};
+
+use crate::common::tol;
+
+pub const DIRECT: [(&str, Setup<'static>); 4] = [
+    ("lu", Setup::Lu),
+    ("cholesky", Setup::Cholesky),
+    ("ldlt", Setup::Ldlt),
+    ("second cholesky", Setup::SecondCholesky),
+];
+
+/// Eigenvalues below count as 0 for the interval of Chebyshev's iteration.
+const LOWEST: f64 = 1e-3;
+
+/// Every iterative method. `order` is that of the ordered variants.
+pub fn iterative<'a>(system: &LimitSystem, order: &'a [u32]) -> Vec<(&'static str, Setup<'a>)> {
+    let eigenvalues = dense::eigenvalues(system).unwrap();
+    let optimal = |all: &[f64]| 2.0 / (all[0] + all[all.len() - 1]);
+    let order = Some(order);
+    vec![
+        ("thall", Setup::THALL),
+        (
+            "jacobi",
+            Setup::Jacobi {
+                omega: optimal(&eigenvalues.jacobi),
+            },
+        ),
+        (
+            "gauss-seidel",
+            Setup::Sor {
+                omega: 1.0,
+                order: None,
+            },
+        ),
+        ("gauss-seidel in order", Setup::Sor { omega: 1.0, order }),
+        ("sor", Setup::Sor { omega: 1.2, order }),
+        (
+            "ssor",
+            Setup::Ssor {
+                omega: 1.0,
+                order: None,
+            },
+        ),
+        ("ssor in order", Setup::Ssor { omega: 1.3, order }),
+        ("pia", Setup::Pia { omega: 1.0 }),
+        (
+            "w-pia",
+            Setup::Pia {
+                omega: optimal(&eigenvalues.a),
+            },
+        ),
+        (
+            "chebyshev",
+            Setup::Chebyshev {
+                spectrum: (eigenvalues.a[0].max(LOWEST), 1.0),
+            },
+        ),
+        ("cg", Setup::Cg),
+        ("plain cg", Setup::PlainCg),
+        ("pcg-jacobi", Setup::PcgJacobi),
+        ("pcg-ssor", Setup::PcgSsor { omega: 1.0 }),
+        ("pcg-ic0", Setup::PcgIc0),
+    ]
+}
+
+pub fn all<'a>(system: &LimitSystem, order: &'a [u32]) -> Vec<(&'static str, Setup<'a>)> {
+    let mut all = DIRECT.to_vec();
+    all.extend(iterative(system, order));
+    all
+}
+
+pub fn reversed(n: usize) -> Vec<u32> {
+    (0..n as u32).rev().collect()
+}
+
+/// max_i ‖p_i − (A v)_i‖₂, computed here.
+pub fn residual(system: &LimitSystem, points: &[DVec3], v: &[DVec3]) -> f64 {
+    (0..v.len())
+        .map(|i| (points[i] - system.a.row_times(i, v)).length())
+        // NaN wins.
+        .fold(0.0, |m: f64, e| if e > m || e.is_nan() { e } else { m })
+}
+
+/// Runs a method and checks what holds of every run, however it ended: an entry of the history for the start and for
+/// each iteration, the start's error as entry 0, and no convergence without a true residual within the tolerance.
+pub fn checked(system: &LimitSystem, points: &[DVec3], setup: Setup, stop: &Stop) -> Solution {
+    let solution = run(system, points, setup, stop);
+    let report = &solution.report;
+    assert_eq!(
+        report.history.len(),
+        report.iterations + 1,
+        "{setup:?}: {:?}",
+        report.outcome
+    );
+    assert_eq!(solution.points.len(), points.len());
+    assert!(report.iterations <= stop.max_iterations, "{setup:?}");
+    // The same operations in the same order: the same number.
+    let same = |a: f64, b: f64| a == b || a.is_nan() && b.is_nan();
+    let (start, first) = (residual(system, points, points), report.history[0].max);
+    assert!(
+        same(first, start),
+        "{setup:?}: {first:e} at the start is {start:e}"
+    );
+    for errors in &report.history {
+        let limit = errors.max * (1.0 + tol::rounding(points.len()));
+        assert!(
+            errors.mean <= limit || errors.mean.is_nan(),
+            "{setup:?}: mean above maximum"
+        );
+    }
+    let (truth, last) = (
+        residual(system, points, &solution.points),
+        report.last().max,
+    );
+    if report.outcome == Outcome::Converged {
+        assert!(
+            same(last, truth),
+            "{setup:?} claims {last:e} but has {truth:e}"
+        );
+        assert!(truth <= stop.tolerance);
+    }
+    solution
+}
