@@ -269,14 +269,13 @@ fn displaced(mesh: &Mesh, f: impl Fn(usize, DVec3, DVec3) -> DVec3) -> Vec<DVec3
 }
 
 fn interpolatory(_: &Lab) -> Result<Finding> {
-    // The complex pair at valence 3 leaves no tangent plane.
-    let at_3 = SplittingMatrix::new(LocalScheme::Sqrt3 { alpha: 1.0 }, 3)?.modes()?;
-    let pair = at_3
-        .iter()
-        .filter(|m| m.frequency == 1)
-        .map(|m| m.value)
-        .next();
-    let pair = pair.unwrap_or_default();
+    let at_3 = condition_over_alpha(&[3], &[1.0])?;
+    let modes = SplittingMatrix::new(LocalScheme::Sqrt3 { alpha: 1.0 }, 3)?.modes()?;
+    let modulus = |frequency: usize| {
+        // λ_0 = 1 is of frequency 0.
+        let own = modes.iter().filter(|m| m.frequency == frequency).map(|m| m.value.norm());
+        own.filter(|&x| x < 1.0 - 1e-9).fold(f64::NAN, f64::max)
+    };
     let others: Vec<usize> = (4..=50).collect();
     let failing = condition_over_alpha(&others, &[1.0])?
         .iter()
@@ -315,8 +314,9 @@ fn interpolatory(_: &Lab) -> Result<Finding> {
         Evidence::equal("largest move of an old vertex", kept, 0.0),
     ])
     .remark(
-        "The mask is explicit and interpolates, as printed. At valence 3 the leading eigenvalues of the frequencies 1 and 2 \
-         are a complex pair each, four of one modulus: there is no tangent plane for general data, and the surface is not C¹.",
+        "The mask is explicit and interpolates, as printed. At valence 3 a complex pair of rotation-invariant modes \
+         decays more slowly than the pair that spans the tangent plane: the surface comes to a point, with the folds \
+         shown, and is not C¹.",
     ))
 }
 
@@ -493,8 +493,7 @@ fn condition(_: &Lab) -> Result<Finding> {
         )]);
     }
     Ok(finding.remark(
-        "From valence 4 on a simple eigenvalue of the rotation-invariant block overtakes λ_1; at valence 3 the \
-         leading pair turns complex. The blend needs three rings, 1 + 6n vertices.",
+        "What overtakes λ_1 is rotation-invariant: a simple eigenvalue from valence 4 on, a complex pair at valence 3. The blend needs three rings, 1 + 6n vertices.",
     ))
 }
 
@@ -532,7 +531,7 @@ fn maps(_: &Lab) -> Result<Finding> {
     }
     Ok(Finding::reproduced(evidence).remark(
         "Checked by the signs of all corner angles of the refined nets and the winding of their outer ring. \
-         At α = 1 valence 3 has no map: its leading pair is complex (L4).",
+         Where a map exists, it need not decide: at valence 3 and α = 1 other modes are larger (L4).",
     ))
 }
 

@@ -205,9 +205,13 @@ fn table(records: &[Record]) -> Table {
 
 fn json(records: &[Record]) -> Json {
     let evidence = |e: &Evidence| {
+        let value = match e.value {
+            Value::Count(n) => n.into(),
+            _ => number(e.value.number()),
+        };
         json!({
             "quantity": e.quantity,
-            "value": number(e.value.number()),
+            "value": value,
             "relation": e.test.map(|t| t.0.sign()),
             "threshold": e.test.map(|t| t.1),
             "holds": e.holds(),
