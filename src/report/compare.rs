@@ -272,6 +272,14 @@ mod tests {
     }
 
     #[test]
+    fn remarks_are_not_compared() {
+        let mut columns = columns();
+        columns[2] = Column::remark("verdict");
+        let rows = vec![row("cube", 0.8, "other words", Some(12), 1e-3)];
+        assert_eq!(differences(columns, rows), [""; 0]);
+    }
+
+    #[test]
     fn a_floor_of_its_own_replaces_the_rounding_floor() {
         let mut columns = columns();
         columns[4] = columns[4].clone().floor(0.0);

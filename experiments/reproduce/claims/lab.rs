@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use limitlab::Result;
 use limitlab::analysis::dense;
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::mesh::{Mesh, Topology, builtin, generate};
 use limitlab::solvers::{Outcome, Setup, Solution, Stop, run, run_watched};
 
@@ -257,48 +257,6 @@ pub fn excess(system: &LimitSystem, i: usize) -> f64 {
         .sum()
 }
 
-/// The pieces of a mesh whose vertices all have valence 3 and are two-colourable: what makes Catmull-Clark singular.
-pub fn cubic_bipartite_components(subject: &Subject) -> usize {
-    let (mesh, topology) = (&subject.mesh, &subject.topology);
-    let (component, count) = topology.components(&mesh.faces);
-    let mut singular = vec![true; count];
-    let mut neighbours = vec![Vec::new(); mesh.len()];
-    for face in mesh.faces.iter() {
-        for (k, &v) in face.iter().enumerate() {
-            let w = face[(k + 1) % face.len()];
-            neighbours[v as usize].push(w as usize);
-            neighbours[w as usize].push(v as usize);
-        }
-    }
-    let mut colour = vec![0i8; mesh.len()];
-    for start in 0..mesh.len() {
-        if topology.incidence.face_count(start) != 3 {
-            singular[component[start] as usize] = false;
-        }
-        if colour[start] != 0 {
-            continue;
-        }
-        colour[start] = 1;
-        let mut open = vec![start];
-        while let Some(v) = open.pop() {
-            for &w in &neighbours[v] {
-                if colour[w] == 0 {
-                    colour[w] = -colour[v];
-                    open.push(w);
-                } else if colour[w] == colour[v] {
-                    singular[component[v] as usize] = false;
-                }
-            }
-        }
-    }
-    singular.iter().filter(|&&s| s).count()
-}
-
-/// The schemes defined on the mesh: all five on triangles, three otherwise.
-pub fn schemes(subject: &Subject) -> impl Iterator<Item = Scheme> + '_ {
-    Scheme::ALL.into_iter().filter(|&s| subject.suits(s))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -310,21 +268,6 @@ mod tests {
         assert!(largest([1.0, f64::NAN, 2.0]).is_nan());
         assert!(smallest([f64::NAN, 2.0]).is_nan());
         assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
-    }
-
-    #[test]
-    fn only_cubic_bipartite_pieces_are_counted() {
-        for (name, count) in [
-            ("cube", 1),
-            ("tetrahedron", 0),
-            ("prism:6", 1),
-            ("prism:7", 0),
-            ("torus:4x4", 0),
-            ("cubes:3", 3),
-        ] {
-            let found = cubic_bipartite_components(&exact(name).unwrap());
-            assert_eq!(found, count, "{name}");
-        }
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 
 use limitlab::Result;
+use limitlab::analysis::singularity::Singularity;
 use limitlab::analysis::splitting::LocalScheme;
 use limitlab::assemble::scheme::loop_beta;
 use limitlab::assemble::{LimitSystem, Scheme};
@@ -17,8 +18,8 @@ use limitlab::subdivide::Refinement;
 use super::Claim;
 use super::finding::{Evidence, Finding};
 use super::lab::{
-    Lab, cubic_bipartite_components, each, ends, entries_per_vertex, exact, largest,
-    limit_by_powers, random_points, smallest, solve_random,
+    Lab, each, ends, entries_per_vertex, exact, largest, limit_by_powers, random_points, smallest,
+    solve_random,
 };
 
 const ROUNDING: f64 = 1e-12;
@@ -434,7 +435,12 @@ fn when_singular(lab: &Lab) -> Result<Finding> {
     let judge = |subject: &crate::context::Subject| -> Result<(usize, usize, f64)> {
         let all = limitlab::analysis::dense::eigenvalues(&subject.system(Scheme::CatmullClark)?)?.a;
         let kernel = all.iter().filter(|l| l.abs() < ZERO).count();
-        Ok((kernel, cubic_bipartite_components(subject), all[0]))
+        Ok((
+            kernel,
+            Singularity::detect(&subject.mesh, &subject.topology, Scheme::CatmullClark)
+                .kernel_dimension(),
+            all[0],
+        ))
     };
     let mut rows = each(lab.polygons(), judge)?;
     for name in special {
@@ -449,7 +455,7 @@ fn when_singular(lab: &Lab) -> Result<Finding> {
     );
     Ok(Finding::settled(vec![
         Evidence::equal(
-            "meshes whose kernel is not as large as the number of 3-valent bipartite components",
+            "meshes whose kernel is not of the dimension that theory says",
             rows.iter().filter(|r| r.0 != r.1).count(),
             0.0,
         ),
@@ -655,17 +661,25 @@ fn growth(system: &LimitSystem, points: &[DVec3]) -> [f64; 2] {
         tolerance: 1e-8,
         max_iterations: 60,
     };
-    run_watched(system, points, Setup::Pia { omega: 1.0 }, &stop, &mut |step| {
-        let energy: f64 = (0..system.len())
-            .map(|i| (points[i] - system.a.row_times(i, step.points)).length_squared() / system.h[i])
-            .sum();
-        let now = [step.errors.max, energy.sqrt()];
-        if let Some(before) = last {
-            worst = [0, 1].map(|k| worst[k].max(now[k] / before[k]));
-        }
-        last = Some(now);
-        ControlFlow::Continue(())
-    });
+    run_watched(
+        system,
+        points,
+        Setup::Pia { omega: 1.0 },
+        &stop,
+        &mut |step| {
+            let energy: f64 = (0..system.len())
+                .map(|i| {
+                    (points[i] - system.a.row_times(i, step.points)).length_squared() / system.h[i]
+                })
+                .sum();
+            let now = [step.errors.max, energy.sqrt()];
+            if let Some(before) = last {
+                worst = [0, 1].map(|k| worst[k].max(now[k] / before[k]));
+            }
+            last = Some(now);
+            ControlFlow::Continue(())
+        },
+    );
     worst
 }
 
@@ -709,7 +723,11 @@ fn linear_time(_: &Lab) -> Result<Finding> {
     for level in LEVELS {
         let system = exact(&format!("icosphere:{level}"))?.system(Scheme::Loop)?;
         entries.push(entries_per_vertex(&system));
-        counts.push(solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-6, 1000).report.iterations);
+        counts.push(
+            solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-6, 1000)
+                .report
+                .iterations,
+        );
     }
     let spread = |v: &[f64]| largest(v.iter().copied()) / smallest(v.iter().copied());
     let iterations: Vec<f64> = counts.iter().map(|&n| n as f64).collect();

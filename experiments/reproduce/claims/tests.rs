@@ -62,16 +62,3 @@ fn a_number_on_the_wrong_side_is_told_everywhere() {
     );
     assert!(rows[2].contains(",,,0.5,,,,not confirmed,"), "{}", rows[2]);
 }
-
-/// The numbers of a mended claim carry its verdict, and those of a broken print do not.
-#[test]
-fn breaking_a_printed_value_changes_the_verdict() {
-    let printed = 9.0 / 4.0; // Thall Eq. 7
-    let deviation = |factor: f64| (factor * 4.0 / 9.0 - 1.0).abs();
-    let verdict = |factor: f64| {
-        let evidence = Evidence::at_most("deviation", deviation(factor), 1e-12);
-        Finding::reproduced(vec![evidence]).verdict()
-    };
-    assert_eq!(verdict(printed), Verdict::Reproduced);
-    assert_eq!(verdict(printed + 1e-3), Verdict::NotConfirmed);
-}
