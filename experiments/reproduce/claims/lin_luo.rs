@@ -495,7 +495,7 @@ fn condition(_: &Lab) -> Result<Finding> {
             .into_iter()
             .filter(|c| !c.holds_above)
             .map(|c| c.alpha)
-            .last();
+            .next_back();
         finding = finding.also([Evidence::shown(
             format!("α at which it ceases to hold at valence {n}"),
             end.unwrap_or(f64::NAN),

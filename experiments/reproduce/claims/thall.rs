@@ -410,16 +410,16 @@ fn dominance(lab: &Lab) -> Result<Finding> {
         right,
         ROUNDING,
     );
-    let classes: [(&str, fn(usize) -> bool); 4] = [
-        ("3", |n| n == 3),
-        ("4", |n| n == 4),
-        ("5", |n| n == 5),
-        ("6 and more", |n| n >= 6),
+    let classes = [
+        ("3", 3..=3),
+        ("4", 4..=4),
+        ("5", 5..=5),
+        ("6 and more", 6..=usize::MAX),
     ];
     for (name, class) in classes {
         let counts = each(lab.subjects()?, |subject| {
             let system = subject.system(CC)?;
-            let of_class = |i: &usize| class(subject.topology.incidence.face_count(*i));
+            let of_class = |i: &usize| class.contains(&subject.topology.incidence.face_count(*i));
             let rows: Vec<usize> = (0..system.len()).filter(of_class).collect();
             let dominant = rows
                 .iter()

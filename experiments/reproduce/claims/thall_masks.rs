@@ -190,12 +190,12 @@ fn tangent_masks_4(_: &Lab) -> Result<Finding> {
     Ok(Finding::reproduced(vec![
         Evidence::at_most(
             "largest relative distance of l_2, l_3, m_2, m_3 from the left eigenspace",
-            or_nan(membership(&tables, 4, own), |v| largest(v)),
+            or_nan(membership(&tables, 4, own), largest),
             ROUNDING,
         ),
         Evidence::above(
             "smallest such distance of Havemann's masks",
-            or_nan(membership(&tables, 4, |m| !own(m)), |v| smallest(v)),
+            or_nan(membership(&tables, 4, |m| !own(m)), smallest),
             0.01,
         ),
         Evidence::shown(
@@ -228,7 +228,7 @@ fn matrix_of_valence_3(_: &Lab) -> Result<Finding> {
         ),
         Evidence::at_most(
             "largest relative distance of l_2, l_3, m_2, m_3 from the left eigenspace",
-            or_nan(membership(&tables, 3, |_| true), |v| largest(v)),
+            or_nan(membership(&tables, 3, |_| true), largest),
             ROUNDING,
         ),
         Evidence::below(
@@ -303,7 +303,7 @@ fn tables_2_and_3(_: &Lab) -> Result<Finding> {
             "largest relative distance of the printed masks from the left eigenspaces",
             or_nan(
                 [3, 4].into_iter().flat_map(|n| membership(&tables, n, |m| m.starts_with("m_"))).collect(),
-                |v| largest(v),
+                largest,
             ),
             ROUNDING,
         ),

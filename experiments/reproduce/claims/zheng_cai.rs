@@ -867,13 +867,13 @@ fn shape_handles(lab: &Lab) -> Result<Finding> {
     let first = plain.first_vertex_face;
     let (mut form, mut off) = (0.0f64, 0.0f64);
     let (mut before, mut after) = (Vec::new(), Vec::new());
-    for v in 0..n {
+    for (v, &handle) in handles.iter().enumerate() {
         let (a, b) = (ring(&plain.mesh, first, v), ring(&scaled.mesh, first, v));
         let d = mean(&a);
         let wrong = a
             .iter()
             .zip(&b)
-            .map(|(a, b)| (*b - (d + handles[v] * (*a - d))).length() / size);
+            .map(|(a, b)| (*b - (d + handle * (*a - d))).length() / size);
         form = largest([form, largest(wrong)]);
         off = largest([off, mean(&b).distance(subject.mesh.positions[v]) / size]);
         before.push(average_normal(&a));
