@@ -37,12 +37,11 @@ fn look_up(name: &str, records: &[Record]) -> Result<String> {
         (None, _) => None,
         (Some(r), "") => Some(format!("{id}: {}", r.finding.verdict().name())),
         (Some(r), _) => {
-            let mut matching = r
-                .finding
-                .evidence
-                .iter()
-                .filter(|e| e.quantity.starts_with(quantity));
-            matching.next().map(|e| shown(e.value))
+            let evidence = &r.finding.evidence;
+            // The whole name first: "runs" is not "runs that failed".
+            let exact = evidence.iter().find(|e| e.quantity == quantity);
+            let start = || evidence.iter().find(|e| e.quantity.starts_with(quantity));
+            exact.or_else(start).map(|e| shown(e.value))
         }
     };
     found.ok_or_else(|| {

@@ -340,7 +340,7 @@ fn shown(value: Value) -> String {
         Value::Number(_) => {
             let text = readable(x, 6);
             match text.contains('.') && !text.contains('e') {
-                true => text.trim_end_matches('0').to_owned(),
+                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
                 false => text,
             }
         }
