@@ -37,24 +37,25 @@ impl Operator {
     /// The operator of `scheme` on a mesh that the validator has passed. O(corners), in parallel.
     ///
     /// # Errors
-    /// As [`LimitSystem::new`](super::LimitSystem::new).
+    /// As [`LimitSystem::new`](super::LimitSystem::new); more than 2³² − 1 neighbours.
     pub fn new(faces: &Faces, topology: &Topology, scheme: Scheme) -> Result<Self> {
         check_mesh(faces, topology, scheme)?;
         let source = Source::new(faces, topology, scheme);
         let n = source.valences.len();
         let kinds = source.kinds();
-        let offsets = source.offsets(&kinds);
-        let neighbours = match source.fill::<i16>(&kinds, &offsets) {
-            Some(near) => Neighbours::Near(near),
-            None => Neighbours::Far(source.fill::<u32>(&kinds, &offsets).unwrap_or_default()),
-        };
-        let double = source.rings();
         let greatest = source.valences.iter().copied().max().unwrap_or(0);
         let by_valence: Vec<f64> = (0..=greatest)
             .map(|n| scheme.h(n.max(1) as usize))
             .collect();
         let h = gather(&by_valence, &source.valences);
-        let (listed, large) = source.listed(&kinds, &h);
+        let (mut listed, large) = source.listed(&kinds, &h);
+        let offsets = source.offsets(&kinds, &listed)?;
+        let neighbours = match source.fill::<i16>(&kinds, &offsets, &listed) {
+            Some(near) => Neighbours::Near(near),
+            None => Neighbours::Far(source.fill(&kinds, &offsets, &listed).unwrap_or_default()),
+        };
+        listed.neighbours = Vec::new();
+        let double = source.rings();
         let diagonal: Vec<f64> = (0..n)
             .into_par_iter()
             .with_min_len(CHUNK)
@@ -272,10 +273,7 @@ impl Operator {
             Neighbours::Far(codes) => renumber(codes, &old.offsets, order, &place, &offsets),
         };
         let kinds = gather(&old.kinds, order);
-        let mut listed = old.listed.clone();
-        if !listed.slots.is_empty() {
-            listed.slots = gather(&old.listed.slots, order);
-        }
+        let listed = old.listed.renumbered(order, &kinds);
         let mut large = old.large.clone();
         for v in &mut large.corners {
             *v = place[*v as usize];
@@ -321,7 +319,7 @@ fn renumber<C: Code>(
         place: &[u32],
         offsets: &[u32],
     ) -> Option<Vec<D>> {
-        fill_rows(offsets, |k, row, _| {
+        fill_rows(offsets, |k, row| {
             let v = order[k] as usize;
             let old = &codes[old_offsets[v] as usize..old_offsets[v + 1] as usize];
             for (new, c) in row.iter_mut().zip(old) {
@@ -340,6 +338,69 @@ fn renumber<C: Code>(
 }
 
 impl Listed {
+    /// Puts together the listed rows of these kinds, in their order: `fill(i, …)` adds those of row `i`, but for its
+    /// starts. In parallel.
+    pub(super) fn collect(
+        kinds: &[Kind],
+        fill: impl Fn(usize, &mut Listed, &mut Vec<(u32, f64)>) + Sync,
+    ) -> Listed {
+        let mut all = Listed::default();
+        if !kinds.contains(&Kind::Listed) {
+            return all;
+        }
+        let parts: Vec<Listed> = (0..kinds.len().div_ceil(CHUNK))
+            .into_par_iter()
+            .map_init(Vec::new, |scratch, k| {
+                let mut part = Listed::default();
+                let rows = k * CHUNK..((k + 1) * CHUNK).min(kinds.len());
+                for i in rows.filter(|&i| kinds[i] == Kind::Listed) {
+                    part.slots.push(i as u32);
+                    part.starts.push(part.weights.len() as u32);
+                    part.large_starts.push(part.corners.len() as u32);
+                    fill(i, &mut part, scratch);
+                }
+                part
+            })
+            .collect();
+        all.slots = vec![NONE; kinds.len()];
+        for part in parts {
+            let (weights, corners) = (all.weights.len() as u32, all.corners.len() as u32);
+            for (k, &i) in (all.own.len() as u32..).zip(&part.slots) {
+                all.slots[i as usize] = k;
+            }
+            all.starts.extend(part.starts.iter().map(|s| s + weights));
+            all.large_starts
+                .extend(part.large_starts.iter().map(|s| s + corners));
+            all.own.extend(part.own);
+            all.h.extend(part.h);
+            all.weights.extend(part.weights);
+            all.neighbours.extend(part.neighbours);
+            all.corners.extend(part.corners);
+        }
+        all.starts.push(all.weights.len() as u32);
+        all.large_starts.push(all.corners.len() as u32);
+        all
+    }
+
+    /// The weights of listed row `i`.
+    pub(super) fn entries(&self, i: usize) -> std::ops::Range<usize> {
+        let slot = self.slots[i] as usize;
+        self.starts[slot] as usize..self.starts[slot + 1] as usize
+    }
+
+    /// The rows in another order, one after the other in memory again: row k is that of vertex `order[k]`.
+    fn renumbered(&self, order: &[u32], kinds: &[Kind]) -> Listed {
+        Listed::collect(kinds, |k, listed, _| {
+            let v = order[k] as usize;
+            let slot = self.slots[v] as usize;
+            let weights = self.entries(v);
+            listed.own.push(self.own[slot]);
+            listed.h.push(self.h[slot]);
+            listed.weights.extend_from_slice(&self.weights[weights]);
+            listed.corners.extend_from_slice(self.large_at(v));
+        })
+    }
+
     /// The large faces at vertex `i`, each with the place of `i` in it.
     pub(super) fn large_at(&self, i: usize) -> &[(u32, u32)] {
         match self.slots.get(i) {

@@ -4,6 +4,8 @@ use rayon::prelude::*;
 
 use super::scheme::{Masks, Scheme};
 use super::stencil::{Code, Kind, LargeFaces, Listed, Ring, Rings};
+use super::system::FaceBlocks;
+use crate::error::{Error, Result};
 use crate::mesh::topology::{NONE, next_in, prev_in};
 use crate::mesh::{Faces, Topology};
 
@@ -50,6 +52,8 @@ pub(super) struct Source<'a> {
     modes: Vec<Option<Modes>>,
     /// The number of every large face; empty if there are none.
     large: Vec<u32>,
+    /// What the corners of a face that is not large add to each other.
+    blocks: FaceBlocks,
     half_edge: f64,
 }
 
@@ -73,7 +77,7 @@ impl Encode for i16 {
 /// Fills the neighbours of all rows in parallel, unless `fill` of some row says `None`.
 pub(super) fn fill_rows<C: Encode>(
     offsets: &[u32],
-    fill: impl Fn(usize, &mut [C], &mut Vec<(u32, f64)>) -> Option<()> + Sync,
+    fill: impl Fn(usize, &mut [C]) -> Option<()> + Sync,
 ) -> Option<Vec<C>> {
     let n = offsets.len() - 1;
     let mut codes = vec![C::default(); offsets[n] as usize];
@@ -87,10 +91,10 @@ pub(super) fn fill_rows<C: Encode>(
     }
     tasks
         .into_par_iter()
-        .map_init(Vec::new, |scratch, (rows, mut part)| {
+        .map(|(rows, mut part)| {
             for i in rows {
                 let (row, after) = part.split_at_mut((offsets[i + 1] - offsets[i]) as usize);
-                fill(i, row, scratch)?;
+                fill(i, row)?;
                 part = after;
             }
             Some(())
@@ -108,6 +112,7 @@ impl<'a> Source<'a> {
             valences: super::system::valences(faces, topology),
             modes: Vec::new(),
             large: Vec::new(),
+            blocks: FaceBlocks::new(faces, &scheme),
             half_edge: 0.5 * scheme.edge_weight(),
         };
         if scheme.edges_only() || faces.uniform_size().is_some_and(|size| size <= LARGE) {
@@ -178,35 +183,37 @@ impl<'a> Source<'a> {
             .collect()
     }
 
-    pub(super) fn offsets(&self, kinds: &[Kind]) -> Vec<u32> {
-        let lengths: Vec<u32> = kinds
-            .par_iter()
-            .enumerate()
-            .with_min_len(CHUNK)
-            .map_init(Vec::new, |scratch, (v, kind)| match kind {
+    pub(super) fn offsets(&self, kinds: &[Kind], listed: &Listed) -> Result<Vec<u32>> {
+        let mut offsets = Vec::with_capacity(kinds.len() + 1);
+        offsets.push(0);
+        let mut end = 0u32;
+        for (v, kind) in kinds.iter().enumerate() {
+            let length = match kind {
                 Kind::Quads => 2 * self.valences[v],
                 Kind::Edges => self.valences[v],
-                Kind::Listed => {
-                    self.list(v, scratch);
-                    scratch.len() as u32
-                }
-            })
-            .collect();
-        let mut offsets = Vec::with_capacity(lengths.len() + 1);
-        offsets.push(0);
-        let mut end = 0;
-        offsets.extend(lengths.iter().map(|length| {
-            end += length;
-            end
-        }));
-        offsets
+                Kind::Listed => listed.entries(v).len() as u32,
+            };
+            end = end.checked_add(length).ok_or_else(|| {
+                Error::Computation(
+                    "the operator would have more neighbours than 32-bit indices reach; use a smaller mesh"
+                        .into(),
+                )
+            })?;
+            offsets.push(end);
+        }
+        Ok(offsets)
     }
 
-    pub(super) fn fill<C: Encode>(&self, kinds: &[Kind], offsets: &[u32]) -> Option<Vec<C>> {
+    pub(super) fn fill<C: Encode>(
+        &self,
+        kinds: &[Kind],
+        offsets: &[u32],
+        listed: &Listed,
+    ) -> Option<Vec<C>> {
         let incidence = &self.topology.incidence;
         let corners = self.faces.corners();
         let open = self.topology.boundary_edges() > 0;
-        fill_rows(offsets, |v, row: &mut [C], scratch| {
+        fill_rows(offsets, |v, row: &mut [C]| {
             let encode = |neighbour: u32| C::encode(v, neighbour);
             match kinds[v] {
                 Kind::Quads => {
@@ -238,8 +245,7 @@ impl<'a> Source<'a> {
                     }
                 }
                 Kind::Listed => {
-                    self.list(v, scratch);
-                    for (slot, &(w, _)) in row.iter_mut().zip(scratch.iter()) {
+                    for (slot, &w) in row.iter_mut().zip(&listed.neighbours[listed.entries(v)]) {
                         *slot = encode(w)?;
                     }
                 }
@@ -268,12 +274,11 @@ impl<'a> Source<'a> {
                 }
                 continue;
             }
-            own += self.scheme.face_weight(size, 0);
-            for steps in 1..size {
-                let side = steps == 1 || steps + 1 == size;
-                let edge = if side { self.half_edge } else { 0.0 };
-                entries.push((at(steps), self.scheme.face_weight(size, steps) + edge));
-            }
+            let block = &self.blocks.by_size[size];
+            own += block[0];
+            let (before, after) = (&face[..place], &face[place + 1..]);
+            let ahead = after.iter().chain(before).copied();
+            entries.extend(ahead.zip(block[1..].iter().copied()));
         }
         entries.sort_by_key(|e| e.0);
         entries.dedup_by(|later, kept| {
@@ -324,21 +329,13 @@ impl<'a> Source<'a> {
                 large.cosine.push(modes.cosine);
             }
         }
-        let mut listed = Listed::default();
-        if !kinds.contains(&Kind::Listed) {
-            return (listed, large);
-        }
-        listed.large_starts.push(0);
-        listed.slots = vec![NONE; kinds.len()];
         let incidence = &self.topology.incidence;
-        let mut scratch = Vec::new();
-        for v in (0..kinds.len()).filter(|&v| kinds[v] == Kind::Listed) {
-            listed.slots[v] = listed.own.len() as u32;
-            let own = self.list(v, &mut scratch);
+        let listed = Listed::collect(kinds, |v, listed, scratch| {
+            let own = self.list(v, scratch);
             listed.own.push(h[v] * own);
             listed.h.push(h[v]);
-            listed.starts.push(listed.weights.len() as u32);
             listed.weights.extend(scratch.iter().map(|e| h[v] * e.1));
+            listed.neighbours.extend(scratch.iter().map(|e| e.0));
             for &c in incidence.corners_at(v) {
                 let f = incidence.face_of(c);
                 if let Some(&number) = self.large.get(f).filter(|&&number| number != NONE) {
@@ -346,8 +343,7 @@ impl<'a> Source<'a> {
                     listed.corners.push((number, place as u32));
                 }
             }
-            listed.large_starts.push(listed.corners.len() as u32);
-        }
+        });
         (listed, large)
     }
 }

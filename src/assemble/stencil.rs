@@ -166,9 +166,11 @@ pub struct Listed {
     pub(super) slots: Vec<u32>,
     /// By slot: the weight of the vertex itself.
     pub(super) own: Vec<f64>,
-    /// By slot: where the weights of its neighbours start.
+    /// By slot, with one more at the end: where the weights of its neighbours start.
     pub(super) starts: Vec<u32>,
     pub(super) weights: Vec<f64>,
+    /// The neighbours to these weights, until they are encoded; then empty.
+    pub(super) neighbours: Vec<u32>,
     /// By slot, with one more at the end: where the large faces at the vertex start in `corners`.
     pub(super) large_starts: Vec<u32>,
     /// A large face and the place of the vertex in it.
@@ -438,6 +440,9 @@ impl Stencil {
         let mut sum = window[row].times(P::weight(listed.own[slot]));
         for (&c, &w) in codes.iter().zip(weights) {
             sum += window[c.place(row, start)].times(P::weight(w));
+        }
+        if listed.corners.is_empty() {
+            return sum;
         }
         let large = listed.large_starts[slot] as usize..listed.large_starts[slot + 1] as usize;
         for &(f, t) in &listed.corners[large] {

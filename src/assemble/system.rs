@@ -158,15 +158,15 @@ pub fn valences(faces: &Faces, topology: &Topology) -> Vec<u32> {
 /// For every face size that occurs, what a face adds between a corner and the one k steps further: its
 /// circulant, and half of the edge weight at its sides (the other half comes from the face across). Adding
 /// the halves face by face, in ascending order of faces, makes M symmetric to the last bit.
-struct FaceBlocks {
-    by_size: Vec<Vec<f64>>,
+pub(super) struct FaceBlocks {
+    pub(super) by_size: Vec<Vec<f64>>,
     half_edge: f64,
     /// Only the corner itself and its two neighbours matter.
     sides_only: bool,
 }
 
 impl FaceBlocks {
-    fn new(faces: &Faces, masks: &impl Masks) -> Self {
+    pub(super) fn new(faces: &Faces, masks: &impl Masks) -> Self {
         let half_edge = 0.5 * masks.edge_weight();
         let mut by_size: Vec<Vec<f64>> = Vec::new();
         for face in faces.iter() {
