@@ -347,7 +347,7 @@ fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) ->
         y_label: "nanoseconds a vertex".into(),
         x_scale: Scale::Log,
         y_scale: Scale::Log,
-        y_range: Some((20.0, 2e4)),
+        y_range: Some((20.0, 1e6)),
         series,
         ..LinePlot::default()
     }

@@ -13,7 +13,7 @@
 //! - *Hard cases.* If that does not converge (λ_min below 10⁻⁴, a singular matrix), conjugate gradients on the same
 //!   operator start from the given points: their count grows with √κ only, and they need no interval.
 //!
-//! Direct methods never win: they take tens of times longer at 10³ vertices already, by `reports/scaling.md`.
+//! Direct methods lose at every size tried, by `reports/scaling.md`.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
