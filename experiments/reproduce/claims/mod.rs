@@ -3,7 +3,7 @@
 //!
 //! - [`finding`]: numbers, thresholds, verdicts;
 //! - [`lab`]: the meshes and small tools that claims share;
-//! - one file a paper: [`thall`] and [`thall_masks`], [`zheng_cai`], [`pia`], [`lin_luo`];
+//! - one file a paper: [`thall`] and [`thall_masks`], [`zheng_cai`] and [`zheng_cai_faces`], [`pia`], [`lin_luo`];
 //! - [`findings`]: the page on what is settled and what is wrong, filled with the ledger's numbers.
 
 mod finding;
@@ -14,6 +14,7 @@ mod pia;
 mod thall;
 mod thall_masks;
 mod zheng_cai;
+mod zheng_cai_faces;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -12,9 +12,8 @@ use limitlab::analysis::order_study::order_study;
 use limitlab::analysis::radius::sweep_radius;
 use limitlab::assemble::{LimitSystem, Scheme};
 use limitlab::interpolate::subset::Restriction;
-use limitlab::interpolate::thall::normal_deviations;
 use limitlab::interpolate::zheng_cai::{
-    Auxiliary, Constraints, FirstRefinement, PhaseOne, Sweep, auxiliary, interpolate,
+    Constraints, FirstRefinement, PhaseOne, Sweep, auxiliary, interpolate,
 };
 use limitlab::mesh::order::Order;
 use limitlab::mesh::validate::Boundary;
@@ -22,14 +21,15 @@ use limitlab::mesh::{Mesh, Topology};
 use limitlab::solvers::gauss_seidel::sweep;
 use limitlab::solvers::{Outcome, Setup, Stop, run};
 use limitlab::subdivide::Refinement;
-use limitlab::subdivide::doo_sabin::{Rule, face_normals, refine_by};
+use limitlab::subdivide::doo_sabin::Rule;
 
 use super::Claim;
 use super::finding::{Evidence, Finding, Value};
 use super::lab::{
-    Lab, each, ends, entries_per_vertex, exact, excess, history, largest, median, random_points,
-    smallest, solve_random,
+    Lab, each, ends, entries_per_vertex, exact, excess, history, largest, median, smallest,
+    solve_random,
 };
+use super::zheng_cai_faces as faces;
 use crate::context::Subject;
 
 const ROUNDING: f64 = 1e-12;
@@ -93,7 +93,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§3.3, Eq. 8 to 17",
         printed: "Eq. 17 is the smallest change that puts the centroid on I and the face into a plane.",
         slow: false,
-        check: perturbation,
+        check: faces::perturbation,
     },
     Claim {
         id: "Z8",
@@ -101,7 +101,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§3.4",
         printed: "ε_k = [(W_c − W_k)·n] n + (V − W_c).",
         slow: false,
-        check: pseudo_code,
+        check: faces::pseudo_code,
     },
     Claim {
         id: "Z9",
@@ -149,7 +149,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "Remark 2",
         printed: "The surface interpolates exactly although the auxiliary mesh is approximate.",
         slow: false,
-        check: exact_interpolation,
+        check: faces::exact_interpolation,
     },
     Claim {
         id: "Z15",
@@ -157,7 +157,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§4.1",
         printed: "With n in place of the average normal the surface has that normal, and n and −n are the same.",
         slow: false,
-        check: given_normals,
+        check: faces::given_normals,
     },
     Claim {
         id: "Z16",
@@ -165,7 +165,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§4.2",
         printed: "W' = D + S(W − D) adjusts the shape; centroid and plane of each face stay.",
         slow: false,
-        check: shape_handles,
+        check: faces::shape_handles,
     },
     Claim {
         id: "Z17",
@@ -181,7 +181,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§2",
         printed: "A planar face and the tangent plane at its centroid coincide.",
         slow: false,
-        check: tangent_plane,
+        check: faces::tangent_plane,
     },
     Claim {
         id: "Z19",
@@ -205,7 +205,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§3.3",
         printed: "All faces of the first refinement that belong to interpolation points are separated.",
         slow: false,
-        check: separated_faces,
+        check: faces::separated_faces,
     },
     Claim {
         id: "Z22",
@@ -229,7 +229,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§4.1 (not said there)",
         printed: "Any normal may be required.",
         slow: false,
-        check: normal_in_plane,
+        check: faces::normal_in_plane,
     },
     Claim {
         id: "Z25",
@@ -237,7 +237,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§3.3, Eq. 11 to 17",
         printed: "ε_k = ((W_k − D)·n) n − (λ − (λ·n) n)/2, D not defined.",
         slow: false,
-        check: middle_line,
+        check: faces::middle_line,
     },
 ];
 
@@ -269,14 +269,6 @@ fn weights(_: &Lab) -> Result<Finding> {
     )]))
 }
 
-fn centroid(mesh: &Mesh, f: usize) -> DVec3 {
-    let face = mesh.faces.face(f);
-    face.iter()
-        .map(|&v| mesh.positions[v as usize])
-        .sum::<DVec3>()
-        / face.len() as f64
-}
-
 fn after_one_step(lab: &Lab) -> Result<Finding> {
     let rows = each(&lab.polygons()[..60], |subject| {
         let (mesh, topology) = (&subject.mesh, &subject.topology);
@@ -294,7 +286,8 @@ fn after_one_step(lab: &Lab) -> Result<Finding> {
             not_four += (0..fine.len()).filter(|&v| valence(&at, v) != 4).count();
             changed += others(&fine).abs_diff(expected);
             // Type-F faces come first, in the order of the old faces.
-            let step = (0..now.faces.len()).map(|f| centroid(&now, f).distance(centroid(&fine, f)));
+            let step = (0..now.faces.len())
+                .map(|f| faces::centroid(&now, f).distance(faces::centroid(&fine, f)));
             moved = largest([moved, largest(step) / mesh.diagonal()]);
             now = fine;
         }
@@ -465,133 +458,6 @@ fn order(lab: &Lab) -> Result<Finding> {
         "The order does change the speed. Colour by colour is the fastest or not much behind, and the one that can \
          run in parallel; a front (breadth first, reverse Cuthill-McKee) is slowest on regular meshes.",
     ))
-}
-
-/// Two-phase interpolation after `sweeps` sweeps, with what the correction did: the rings before it.
-struct Corrected {
-    auxiliary: Auxiliary,
-    before: Mesh,
-    after: FirstRefinement,
-}
-
-fn corrected(subject: &Subject, sweeps: usize, constraints: &Constraints) -> Result<Corrected> {
-    let phase = PhaseOne {
-        max_iterations: sweeps,
-        eps: 0.0,
-        ..PhaseOne::default()
-    };
-    let (mesh, topology) = (&subject.mesh, &subject.topology);
-    let auxiliary = auxiliary(mesh, topology, constraints.interpolated, &phase)?;
-    let before = refine_by(Rule::ZhengCai, &auxiliary.mesh, topology)?;
-    let after = FirstRefinement::new(
-        &auxiliary.mesh,
-        topology,
-        Rule::ZhengCai,
-        &mesh.positions,
-        constraints,
-    )?;
-    Ok(Corrected {
-        auxiliary,
-        before,
-        after,
-    })
-}
-
-/// Corner positions of the type-V face of `v`.
-fn ring(mesh: &Mesh, first_vertex_face: usize, v: usize) -> Vec<DVec3> {
-    let face = mesh.faces.face(first_vertex_face + v);
-    face.iter().map(|&c| mesh.positions[c as usize]).collect()
-}
-
-fn mean(points: &[DVec3]) -> DVec3 {
-    points.iter().sum::<DVec3>() / points.len() as f64
-}
-
-/// Eq. 10.
-fn average_normal(ring: &[DVec3]) -> DVec3 {
-    let center = mean(ring);
-    let next = ring.iter().cycle().skip(1);
-    let area: DVec3 = ring
-        .iter()
-        .zip(next)
-        .map(|(a, b)| (a - center).cross(b - center))
-        .sum();
-    area.normalize()
-}
-
-const POLYGONS: &str = "irregular-poly:300";
-
-fn perturbation(lab: &Lab) -> Result<Finding> {
-    let subject = lab.context.stand_in(POLYGONS)?;
-    let done = corrected(&subject, 2, &Constraints::default())?;
-    let first = done.after.first_vertex_face;
-    let size = subject.mesh.diagonal();
-    let (mut off, mut flat, mut across) = (0.0f64, 0.0f64, 0.0f64);
-    for v in 0..subject.mesh.len() {
-        let (old, new) = (
-            ring(&done.before, first, v),
-            ring(&done.after.mesh, first, v),
-        );
-        let (n, point) = (average_normal(&old), subject.mesh.positions[v]);
-        off = largest([off, mean(&new).distance(point) / size]);
-        flat = largest([
-            flat,
-            largest(new.iter().map(|w| (w - point).dot(n).abs() / size)),
-        ]);
-        // Smallest change: orthogonal to all changes that keep centroid and plane.
-        let mut free = random_points(new.len(), v as u64);
-        free.iter_mut().for_each(|d| *d -= d.dot(n) * n);
-        let center = mean(&free);
-        let change = old.iter().zip(&new).map(|(a, b)| *b - *a);
-        let product: f64 = change.zip(&free).map(|(e, d)| e.dot(*d - center)).sum();
-        across = largest([across, product.abs() / size]);
-    }
-    Ok(Finding::reproduced(vec![
-        Evidence::at_most(
-            format!("largest distance of a centroid from I over L, {POLYGONS}, two sweeps"),
-            off,
-            ROUNDING,
-        ),
-        Evidence::at_most(
-            "largest distance of a corner from the plane over L",
-            flat,
-            ROUNDING,
-        ),
-        Evidence::at_most(
-            "largest product of the change with an admissible other one over L (0: no smaller change)",
-            across,
-            ROUNDING,
-        ),
-    ]))
-}
-
-fn pseudo_code(lab: &Lab) -> Result<Finding> {
-    let subject = lab.context.stand_in(POLYGONS)?;
-    let done = corrected(&subject, 2, &Constraints::default())?;
-    let first = done.after.first_vertex_face;
-    let size = subject.mesh.diagonal();
-    let (mut printed, mut right) = (0.0f64, 0.0f64);
-    for v in 0..subject.mesh.len() {
-        let old = ring(&done.before, first, v);
-        let (n, center) = (average_normal(&old), mean(&old));
-        let target = subject.mesh.positions[v];
-        let moved = |to: DVec3| {
-            let new: Vec<DVec3> = old
-                .iter()
-                .map(|w| *w + (center - *w).dot(n) * n + (to - center))
-                .collect();
-            mean(&new).distance(target) / size
-        };
-        printed = largest([printed, moved(done.auxiliary.mesh.positions[v])]);
-        right = largest([right, moved(target)]);
-    }
-    Ok(Finding::corrected(
-        "largest distance of a centroid from I over L, with V (print) and I (right) in step 4",
-        printed,
-        right,
-        ROUNDING,
-    )
-    .remark("Step 4 needs (I − W_c), as Eq. 17 has it: V is the vertex of the auxiliary mesh."))
 }
 
 fn sweeps(lab: &Lab) -> Result<Finding> {
@@ -774,130 +640,6 @@ fn linear_time(_: &Lab) -> Result<Finding> {
     ]))
 }
 
-fn exact_interpolation(lab: &Lab) -> Result<Finding> {
-    let subject = lab.context.stand_in(POLYGONS)?;
-    let size = subject.mesh.diagonal();
-    let done = corrected(&subject, 1, &Constraints::default())?;
-    let off = |mesh: &Mesh| {
-        let points = subject.mesh.positions.iter().enumerate();
-        largest(
-            points
-                .map(|(v, p)| centroid(mesh, done.after.first_vertex_face + v).distance(*p) / size),
-        )
-    };
-    Ok(Finding::reproduced(vec![
-        Evidence::above(
-            format!(
-                "largest distance of a centroid from I over L after one sweep, {POLYGONS}, not corrected"
-            ),
-            off(&done.before),
-            1e-3,
-        ),
-        Evidence::at_most(
-            "the same corrected, at level 1",
-            off(&done.after.mesh),
-            ROUNDING,
-        ),
-        Evidence::at_most(
-            "the same at level 4",
-            off(&done.after.surface(4)?),
-            ROUNDING,
-        ),
-    ]))
-}
-
-/// One normal a vertex, off the average one by up to 0.8.
-fn tilted_normals(subject: &Subject, sign: f64) -> Result<Vec<Option<DVec3>>> {
-    let done = corrected(subject, 5, &Constraints::default())?;
-    let first = done.after.first_vertex_face;
-    let random = random_points(subject.mesh.len(), 7);
-    Ok((0..subject.mesh.len())
-        .map(|v| Some(sign * (average_normal(&ring(&done.before, first, v)) + 0.5 * random[v])))
-        .collect())
-}
-
-fn given_normals(lab: &Lab) -> Result<Finding> {
-    let subject = lab.context.stand_in(POLYGONS)?;
-    let refined = |sign: f64| -> Result<(FirstRefinement, Vec<DVec3>)> {
-        let normals = tilted_normals(&subject, sign)?;
-        let constraints = Constraints {
-            normals: Some(&normals),
-            ..Constraints::default()
-        };
-        let unit = normals.iter().flatten().map(|n| n.normalize()).collect();
-        Ok((corrected(&subject, 5, &constraints)?.after, unit))
-    };
-    let (plus, wanted) = refined(1.0)?;
-    let (minus, _) = refined(-1.0)?;
-    let fine = plus.surface(3)?;
-    let first = plus.first_vertex_face;
-    let normals = face_normals(&fine);
-    let found: Vec<DVec3> = (0..wanted.len())
-        .map(|v| {
-            let n = normals[first + v];
-            if n.dot(wanted[v]) < 0.0 { -n } else { n }
-        })
-        .collect();
-    Ok(Finding::reproduced(vec![
-        Evidence::at_most(
-            format!("largest angle of the surface's normal with ±n at level 3, {POLYGONS}"),
-            largest(normal_deviations(&found, &wanted)),
-            1e-9,
-        ),
-        Evidence::at_most(
-            "largest difference over L of the meshes for n and −n",
-            super::lab::distance(&plus.mesh.positions, &minus.mesh.positions)
-                / subject.mesh.diagonal(),
-            1e-15,
-        ),
-    ]))
-}
-
-fn shape_handles(lab: &Lab) -> Result<Finding> {
-    let subject = lab.context.stand_in(POLYGONS)?;
-    let n = subject.mesh.len();
-    let handles: Vec<f64> = (0..n).map(|v| [0.4, 1.0, 2.5][v % 3]).collect();
-    let plain = corrected(&subject, 5, &Constraints::default())?.after;
-    let constraints = Constraints {
-        handles: Some(&handles),
-        ..Constraints::default()
-    };
-    let scaled = corrected(&subject, 5, &constraints)?.after;
-    let size = subject.mesh.diagonal();
-    let first = plain.first_vertex_face;
-    let (mut form, mut off) = (0.0f64, 0.0f64);
-    let (mut before, mut after) = (Vec::new(), Vec::new());
-    for (v, &handle) in handles.iter().enumerate() {
-        let (a, b) = (ring(&plain.mesh, first, v), ring(&scaled.mesh, first, v));
-        let d = mean(&a);
-        let wrong = a
-            .iter()
-            .zip(&b)
-            .map(|(a, b)| (*b - (d + handle * (*a - d))).length() / size);
-        form = largest([form, largest(wrong)]);
-        off = largest([off, mean(&b).distance(subject.mesh.positions[v]) / size]);
-        before.push(average_normal(&a));
-        after.push(average_normal(&b));
-    }
-    Ok(Finding::reproduced(vec![
-        Evidence::at_most(
-            format!("largest distance over L from D + S(W − D), {POLYGONS}, S = 0.4, 1, 2.5"),
-            form,
-            ROUNDING,
-        ),
-        Evidence::at_most(
-            "largest distance of a centroid from I over L",
-            off,
-            ROUNDING,
-        ),
-        Evidence::at_most(
-            "largest angle between the normals with and without handles",
-            largest(normal_deviations(&after, &before)),
-            1e-9,
-        ),
-    ]))
-}
-
 fn subset(lab: &Lab) -> Result<Finding> {
     let rows = each(lab.polygons(), |subject| {
         let marks: Vec<bool> = (0..subject.mesh.len()).map(|v| v % 3 == 0).collect();
@@ -918,7 +660,7 @@ fn subset(lab: &Lab) -> Result<Finding> {
             free.map(|v| done.auxiliary.mesh.positions[v].distance(subject.mesh.positions[v]));
         let held = (0..marks.len()).filter(|&v| marks[v]);
         let off = held.map(|v| {
-            centroid(&done.first.mesh, done.first.first_vertex_face + v)
+            faces::centroid(&done.first.mesh, done.first.first_vertex_face + v)
                 .distance(subject.mesh.positions[v])
         });
         Ok((
@@ -948,47 +690,6 @@ fn subset(lab: &Lab) -> Result<Finding> {
             "runs of Gauss-Seidel that did not settle to 10⁻¹² L",
             rows.iter().map(|r| r.3).sum::<usize>(),
             0.0,
-        ),
-    ]))
-}
-
-fn tangent_plane(lab: &Lab) -> Result<Finding> {
-    let subject = lab.context.stand_in("irregular-poly:60")?;
-    let done = corrected(&subject, 5, &Constraints::default())?.after;
-    let first = done.first_vertex_face;
-    let at_start = face_normals(&done.mesh);
-    let n = subject.mesh.len();
-    // The largest angle between a type-V face's plane and the faces beside it.
-    let beside = |mesh: &Mesh| {
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        let normals = face_normals(mesh);
-        let mut worst = Vec::new();
-        for v in 0..n {
-            let range = mesh.faces.range(first + v);
-            let across = range.filter_map(|c| topology.twin(c as u32));
-            let pairs = across.map(|t| normals[topology.incidence.face_of(t)]);
-            let angles: Vec<f64> = pairs
-                .map(|m| normal_deviations(&[m], &[normals[first + v]])[0])
-                .collect();
-            worst.push(largest(angles));
-        }
-        median(worst)
-    };
-    let (second, sixth) = (done.surface(2)?, done.surface(6)?);
-    let kept = face_normals(&sixth);
-    Ok(Finding::reproduced(vec![
-        Evidence::at_most(
-            "largest angle between the planes of a type-V face at levels 1 and 6, irregular-poly:60",
-            largest(normal_deviations(
-                &kept[first..first + n],
-                &at_start[first..first + n],
-            )),
-            1e-9,
-        ),
-        Evidence::at_most(
-            "median angle with the faces beside it at level 6 over that at level 2",
-            beside(&sixth) / beside(&second),
-            0.25,
         ),
     ]))
 }
@@ -1024,25 +725,6 @@ fn five_iterations(lab: &Lab) -> Result<Finding> {
         Evidence::shown("meshes", errors.len()),
     ])
     .remark("Good is read as the paper's own 0.3 % of L, most as nine in ten."))
-}
-
-fn separated_faces(lab: &Lab) -> Result<Finding> {
-    let rows = each(lab.polygons(), |subject| {
-        let fine = refine_by(Rule::ZhengCai, &subject.mesh, &subject.topology)?;
-        let first = subject.mesh.faces.len() + subject.topology.edges();
-        let mut uses = vec![0usize; fine.len()];
-        for f in first..fine.faces.len() {
-            for &v in fine.faces.face(f) {
-                uses[v as usize] += 1;
-            }
-        }
-        Ok(uses.iter().filter(|&&u| u != 1).count())
-    })?;
-    Ok(Finding::reproduced(vec![Evidence::equal(
-        "vertices of the first refinement that do not lie in exactly one type-V face, random meshes",
-        rows.iter().sum::<usize>(),
-        0.0,
-    )]))
 }
 
 fn phases(lab: &Lab) -> Result<Finding> {
@@ -1099,73 +781,4 @@ fn same_on_triangles(lab: &Lab) -> Result<Finding> {
         "1 + 2cos(2π/3) = 0 makes Δ_i of Eq. 3 vanish on triangles. Models of the Princeton Shape Benchmark consist of \
          triangles, so the comparison of §3.5 is one of solvers only.",
     ))
-}
-
-fn normal_in_plane(lab: &Lab) -> Result<Finding> {
-    let subject = lab.context.stand_in("irregular-poly:60")?;
-    let plain = corrected(&subject, 5, &Constraints::default())?;
-    let first = plain.after.first_vertex_face;
-    let flat = ring(&plain.before, first, 0);
-    let normal = average_normal(&flat);
-    let side = normal.cross(flat[0] - mean(&flat)).normalize();
-    let area = |ring: &[DVec3], n: DVec3| {
-        let center = mean(ring);
-        let next = ring.iter().cycle().skip(1);
-        ring.iter()
-            .zip(next)
-            .map(|(a, b)| (a - center).cross(b - center))
-            .sum::<DVec3>()
-            .dot(n)
-            .abs()
-    };
-    let refined = |given: DVec3| {
-        let mut normals = vec![None; subject.mesh.len()];
-        normals[0] = Some(given);
-        let constraints = Constraints {
-            normals: Some(&normals),
-            ..Constraints::default()
-        };
-        corrected(&subject, 5, &constraints)
-    };
-    const TILT: f64 = 1e-3;
-    let given = (side + TILT * normal).normalize();
-    let tilted = refined(given)?.after;
-    let ratio = area(&ring(&tilted.mesh, first, 0), given) / area(&flat, normal);
-    Ok(Finding::settled(vec![
-        Evidence::at_most(
-            "area of a type-V face whose given normal is tilted by 0.001 from its plane, over that of the average normal",
-            ratio,
-            1.01 * TILT,
-        ),
-        Evidence::equal("normals in the plane that are refused, of 1", usize::from(refined(side).is_err()), 1.0),
-    ])
-    .remark("The area shrinks by the cosine between given and average normal: the face collapses to a line."))
-}
-
-fn middle_line(lab: &Lab) -> Result<Finding> {
-    let subject = lab.context.stand_in(POLYGONS)?;
-    let done = corrected(&subject, 2, &Constraints::default())?;
-    let first = done.after.first_vertex_face;
-    let size = subject.mesh.diagonal();
-    let (mut printed, mut right) = (0.0f64, 0.0f64);
-    for v in 0..subject.mesh.len() {
-        let old = ring(&done.before, first, v);
-        let (n, d) = (average_normal(&old), subject.mesh.positions[v]);
-        let center = mean(&old);
-        // Eq. 16 with D = I: λ − (λ·n)n = 2[(W_c − I) − ((W_c − I)·n)n].
-        let along = 2.0 * ((center - d) - (center - d).dot(n) * n);
-        for w in &old {
-            let last = (center - *w).dot(n) * n + (d - center);
-            let line = |sign: f64| sign * (*w - d).dot(n) * n - 0.5 * along;
-            printed = largest([printed, line(1.0).distance(last) / size]);
-            right = largest([right, line(-1.0).distance(last) / size]);
-        }
-    }
-    Ok(Finding::corrected(
-        "largest distance over L of the second line of Eq. 17 from its last, with + (print) and − (right) at ((W_k − D)·n)n",
-        printed,
-        right,
-        ROUNDING,
-    )
-    .remark("D stands for I throughout."))
 }
