@@ -11,6 +11,8 @@ mod methods;
 mod omega;
 mod orders;
 mod pia;
+mod popping;
+mod ripples;
 mod sparsity;
 mod splitting;
 mod thall;
@@ -58,7 +60,7 @@ struct Arguments {
 }
 
 /// All items, in the order in which they run.
-const ITEMS: [Item; 12] = [
+const ITEMS: [Item; 14] = [
     pia::TABLE1,
     thall::ITERATIONS,
     zheng_cai::SECTION_3_5,
@@ -68,6 +70,8 @@ const ITEMS: [Item; 12] = [
     splitting::LOCAL,
     orders::ORDERS,
     valences::VALENCES,
+    popping::POPPING,
+    ripples::RIPPLES,
     figures::ALL,
     claims::LEDGER,
     claims::FINDINGS,
