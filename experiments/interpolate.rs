@@ -26,8 +26,9 @@ use limitlab::interpolate::subset::Restriction;
 use limitlab::interpolate::surface::{Request, Surface, surface};
 use limitlab::interpolate::zheng_cai::{self, Constraints, PhaseOne, Sweep};
 use limitlab::mesh::order::Order;
-use limitlab::mesh::{Mesh, io};
+use limitlab::mesh::{Mesh, Topology, io};
 use limitlab::solvers::{Errors, Method, Outcome, Report, Solution, Step, run_watched};
+use limitlab::subdivide::Refinement;
 use limitlab::subdivide::doo_sabin::{Rule, limit_positions};
 
 /// Computes the control mesh V with A V = P: the vertices P of the mesh become points of the limit surface. Unless
@@ -44,8 +45,10 @@ struct Arguments {
     output: PathBuf,
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
     /// pcg-ssor, pcg-ic0; two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); halstead (the fairest
-    /// surface, with --scheme catmull-clark: a control mesh two refinements down). auto is chebyshev in mixed
-    /// precision without a stored matrix, cg where that makes no progress, and ldlt where neither does
+    /// surface, with --scheme catmull-clark: a control mesh two refinements down); butterfly and labsik-greiner (with
+    /// --subdivide: schemes that pass through the vertices of triangle meshes with no system solved). auto is
+    /// chebyshev in mixed precision without a stored matrix, cg where that makes no progress, and ldlt where neither
+    /// does
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice)]
     method: Choice,
     /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
@@ -81,7 +84,7 @@ struct ShapeFlags {
     #[arg(long, value_name = "LIST|FILE")]
     vertices: Option<String>,
     /// Normals of the surface at given points: a file with lines `vertex nx ny nz`, or a mesh file with normals
-    /// (.off, .ply). Loop, √3 and Catmull-Clark turn rings of the mesh refined twice or more, Doo-Sabin tilts faces
+    /// (.obj, .off, .ply). Loop, √3 and Catmull-Clark turn rings of the mesh refined twice or more, Doo-Sabin tilts faces
     #[arg(long, value_name = "FILE")]
     normals: Option<PathBuf>,
     /// Turn rings only where the normal is off by more than this angle in degrees
@@ -121,6 +124,8 @@ enum Choice {
     Solver(Method),
     TwoPhase,
     Halstead,
+    /// A scheme that keeps its vertices.
+    Keeping(Refinement),
 }
 
 fn choice(text: &str) -> Result<Choice> {
@@ -128,6 +133,8 @@ fn choice(text: &str) -> Result<Choice> {
         "auto" => Ok(Choice::Auto),
         "two-phase" => Ok(Choice::TwoPhase),
         "halstead" => Ok(Choice::Halstead),
+        "butterfly" => Ok(Choice::Keeping(Refinement::Butterfly)),
+        "labsik-greiner" => Ok(Choice::Keeping(Refinement::LabsikGreiner)),
         _ => text.parse().map(Choice::Solver),
     }
 }
@@ -173,6 +180,26 @@ fn main() -> ExitCode {
             );
         }
     }
+    if let Choice::Keeping(scheme) = arguments.method {
+        let shape = &arguments.shape;
+        if arguments.mesh.scheme.is_some() {
+            conflict(&format!(
+                "--method {scheme} is a scheme of its own: leave --scheme out"
+            ));
+        }
+        if shape.vertices.is_some() || shape.normals.is_some() || shape.shape_handle.is_some() {
+            conflict(&format!(
+                "--method {scheme} passes through all vertices and takes no normals or shape handles"
+            ));
+        }
+        if shape.subdivide == 0 {
+            conflict(&format!(
+                "--method {scheme} leaves the control mesh as it is: ask for the surface with --subdivide"
+            ));
+        }
+        // Its topology is that of the scheme which is named where none is.
+        arguments.mesh.scheme = Some(Scheme::Loop);
+    }
     cli::exit(|| {
         arguments.common.apply()?;
         run(&arguments)
@@ -189,12 +216,11 @@ fn run(arguments: &Arguments) -> Result<()> {
         Error::Computation(what) | Error::Mesh { what, .. } => Error::mesh(&input.name, what),
         other => other,
     };
-    let mut result = match &wishes.alpha {
-        Some(alpha) => unified(arguments, &input, alpha).map_err(named)?,
-        None if arguments.method == Choice::Halstead => {
-            fairest(arguments, &input, &wishes).map_err(named)?
-        }
-        None => {
+    let mut result = match (&wishes.alpha, arguments.method) {
+        (Some(alpha), _) => unified(arguments, &input, alpha).map_err(named)?,
+        (None, Choice::Halstead) => fairest(arguments, &input, &wishes).map_err(named)?,
+        (None, Choice::Keeping(scheme)) => keeping(arguments, &input, scheme).map_err(named)?,
+        (None, _) => {
             let control = control_mesh(arguments, &input, &wishes)?;
             refine(arguments, &input, &wishes, control).map_err(named)?
         }
@@ -528,23 +554,52 @@ fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Fini
 /// The unified √3 surface. Its errors are the distances of the vertices with α = 1, which stay: 0.
 fn unified(arguments: &Arguments, input: &Input, alpha: &[f64]) -> Result<Finished> {
     let flags = &arguments.shape;
-    if flags.limit || flags.write_normals {
+    if flags.subdivide == 0 && !flags.limit {
         return Err(Error::Computation(
-            "the limit points and normals of the unified √3 scheme have no mask here: refine further with --subdivide \
-             instead of --limit and --write-normals"
+            "the unified √3 scheme leaves the control mesh as it is: ask for the surface with --subdivide or --limit"
                 .into(),
         ));
     }
-    if flags.subdivide == 0 {
-        return Err(Error::Computation(
-            "the unified √3 scheme leaves the control mesh as it is: ask for the surface with --subdivide".into(),
-        ));
-    }
     let start = Instant::now();
-    let (mesh, _) = lin_luo::surface::refine_n(&input.mesh, alpha, flags.subdivide.into())?;
-    Ok(Finished {
-        method: "lin-luo",
-        surface: Surface::plain(mesh),
+    let (mut mesh, alpha) = lin_luo::surface::refine_n(&input.mesh, alpha, flags.subdivide.into())?;
+    let mut normals = None;
+    if flags.limit || flags.write_normals {
+        let found = lin_luo::limit::limits(&mesh, &alpha)?;
+        normals = flags.write_normals.then_some(found.normals);
+        if flags.limit {
+            mesh.positions = found.positions;
+        }
+    }
+    let surface = Surface {
+        normals,
+        ..Surface::plain(mesh)
+    };
+    Ok(unsolved("lin-luo", input, surface, start))
+}
+
+/// The surface of a scheme that keeps its vertices.
+fn keeping(arguments: &Arguments, input: &Input, scheme: Refinement) -> Result<Finished> {
+    let flags = &arguments.shape;
+    let start = Instant::now();
+    let mesh = scheme.refine_n(&input.mesh, flags.subdivide.into())?;
+    let normals = if flags.write_normals {
+        let topology = Topology::new(&mesh.faces, mesh.len());
+        Some(scheme.limit_normals(&mesh, &topology)?)
+    } else {
+        None
+    };
+    let surface = Surface {
+        normals,
+        ..Surface::plain(mesh)
+    };
+    Ok(unsolved(scheme.name(), input, surface, start))
+}
+
+/// A surface without a system: vertices that are interpolated stay, so their errors are 0.
+fn unsolved(method: &'static str, input: &Input, surface: Surface, start: Instant) -> Finished {
+    Finished {
+        method,
+        surface,
         iterations: 0,
         status: "converged",
         errors: Errors {
@@ -558,7 +613,7 @@ fn unified(arguments: &Arguments, input: &Input, alpha: &[f64]) -> Result<Finish
             subdivide: start.elapsed().as_secs_f64(),
             ..Seconds::default()
         },
-    })
+    }
 }
 
 /// Nothing that is no number reaches a file.
@@ -613,7 +668,10 @@ fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished
     common.remark(format_args!(
         "{}: {} by {}, {} iterations, max error {:.3e}, mean {:.3e} (mesh units)",
         arguments.output.display(),
-        input.scheme,
+        match arguments.method {
+            Choice::Keeping(scheme) => scheme.name(),
+            _ => input.scheme.name(),
+        },
         result.method,
         result.iterations,
         errors.max,
@@ -628,7 +686,7 @@ fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished
     }
     let marked = |marks: &Vec<bool>| marks.iter().filter(|&&m| m).count();
     let given = |normals: &Vec<Option<DVec3>>| normals.iter().flatten().count();
-    let object = input.json(json!({
+    let mut object = input.json(json!({
         "method": result.method,
         "iterations": result.iterations,
         "status": result.status,
@@ -659,6 +717,9 @@ fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished
             "write": number(seconds.write),
         },
     }));
+    if let Choice::Keeping(scheme) = arguments.method {
+        object["scheme"] = json!(scheme.name());
+    }
     cli::print(&format!("{object:#}"))
 }
 

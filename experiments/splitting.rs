@@ -22,7 +22,7 @@ struct Arguments {
     /// Valences from A to B, both included, or a single one; within 3..100
     #[arg(long, value_name = "A..B", default_value = "3..12")]
     valence: Valences,
-    /// catmull-clark, loop, doo-sabin (at a face) or sqrt3
+    /// catmull-clark, loop, doo-sabin (at a face), sqrt3 or labsik-greiner
     #[arg(long, value_name = "NAME", default_value = "catmull-clark")]
     scheme: String,
     /// The blend of sqrt3, 0 to 2: 0 approximating (unless told), 1 interpolating

@@ -56,12 +56,11 @@ pub fn normals(path: &Path, vertices: usize) -> Result<Vec<Option<DVec3>>> {
         let rows = rows::<3>(path, vertices, "vertex nx ny nz")?;
         return Ok(rows.into_iter().map(|r| r.map(DVec3::from)).collect());
     }
-    let Some(normals) = io::read(path)?.normals else {
+    let Some(normals) = io::read_normals(path)? else {
         return Err(Error::parse(
             path,
             None,
-            "holds no normals that are read (OFF and PLY may; those of OBJ are not): use a text file with lines \
-             `vertex nx ny nz`",
+            "holds no normals: export them, or use a text file with lines `vertex nx ny nz`",
         ));
     };
     if normals.len() != vertices {
@@ -189,7 +188,7 @@ mod tests {
         let mesh = crate::mesh::builtin::tetrahedron();
         let mut given = mesh.positions.clone();
         given[2] = DVec3::ZERO;
-        for name in ["a.off", "a.ply"] {
+        for name in ["a.off", "a.ply", "a.obj"] {
             let path = folder.path().join(name);
             io::write(&path, &mesh, Some(&given)).unwrap();
             let found = normals(&path, 4).unwrap();
@@ -202,8 +201,8 @@ mod tests {
                     .contains("4 normals for a mesh of 5")
             );
         }
-        let path = folder.path().join("a.obj");
-        io::write(&path, &mesh, Some(&given)).unwrap();
+        let path = folder.path().join("plain.obj");
+        io::write(&path, &mesh, None).unwrap();
         assert!(
             normals(&path, 4)
                 .unwrap_err()

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Faces, Mesh, obj, off, ply};
+use super::{Faces, Mesh, obj, obj_normals, off, ply};
 use crate::output::write_file;
 use crate::{Error, Result};
 
@@ -21,7 +21,8 @@ pub struct Loaded {
     pub mesh: Mesh,
     /// Where each vertex and face stands; `None` for binary files.
     pub lines: Option<Lines>,
-    /// One normal a vertex, as in the file: not checked, not normalised. OFF and PLY only.
+    /// One normal a vertex, as in the file: not checked, not normalised. OFF and PLY only; for OBJ see
+    /// [`read_normals`].
     pub normals: Option<Vec<DVec3>>,
     /// What a user should know, a sentence each: above all what the file holds and the mesh does not keep.
     pub remarks: Vec<String>,
@@ -78,6 +79,21 @@ pub fn read(path: &Path) -> Result<Loaded> {
         Format::Off => off::read_bytes(&bytes, path),
         Format::Ply => ply::read_bytes(&bytes, path),
     }
+}
+
+/// Reads the normals of a mesh file, one a vertex and zero for a vertex without, as in the file; `None` if it has none.
+/// In an OBJ file all corners of a vertex must have the same.
+///
+/// # Errors
+/// As [`read`], and for OBJ: a vertex whose corners have different normals, a corner that refers to a normal which is
+/// not there.
+pub fn read_normals(path: &Path) -> Result<Option<Vec<DVec3>>> {
+    let Format::Obj = Format::of(path)? else {
+        return Ok(read(path)?.normals);
+    };
+    let bytes = fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let loaded = obj::read_bytes(&bytes, path)?;
+    obj_normals::read(&bytes, path, loaded.mesh.len())
 }
 
 /// Writes a mesh file, with `normals` (one a vertex) if given, in the format that the extension names. All doubles

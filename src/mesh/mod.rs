@@ -8,6 +8,7 @@ pub mod generate;
 pub mod io;
 pub mod noise;
 pub mod obj;
+mod obj_normals;
 pub mod off;
 pub mod order;
 pub mod ply;

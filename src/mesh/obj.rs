@@ -154,7 +154,7 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
 }
 
 /// Skips blanks, over line ends that a backslash continues.
-fn skip_blanks(s: &mut Scanner) {
+pub(super) fn skip_blanks(s: &mut Scanner) {
     s.skip_blanks();
     while let [b'\\', b'\n' | b'\r', ..] = s.rest() {
         s.advance(1);
@@ -163,7 +163,7 @@ fn skip_blanks(s: &mut Scanner) {
     }
 }
 
-fn skip_statement(s: &mut Scanner) {
+pub(super) fn skip_statement(s: &mut Scanner) {
     loop {
         let start = s.rest();
         s.skip_to_line_end();
@@ -236,6 +236,14 @@ fn corner(s: &mut Scanner, builder: &Builder) -> Result<u32> {
     let vertex = u32::try_from(vertex).map_err(|_| refuse())?;
     s.advance(token.len());
     Ok(vertex)
+}
+
+/// The numbers of the vertex and the normal of a corner `v//vn` or `v/vt/vn`; `None` without a normal.
+pub(super) fn corner_references(token: &[u8]) -> Option<(i64, i64)> {
+    let mut parts = std::str::from_utf8(token).ok()?.split('/');
+    let vertex = parts.next()?.parse().ok()?;
+    let normal = parts.nth(1)?.parse().ok()?;
+    Some((vertex, normal))
 }
 
 /// Writes `mesh` as OBJ: `v` lines, `vn` lines if there are `normals` (one a vertex), `f` lines.

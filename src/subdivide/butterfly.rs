@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::loop_scheme::split_in_four;
 use super::star::{
-    Circle, edge_numbers, next_in_triangle, prev_in_triangle, refuse, require_room,
+    Circle, Harmonics, edge_numbers, next_in_triangle, prev_in_triangle, refuse, require_room,
     require_triangles, twin,
 };
 use crate::Result;
@@ -99,27 +99,9 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
         }
         let circle = circle.of(n);
         let neighbor = |c: u32| corners[next_in_triangle(c)] as usize;
-        // The mask is a circulant of three harmonics, so its n products cost O(n): first the ring's
-        // harmonics, then their sum at each neighbour.
-        let mut mean = DVec3::ZERO;
-        let mut first = [DVec3::ZERO; 2];
-        let mut second = [DVec3::ZERO; 2];
+        let ring = Harmonics::of(star.iter().map(|&c| old[neighbor(c)]), circle, 1);
         for (j, &c) in star.iter().enumerate() {
-            let point = old[neighbor(c)];
-            let (once, twice) = (circle[j], circle[2 * j % n]);
-            mean += point;
-            first[0] += once.x * point;
-            first[1] += once.y * point;
-            second[0] += twice.x * point;
-            second[1] += twice.y * point;
-        }
-        let [a0, a1, a2] = amplitudes(n).map(|a| a / n as f64);
-        for (j, &c) in star.iter().enumerate() {
-            let (once, twice) = (circle[j], circle[2 * j % n]);
-            let point = CENTER * old[v]
-                + a0 * mean
-                + a1 * (once.x * first[0] + once.y * first[1])
-                + a2 * (twice.x * second[0] + twice.y * second[1]);
+            let point = CENTER * old[v] + ring.at(circle, j, amplitudes(n));
             let share = if regular(neighbor(c)) { 1.0 } else { 0.5 };
             edge_points[edge[c as usize] as usize] += share * point;
         }

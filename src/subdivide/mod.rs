@@ -9,9 +9,7 @@
 //! | [`sqrt3`] | Kobbelt 2000 | triangles | no |
 //! | [`unified_sqrt3`] | Lin & Luo, α per vertex | triangles | where α = 1 |
 //! | [`butterfly`] | modified Butterfly, Zorin, Schröder & Sweldens 1996 | triangles | yes |
-//!
-//! Labsik & Greiner's interpolatory √3 (2000) is missing: its regular mask, (32, −1, −2)/81 on 12 points, follows
-//! from the reproduction of cubics, but its weights at extraordinary vertices could not be established.
+//! | [`labsik_greiner`] | interpolatory √3, Labsik & Greiner 2000 | triangles | yes |
 //!
 //! Meshes are closed: an open one is refused with an [`Error::Mesh`]. A step takes time and memory
 //! proportional to the mesh, with flat arrays only: contributions are scattered to the new points in one pass
@@ -32,6 +30,7 @@
 pub mod butterfly;
 pub mod catmull_clark;
 pub mod doo_sabin;
+pub mod labsik_greiner;
 pub mod loop_scheme;
 pub mod sqrt3;
 mod star;
@@ -55,16 +54,18 @@ pub enum Refinement {
     DooSabin,
     Sqrt3,
     Butterfly,
+    LabsikGreiner,
 }
 
 impl Refinement {
     /// All of them, in the order in which messages list them.
-    pub const ALL: [Refinement; 5] = [
+    pub const ALL: [Refinement; 6] = [
         Refinement::CatmullClark,
         Refinement::Loop,
         Refinement::DooSabin,
         Refinement::Sqrt3,
         Refinement::Butterfly,
+        Refinement::LabsikGreiner,
     ];
 
     /// The name on the command line, which `parse` reads back.
@@ -75,6 +76,7 @@ impl Refinement {
             Refinement::DooSabin => "doo-sabin",
             Refinement::Sqrt3 => "sqrt3",
             Refinement::Butterfly => "butterfly",
+            Refinement::LabsikGreiner => "labsik-greiner",
         }
     }
 
@@ -93,6 +95,7 @@ impl Refinement {
             Refinement::DooSabin => doo_sabin::refine(mesh, topology),
             Refinement::Sqrt3 => sqrt3::refine(mesh, topology),
             Refinement::Butterfly => butterfly::refine(mesh, topology),
+            Refinement::LabsikGreiner => labsik_greiner::refine(mesh, topology),
         }
     }
 
@@ -112,8 +115,8 @@ impl Refinement {
         Ok(refined)
     }
 
-    /// The limit points of all vertices; under Doo-Sabin the centroids of their type-V faces, under Butterfly
-    /// the vertices themselves.
+    /// The limit points of all vertices; under Doo-Sabin the centroids of their type-V faces, under the
+    /// interpolatory schemes the vertices themselves.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).
@@ -128,8 +131,8 @@ impl Refinement {
                 doo_sabin::limit_positions(doo_sabin::Rule::DooSabin, mesh, topology)
             }
             Refinement::Sqrt3 => sqrt3::limit_positions(mesh, topology),
-            Refinement::Butterfly => {
-                star::require_triangles(mesh, topology, "butterfly")?;
+            Refinement::Butterfly | Refinement::LabsikGreiner => {
+                star::require_triangles(mesh, topology, self.name())?;
                 Ok(mesh.positions.clone())
             }
         }
@@ -139,7 +142,7 @@ impl Refinement {
     /// [`Tangents::normal`] is.
     ///
     /// # Errors
-    /// As [`refine`](Self::refine); Butterfly has no mask for them here.
+    /// As [`refine`](Self::refine); Butterfly and Labsik-Greiner have no mask for them here.
     ///
     /// # Panics
     /// If `topology` is not that of `mesh`.
@@ -151,10 +154,9 @@ impl Refinement {
                 doo_sabin::limit_normals(doo_sabin::Rule::DooSabin, mesh, topology)
             }
             Refinement::Sqrt3 => sqrt3::limit_normals(mesh, topology),
-            Refinement::Butterfly => Err(Error::Unknown(
-                "butterfly has no tangent masks here: use loop, sqrt3, catmull-clark or doo-sabin"
-                    .into(),
-            )),
+            Refinement::Butterfly | Refinement::LabsikGreiner => Err(Error::Unknown(format!(
+                "{self} has no tangent masks here: use loop, sqrt3, catmull-clark or doo-sabin"
+            ))),
         }
     }
 }

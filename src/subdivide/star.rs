@@ -185,6 +185,53 @@ impl Circle {
     }
 }
 
+/// The harmonics 0, 1 and 2 of the points of a ring, divided by their number n: a circulant mask of these harmonics
+/// is applied to the whole ring in O(n).
+pub(crate) struct Harmonics {
+    mean: DVec3,
+    once: [DVec3; 2],
+    twice: [DVec3; 2],
+}
+
+impl Harmonics {
+    /// Of points at every `stride`-th place of `circle`.
+    pub(crate) fn of(
+        ring: impl ExactSizeIterator<Item = DVec3>,
+        circle: &[DVec2],
+        stride: usize,
+    ) -> Self {
+        let share = 1.0 / ring.len() as f64;
+        let mut found = Harmonics {
+            mean: DVec3::ZERO,
+            once: [DVec3::ZERO; 2],
+            twice: [DVec3::ZERO; 2],
+        };
+        for (j, point) in ring.enumerate() {
+            let point = share * point;
+            let [once, twice] = places(circle, stride * j);
+            found.mean += point;
+            found.once[0] += once.x * point;
+            found.once[1] += once.y * point;
+            found.twice[0] += twice.x * point;
+            found.twice[1] += twice.y * point;
+        }
+        found
+    }
+
+    /// The blend with these amplitudes, symmetric about `place` of the circle.
+    pub(crate) fn at(&self, circle: &[DVec2], place: usize, amplitudes: [f64; 3]) -> DVec3 {
+        let [once, twice] = places(circle, place);
+        amplitudes[0] * self.mean
+            + amplitudes[1] * (once.x * self.once[0] + once.y * self.once[1])
+            + amplitudes[2] * (twice.x * self.twice[0] + twice.y * self.twice[1])
+    }
+}
+
+/// A place on the circle, and that of twice its angle.
+fn places(circle: &[DVec2], place: usize) -> [DVec2; 2] {
+    [circle[place], circle[2 * place % circle.len()]]
+}
+
 /// Two vectors that span the tangent plane of a limit surface at a point: the tangent masks (left eigenvectors
 /// of the subdominant eigenvalue) applied to the control points, cosine first. Their lengths have no meaning
 /// beyond the mask's own scale; on a regular star they are perpendicular and of the same length.
@@ -202,6 +249,16 @@ impl Tangents {
         self.cosine += weights.x * vector;
         self.sine += weights.y * vector;
         self.reach += weights.length() * vector.length();
+    }
+
+    /// Those of a ring in counter-clockwise order about the origin: (cos, sin)(2πj/n) on its points.
+    pub(crate) fn of_ring(ring: &[DVec3]) -> Self {
+        let step = TAU / ring.len() as f64;
+        let mut pair = Tangents::default();
+        for (j, &point) in ring.iter().enumerate() {
+            pair.add(DVec2::from_angle(step * j as f64), point);
+        }
+        pair
     }
 
     /// The unit normal `cosine × sine`: outward where faces are counter-clockwise seen from outside. The zero

@@ -2,6 +2,7 @@
 
 mod halstead;
 mod lin_luo;
+mod lin_luo_limits;
 mod program;
 mod thall;
 mod zheng_cai;

@@ -251,8 +251,12 @@ fn failures_say_what_is_wrong_and_write_nothing() {
         ),
         ("icosahedron --alpha 1".into(), "--subdivide"),
         (
-            "icosahedron --alpha 1 --subdivide 2 --limit".into(),
-            "no mask",
+            "icosahedron --method butterfly --subdivide 2 --write-normals".into(),
+            "no tangent masks",
+        ),
+        (
+            "cube --method labsik-greiner --subdivide 2".into(),
+            "face 0 has 4 corners",
         ),
         (
             "icosahedron --vertices 12".into(),
@@ -308,12 +312,46 @@ fn failures_say_what_is_wrong_and_write_nothing() {
         "icosahedron --alpha 1 --scheme loop --subdivide 1",
         "icosahedron --alpha 1 --normals n.txt",
         "icosahedron --method two-phase --scheme loop",
+        "icosahedron --method labsik-greiner",
+        "icosahedron --method butterfly --scheme loop --subdivide 2",
+        "icosahedron --method butterfly --vertices 1 --subdivide 2",
         "icosahedron --method halstead --subdivide 1",
         "icosahedron --method halstead --vertices 1",
         "icosahedron --normal-levels 2",
         "icosahedron --subdivide 13",
     ] {
         bench.fail(arguments, 2);
+    }
+}
+
+/// The limit of the unified scheme, pushed to from any level, and the schemes that need no system.
+#[test]
+fn surfaces_without_a_system_pass_through_the_points() {
+    let bench = Bench::new();
+    let given = with_noise("icosphere:1");
+    let alpha = "icosphere:1 --noise 0.1 --alpha 0.25 --vertices 4,5 --limit --write-normals";
+    let (_, coarse) = bench.run(alpha);
+    let (_, fine) = bench.run(&format!("{alpha} --subdivide 2"));
+    let n = given.len();
+    assert_eq!(coarse.mesh.faces, given.faces);
+    assert!(distance(&coarse.mesh.positions, &fine.mesh.positions[..n]) < ROUNDING);
+    assert!(coarse.mesh.positions[4..6] == given.positions[4..6]);
+    assert!(coarse.mesh.positions[3].distance(given.positions[3]) > 1e-3);
+    let normals = coarse.normals.unwrap();
+    assert!(distance(&normals, &fine.normals.unwrap()[..n]) < 1e-9);
+    for (name, scheme) in [
+        ("butterfly", Refinement::Butterfly),
+        ("labsik-greiner", Refinement::LabsikGreiner),
+    ] {
+        let (json, loaded) = bench.run(&format!(
+            "icosphere:1 --noise 0.1 --method {name} --subdivide 2 --limit"
+        ));
+        assert_eq!(
+            (&json["scheme"], &json["method"]),
+            (&name.into(), &name.into())
+        );
+        assert_eq!(loaded.mesh, scheme.refine_n(&given, 2).unwrap());
+        assert_eq!(loaded.mesh.positions[..n], given.positions);
     }
 }
 

@@ -6,9 +6,10 @@ use limitlab::analysis::splitting::{LocalScheme, Net, SplittingMatrix, character
 use crate::{EIGEN, SCHEMES};
 
 const VALENCES: [usize; 8] = [3, 4, 5, 6, 7, 8, 12, 50];
-const BLENDS: [LocalScheme; 2] = [
+const BLENDS: [LocalScheme; 3] = [
     LocalScheme::Sqrt3 { alpha: 0.5 },
     LocalScheme::Sqrt3 { alpha: 1.0 },
+    LocalScheme::LabsikGreiner,
 ];
 
 fn map(scheme: LocalScheme, n: usize) -> Net {

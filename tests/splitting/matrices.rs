@@ -5,10 +5,11 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::{EIGEN, ROUNDING, SCHEMES};
 
-const BLENDS: [LocalScheme; 3] = [
+const BLENDS: [LocalScheme; 4] = [
     LocalScheme::Sqrt3 { alpha: 0.5 },
     LocalScheme::Sqrt3 { alpha: 1.0 },
     LocalScheme::Sqrt3 { alpha: 1.5 },
+    LocalScheme::LabsikGreiner,
 ];
 
 #[test]

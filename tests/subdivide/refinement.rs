@@ -10,7 +10,10 @@ use crate::meshes::*;
 fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
     match scheme {
         Refinement::CatmullClark | Refinement::DooSabin => polygon_meshes(),
-        Refinement::Loop | Refinement::Sqrt3 | Refinement::Butterfly => triangle_meshes(),
+        Refinement::Loop
+        | Refinement::Sqrt3
+        | Refinement::Butterfly
+        | Refinement::LabsikGreiner => triangle_meshes(),
     }
 }
 
@@ -53,7 +56,7 @@ fn counts_and_topology_after_each_step() {
                     Refinement::CatmullClark => (v + e + f, c),
                     Refinement::Loop | Refinement::Butterfly => (v + e, 4 * f),
                     Refinement::DooSabin => (c, f + e + v),
-                    Refinement::Sqrt3 => (v + f, c),
+                    Refinement::Sqrt3 | Refinement::LabsikGreiner => (v + f, c),
                 };
                 assert_eq!((fine.len(), fine.faces.len()), expected, "{scheme} {level}");
                 assert_manifold(&fine, euler);
@@ -97,6 +100,7 @@ fn faces_are_numbered_as_documented() {
     assert_eq!(refine(Refinement::Loop).face(3), [4, 5, 6]);
     assert_eq!(refine(Refinement::Butterfly), refine(Refinement::Loop));
     assert_eq!(refine(Refinement::Sqrt3).face(1), [1, 4 + 1, 4]);
+    assert_eq!(refine(Refinement::LabsikGreiner), refine(Refinement::Sqrt3));
     let doo_sabin = refine(Refinement::DooSabin);
     assert_eq!(doo_sabin.face(1), [3, 4, 5]);
     assert_eq!(doo_sabin.face(4 + 1), [2, 1, 4, 3]);
@@ -318,7 +322,12 @@ fn meshes_that_cannot_be_refined_are_refused_with_their_place() {
         assert!(message(scheme, &lonely).contains("vertex 4 belongs to no face"));
         assert!(message(scheme, &turned).contains("in the same direction"));
     }
-    for scheme in [Refinement::Loop, Refinement::Sqrt3, Refinement::Butterfly] {
+    for scheme in [
+        Refinement::Loop,
+        Refinement::Sqrt3,
+        Refinement::Butterfly,
+        Refinement::LabsikGreiner,
+    ] {
         let text = message(scheme, &pyramid(5));
         assert!(text.contains("face 0 has 5 corners") && text.contains(scheme.name()));
     }
@@ -340,7 +349,9 @@ fn meshes_that_cannot_be_refined_are_refused_with_their_place() {
         vec![DVec3::ZERO, DVec3::X, DVec3::Y],
         Faces::from_lists([[0, 1, 2], [0, 2, 1]]),
     );
-    assert!(message(Refinement::Butterfly, &pillow).contains("vertex 0 has valence 2"));
+    for scheme in [Refinement::Butterfly, Refinement::LabsikGreiner] {
+        assert!(message(scheme, &pillow).contains("vertex 0 has valence 2"));
+    }
     assert!(Refinement::Loop.refine_n(&pillow, 1).is_ok());
 }
 

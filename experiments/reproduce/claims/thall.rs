@@ -521,25 +521,33 @@ fn first_iterations(lab: &Lab) -> Result<Finding> {
         runs.iter()
             .map(move |r| r.get(k).copied().unwrap_or(f64::NAN))
     };
-    let mut evidence = vec![Evidence::at_most(
-        "median over the meshes of the largest error after 2 iterations, over L",
-        median(after(2).collect()),
-        0.02,
-    )];
-    for k in [0, 1, 3] {
+    // How much of the error an iteration leaves, at worst.
+    let left = |k: usize| largest(after(k).zip(after(k - 1)).map(|(now, before)| now / before));
+    let mut evidence: Vec<Evidence> = (1..=3)
+        .map(|k| {
+            Evidence::below(
+                format!("largest error after iteration {k} over the one before, worst mesh"),
+                left(k),
+                1.0,
+            )
+        })
+        .collect();
+    for k in 0..=3 {
         evidence.push(Evidence::shown(
-            format!("the same after {k}"),
+            format!("largest error over L after {k}, median mesh"),
             median(after(k).collect()),
         ));
+        evidence.push(Evidence::shown(
+            format!("largest error over L after {k}, worst mesh"),
+            largest(after(k)),
+        ));
     }
-    evidence.push(Evidence::shown(
-        "largest after 2 on any mesh",
-        largest(after(2)),
-    ));
     evidence.push(Evidence::shown("meshes", runs.len()));
-    Ok(Finding::reproduced(evidence)
-        .remark("The paper gives no number; good is read as two percent of L, the diagonal of the bounding box, on the median mesh. \
-         The largest error shows that not every mesh is done so soon."))
+    Ok(Finding::settled(evidence).remark(
+        "The paper has no number for a good approximation, so none is held against these: whether one or two iterations \
+         are enough is for the reader's tolerance. What it does say, that the approximations are successively closer \
+         (§2.1), is tested. L is the diagonal of the bounding box.",
+    ))
 }
 
 fn linear_time(_: &Lab) -> Result<Finding> {

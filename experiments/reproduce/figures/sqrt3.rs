@@ -21,24 +21,30 @@ fn refined(mesh: &Mesh, alpha: &[f64], steps: usize) -> Result<Mesh> {
 
 /// An even number of steps, after which the original edges are back, up to [`FACES`] triangles.
 fn surface(mesh: &Mesh, alpha: &[f64]) -> Result<Surface> {
+    Ok(Surface::smooth(refined(mesh, alpha, steps(mesh))?))
+}
+
+fn steps(mesh: &Mesh) -> usize {
     let mut steps = 2;
     while steps < 8 && mesh.faces.len() * 3_usize.pow(steps as u32 + 2) <= FACES {
         steps += 2;
     }
-    Ok(Surface::smooth(refined(mesh, alpha, steps)?))
+    steps
 }
 
-/// Fig. 5: modified Butterfly and the interpolatory √3 scheme.
+/// Fig. 5: modified Butterfly and the interpolatory √3 scheme, and beside them Labsik and Greiner's.
 pub fn against_butterfly(album: &mut Album) -> Result<()> {
     let subject = album.subject("closed/bob_small_250v.off", "tri-torus:12x7")?;
     let mesh = &subject.mesh;
     let view = view(DVec3::Y, 35.0, 20.0);
     let butterfly = Surface::smooth(Refinement::Butterfly.refine_n(mesh, 4)?);
     let ours = surface(mesh, &vec![1.0; mesh.len()])?;
+    let earlier = Surface::smooth(Refinement::LabsikGreiner.refine_n(mesh, steps(mesh))?);
     let shown = [
         ("(a) the mesh", cage(mesh, GIVEN)),
         ("(b) modified Butterfly", butterfly),
         ("(c) interpolatory √3", ours),
+        ("Labsik-Greiner √3", earlier),
     ];
     let panels = shown
         .map(|(caption, surface)| {
@@ -49,12 +55,13 @@ pub fn against_butterfly(album: &mut Album) -> Result<()> {
         .to_vec();
     let line = Line {
         name: "lin-luo-5",
-        shows: "Lin-Luo Fig. 5: a mesh with a hole by modified Butterfly and by the interpolatory √3 scheme (α = 1)",
+        shows: "Lin-Luo Fig. 5: a mesh with a hole by modified Butterfly and by the interpolatory √3 scheme (α = 1), with \
+                Labsik and Greiner's beside",
         subject: &subject,
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet(3, (170, 165), panels))
+    album.add(&line, &sheet(4, (135, 131), panels))
 }
 
 /// Fig. 6: a bunny under the interpolatory √3 scheme, step by step.

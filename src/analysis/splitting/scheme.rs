@@ -9,7 +9,7 @@ use super::star::Layout;
 use crate::error::{Error, Result};
 use crate::mesh::{Mesh, Topology};
 use crate::subdivide::unified_sqrt3::{self, ALPHA_RANGE};
-use crate::subdivide::{catmull_clark, doo_sabin, loop_scheme, sqrt3};
+use crate::subdivide::{catmull_clark, doo_sabin, labsik_greiner, loop_scheme, sqrt3};
 
 /// Valences of local matrices. Below 3 a star is degenerate; the matrices are dense, and the largest (three rings
 /// of quads) has 12n+1 rows.
@@ -26,10 +26,13 @@ pub enum LocalScheme {
     Sqrt3 {
         alpha: f64,
     },
+    /// The interpolatory √3 scheme of Labsik & Greiner, two steps turned back as of `Sqrt3`.
+    LabsikGreiner,
 }
 
 impl LocalScheme {
-    /// The scheme called `name`, one of `catmull-clark`, `loop`, `doo-sabin`, `sqrt3`; only the last takes an `alpha`.
+    /// The scheme called `name`, one of `catmull-clark`, `loop`, `doo-sabin`, `sqrt3`, `labsik-greiner`; only `sqrt3`
+    /// takes an `alpha`.
     ///
     /// # Errors
     /// [`Error::Unknown`] for another name, an `alpha` outside [`ALPHA_RANGE`], or one for a scheme without.
@@ -41,9 +44,11 @@ impl LocalScheme {
             "sqrt3" => LocalScheme::Sqrt3 {
                 alpha: alpha.unwrap_or(0.0),
             },
+            "labsik-greiner" => LocalScheme::LabsikGreiner,
             _ => {
                 return Err(Error::Unknown(format!(
-                    "no splitting matrix for {name:?}: choose one of catmull-clark, loop, doo-sabin, sqrt3"
+                    "no splitting matrix for {name:?}: choose one of catmull-clark, loop, doo-sabin, sqrt3, \
+                     labsik-greiner"
                 )));
             }
         };
@@ -69,6 +74,7 @@ impl LocalScheme {
             LocalScheme::Loop => "loop",
             LocalScheme::DooSabin => "doo-sabin",
             LocalScheme::Sqrt3 { .. } => "sqrt3",
+            LocalScheme::LabsikGreiner => "labsik-greiner",
         }
     }
 
@@ -76,15 +82,18 @@ impl LocalScheme {
     pub fn layout(self) -> Layout {
         match self {
             LocalScheme::CatmullClark => Layout::Quads,
-            LocalScheme::Loop | LocalScheme::Sqrt3 { .. } => Layout::Triangles,
+            LocalScheme::Loop | LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => {
+                Layout::Triangles
+            }
             LocalScheme::DooSabin => Layout::QuadsAboutFace,
         }
     }
 
-    /// The fewest rings on which the local matrix closes: 1, but 3 for the blend with α ≠ 0.
+    /// The fewest rings on which the local matrix closes: 1, but 3 for the blend with α ≠ 0 and Labsik-Greiner.
     pub fn least_rings(self) -> usize {
         match self {
             LocalScheme::Sqrt3 { alpha } if alpha != 0.0 => 3,
+            LocalScheme::LabsikGreiner => 3,
             _ => 1,
         }
     }
@@ -96,10 +105,12 @@ impl LocalScheme {
 
     /// How much finer the mesh becomes in one round: a 1-to-k² split.
     pub(super) fn factor(self) -> usize {
-        match self {
-            LocalScheme::Sqrt3 { .. } => 3,
-            _ => 2,
-        }
+        if self.turns() { 3 } else { 2 }
+    }
+
+    /// Whether a step turns the star by half a sector, so that a round is two steps.
+    fn turns(self) -> bool {
+        matches!(self, LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner)
     }
 
     /// # Errors
@@ -126,6 +137,7 @@ impl LocalScheme {
                 let (mesh, _) = unified_sqrt3::refine(mesh, topology, &vec![alpha; mesh.len()])?;
                 Ok(mesh)
             }
+            LocalScheme::LabsikGreiner => labsik_greiner::refine(mesh, topology),
         }
     }
 
@@ -135,13 +147,14 @@ impl LocalScheme {
             LocalScheme::CatmullClark => 4 * root,
             LocalScheme::Loop => 12 * (root / 3) + 3 * (root % 3),
             LocalScheme::DooSabin => root,
-            LocalScheme::Sqrt3 { .. } => 3 * root,
+            LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => 3 * root,
         }
     }
 
     /// The subdominant eigenvalue λ_1 = λ_2 in closed form; none for the blend with α ≠ 0.
     ///
-    /// Catmull-Clark (4 + A_n)/16 (Thall Eq. 15), Loop 3/8 + ¼cos(2π/n), Doo-Sabin ½, √3 (⅔cos(π/n))².
+    /// Catmull-Clark (4 + A_n)/16 (Thall Eq. 15), Loop 3/8 + ¼cos(2π/n), Doo-Sabin ½, √3 and Labsik-Greiner
+    /// (⅔cos(π/n))².
     ///
     /// ```
     /// use limitlab::analysis::splitting::LocalScheme;
@@ -156,10 +169,12 @@ impl LocalScheme {
             LocalScheme::DooSabin => Some(0.5),
             LocalScheme::Sqrt3 { alpha: 0.0 } => Some((2.0 / 3.0 * (PI / n as f64).cos()).powi(2)),
             LocalScheme::Sqrt3 { .. } => None,
+            LocalScheme::LabsikGreiner => Some(labsik_greiner::subdominant(n).powi(2)),
         }
     }
 
-    /// All eigenvalues on one ring in closed form, by Fourier block, largest first; none for the blend with α ≠ 0.
+    /// All eigenvalues on one ring in closed form, by Fourier block, largest first; none for schemes that do not close
+    /// on one ring.
     ///
     /// With c_k = cos(2πk/n): Catmull-Clark (5 + c_k ± cos(πk/n)√(2(9+c_k)))/16 for 0 < k < n, and beside 1 the
     /// roots of μ² − (3n−7)/(4n) μ + (n−3)/(16n); Loop 3/8 + ¼c_k, and (3/8 + ¼c_1)²; Doo-Sabin 1, ½, ½, ¼, …;
@@ -195,7 +210,7 @@ impl LocalScheme {
                 all.push((2.0 / 3.0 - sqrt3::relaxation(n)).powi(2));
                 all.extend((1..n).map(|k| (2.0 / 3.0 * half(k)).powi(2)));
             }
-            LocalScheme::Sqrt3 { .. } => return None,
+            LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => return None,
         }
         let mut all: Vec<_> = all.into_iter().map(Complex::from).collect();
         super::spectrum::sort(&mut all);
@@ -210,13 +225,13 @@ impl LocalScheme {
             LocalScheme::Loop => Some(loop_scheme::limit_mask(n).to_vec()),
             LocalScheme::DooSabin => Some(vec![1.0 / n as f64]),
             LocalScheme::Sqrt3 { alpha: 0.0 } => Some(sqrt3::limit_mask(n).to_vec()),
-            LocalScheme::Sqrt3 { alpha: 1.0 } => Some(vec![1.0, 0.0]),
+            LocalScheme::Sqrt3 { alpha: 1.0 } | LocalScheme::LabsikGreiner => Some(vec![1.0, 0.0]),
             LocalScheme::Sqrt3 { .. } => None,
         }
     }
 
     /// The weights of the cosine tangent mask in closed form, orbit by orbit on one ring (the sine mask has sines in
-    /// their place); none for the blend with α ≠ 0.
+    /// their place); none for schemes that do not close on one ring.
     pub(super) fn cosine_mask_formula(self, n: usize) -> Option<Vec<f64>> {
         let ring = || (0..n).map(|j| (TAU * j as f64 / n as f64).cos());
         match self {
@@ -229,7 +244,7 @@ impl LocalScheme {
             LocalScheme::Loop | LocalScheme::Sqrt3 { alpha: 0.0 } => {
                 Some([0.0].into_iter().chain(ring()).collect())
             }
-            LocalScheme::Sqrt3 { .. } => None,
+            LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => None,
         }
     }
 }
@@ -256,11 +271,7 @@ impl Round {
     /// of `rings` rings in the result. For √3 the two steps turn the star clockwise by one sector; the walk starts
     /// one sector further on, which is R.
     pub(super) fn new(scheme: LocalScheme, mesh: &Mesh, n: usize, rings: usize) -> Result<Self> {
-        let steps = if matches!(scheme, LocalScheme::Sqrt3 { .. }) {
-            2
-        } else {
-            1
-        };
+        let steps = if scheme.turns() { 2 } else { 1 };
         let mut refined = mesh.clone();
         let mut root = 0;
         let mut topologies = Vec::with_capacity(steps);

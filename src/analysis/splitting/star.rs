@@ -140,7 +140,7 @@ impl Layout {
     }
 
     /// The disc and one vertex more, joined to the outermost ring, which makes it a closed mesh.
-    pub(super) fn closed(self, n: usize, rings: usize) -> Faces {
+    pub fn closed(self, n: usize, rings: usize) -> Faces {
         let mut faces = self.faces(n, rings);
         let apex = self.len(n, rings) as u32;
         let ring = self.boundary(n, rings);
@@ -181,7 +181,7 @@ impl Layout {
     ///
     /// # Errors
     /// [`Error::Computation`] if the walk meets a boundary.
-    pub(super) fn walk(
+    pub fn walk(
         self,
         faces: &Faces,
         topology: &Topology,
