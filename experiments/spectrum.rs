@@ -14,8 +14,11 @@ use limitlab::analysis::eigen::End;
 use limitlab::analysis::promise::{Counts, Promise};
 use limitlab::analysis::radius::{SpectralRadius, spectral_radius};
 use limitlab::analysis::singularity::{Mode, Singularity, modes};
-use limitlab::analysis::spectrum::{Ends, Extremes, Operator, Spectrum, ends, excited};
+use limitlab::analysis::spectrum::{
+    Ends, Estimate, Extremes, Operator, Spectrum, excited, mesh_ends,
+};
 use limitlab::assemble::LimitSystem;
+use limitlab::assemble::bounds::SpectralBounds;
 use limitlab::cli::{
     self, CommonFlags, Input, MeshFlags, OutputFlags, Progress, StopFlags, number,
 };
@@ -45,6 +48,9 @@ struct Arguments {
     /// Leave out the spectral radii of Gauss-Seidel, SOR and SSOR, which take the longest on large meshes
     #[arg(long)]
     no_sweeps: bool,
+    /// Leave out what part of the spectra the points excite
+    #[arg(long)]
+    no_data: bool,
     #[command(flatten)]
     mesh: MeshFlags,
     #[command(flatten)]
@@ -74,7 +80,7 @@ fn main() -> ExitCode {
 
 /// All that is known of one mesh.
 struct Findings {
-    system: LimitSystem,
+    bounds: SpectralBounds,
     ends: Ends,
     full: Option<dense::Eigenvalues>,
     sweeps: Vec<(Method, f64, SpectralRadius)>,
@@ -162,20 +168,25 @@ fn run(arguments: &Arguments) -> Result<()> {
 }
 
 fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
-    let system = input.system()?;
     let with_name = |e: limitlab::Error| limitlab::Error::mesh(&input.name, e.to_string());
+    // Only some of what can be asked for needs entries.
+    let explicit =
+        arguments.full || !arguments.no_sweeps || arguments.modes > 0 || arguments.certify;
+    let system = explicit.then(|| input.system()).transpose()?;
+    let operator =
+        limitlab::assemble::Operator::new(&input.mesh.faces, &input.topology, input.scheme)
+            .map_err(with_name)?;
     let progress = Progress::new(&input.name, 5, arguments.common.quiet);
     let verdict = Singularity::detect(&input.mesh, &input.topology, input.scheme);
-    let promise = Promise::new(&system);
+    let promise = Promise::new(&operator.bounds());
     let tolerance = arguments.stop.stop(&input.mesh).tolerance;
-    let counts = promise.counts(&system, &input.mesh.positions, tolerance);
-    let full = if arguments.full {
-        Some(dense::full_eigenvalues(&system).map_err(with_name)?)
-    } else {
-        None
+    let counts = promise.counts(&operator, &input.mesh.positions, tolerance);
+    let full = match &system {
+        Some(system) if arguments.full => Some(dense::full_eigenvalues(system).map_err(with_name)?),
+        _ => None,
     };
     progress.step();
-    let ends = ends(&system).map_err(with_name)?;
+    let ends = mesh_ends(&input.mesh, &input.topology, input.scheme).map_err(with_name)?;
     if !ends.converged() {
         arguments.common.remark(format_args!(
             "{}: an end of the spectrum is the edge of a dense band; its error is in the table",
@@ -183,37 +194,43 @@ fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
         ));
     }
     progress.step();
-    let sweeps = if arguments.no_sweeps {
-        Vec::new()
-    } else {
-        radii_of_sweeps(&system).map_err(with_name)?
+    let sweeps = match &system {
+        Some(system) if !arguments.no_sweeps => radii_of_sweeps(system).map_err(with_name)?,
+        _ => Vec::new(),
     };
     progress.step();
     let points = &input.mesh.positions;
-    let data = [
-        excited(&system, points, Operator::A).map_err(with_name)?,
-        excited(&system, points, Operator::Jacobi).map_err(with_name)?,
-    ];
-    let modes = match arguments.modes {
-        0 => Vec::new(),
-        k => modes(&system, Operator::A, End::Lowest, k.into()).map_err(with_name)?,
+    let data = if arguments.no_data {
+        [None; 2]
+    } else {
+        [
+            excited(&operator, points, Operator::A).map_err(with_name)?,
+            excited(&operator, points, Operator::Jacobi).map_err(with_name)?,
+        ]
+    };
+    let modes = match &system {
+        Some(system) if arguments.modes > 0 => {
+            let count = arguments.modes.into();
+            modes(system, Operator::A, End::Lowest, count).map_err(with_name)?
+        }
+        _ => Vec::new(),
     };
     progress.step();
     let mut certificates = [None; 4];
-    if arguments.certify {
+    if let Some(system) = system.as_ref().filter(|_| arguments.certify) {
         let Spectrum { a, jacobi } = ends.spectrum();
-        for (slot, (operator, end, estimate)) in certificates.iter_mut().zip([
+        for (slot, (which, end, estimate)) in certificates.iter_mut().zip([
             (Operator::A, End::Lowest, a.min),
             (Operator::A, End::Highest, a.max),
             (Operator::Jacobi, End::Lowest, jacobi.min),
             (Operator::Jacobi, End::Highest, jacobi.max),
         ]) {
-            *slot = certify(&system, operator, end, estimate).map_err(with_name)?;
+            *slot = certify(system, which, end, estimate).map_err(with_name)?;
         }
     }
     progress.step();
     Ok(Findings {
-        system,
+        bounds: operator.bounds(),
         ends,
         full,
         sweeps,
@@ -249,6 +266,8 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
             Column::number("residual", 1e3, 2).floor(1e-6),
             Column::number("error", 1e3, 2).floor(1e-6),
             Column::text("source"),
+            Column::count("multiplicity"),
+            Column::number("equal_within", 1e-3, 1),
             Column::number("proven_bound", 1e-9, 10),
             Column::number("certified", 1e-6, 10),
             Column::number("excited_by_data", 1e-3, 6),
@@ -288,7 +307,8 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
     table.note(format!(
         "`residual` is ‖Sx − λx‖₂ of the symmetric matrix similar to A or D⁻¹A: an eigenvalue lies that close. `error` \
          estimates the error of the value as the end of the spectrum. {} products of a matrix with a vector were made. \
-         `proven_bound` follows from valences and face sizes alone; `certified` from a Cholesky factorization \
+         `multiplicity` counts the eigenvalues that equal this \
+         end up to `equal_within`, relative, where that was decided. `proven_bound` follows from valences and face sizes alone; `certified` from a Cholesky factorization \
          (--certify). ω of Jacobi is safe below {:.6} by proof, below {:.6} by the spectrum; of W-PIA below {:.6}.",
         found.ends.applications,
         found.promise.safe_omega_jacobi,
@@ -302,7 +322,7 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
         promised(found.counts.thall),
         promised(found.counts.chebyshev)
     ));
-    let b = &found.system.bounds;
+    let b = &found.bounds;
     let e = &found.ends;
     let data = |k: usize, low: bool| found.data[k].map(|d| if low { d.min } else { d.max });
     for (k, (name, estimate, bound, excited)) in [
@@ -330,6 +350,8 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
             estimate.residual.into(),
             estimate.error.into(),
             estimate.source.name().into(),
+            estimate.multiplicity.map(|m| m.count).into(),
+            estimate.multiplicity.map(|m| m.within).into(),
             bound.into(),
             found.certificates[k].map(|c| c.bound).into(),
             excited.into(),
@@ -433,6 +455,10 @@ fn histogram(input: &Input, full: &dense::Eigenvalues, promise: &Promise) -> Fig
 fn json(input: &Input, found: &Findings) -> Value {
     let e = &found.ends;
     let Spectrum { a, jacobi } = found.spectrum();
+    let multiplicity = |e: Estimate| {
+        e.multiplicity
+            .map(|m| json!({ "count": m.count, "within": m.within }))
+    };
     let mut rho = Map::new();
     for (method, _, value) in found.radii() {
         rho.insert(method.into(), number(value));
@@ -440,16 +466,28 @@ fn json(input: &Input, found: &Findings) -> Value {
     let mut object = json!({
         "lambda_min": number(e.lambda_min.value),
         "lambda_max": number(e.lambda_max.value),
-        "lambda_min_bound": number(found.system.bounds.lambda_min),
+        "lambda_min_bound": number(found.bounds.lambda_min),
         "jacobi_lambda_min": number(e.jacobi_lambda_min.value),
         "jacobi_lambda_max": number(e.jacobi_lambda_max.value),
-        "jacobi_lambda_min_bound": number(found.system.bounds.jacobi_lambda_min),
-        "jacobi_lambda_max_bound": number(found.system.bounds.jacobi_lambda_max),
+        "jacobi_lambda_min_bound": number(found.bounds.jacobi_lambda_min),
+        "jacobi_lambda_max_bound": number(found.bounds.jacobi_lambda_max),
         "residuals": {
             "lambda_min": number(e.lambda_min.residual),
             "lambda_max": number(e.lambda_max.residual),
             "jacobi_lambda_min": number(e.jacobi_lambda_min.residual),
             "jacobi_lambda_max": number(e.jacobi_lambda_max.residual),
+        },
+        "multiplicities": {
+            "lambda_min": multiplicity(e.lambda_min),
+            "lambda_max": multiplicity(e.lambda_max),
+            "jacobi_lambda_min": multiplicity(e.jacobi_lambda_min),
+            "jacobi_lambda_max": multiplicity(e.jacobi_lambda_max),
+        },
+        "sources": {
+            "lambda_min": e.lambda_min.source.name(),
+            "lambda_max": e.lambda_max.source.name(),
+            "jacobi_lambda_min": e.jacobi_lambda_min.source.name(),
+            "jacobi_lambda_max": e.jacobi_lambda_max.source.name(),
         },
         "converged": e.converged(),
         "applications": e.applications,

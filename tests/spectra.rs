@@ -4,13 +4,14 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
+use limitlab::analysis::bracket::{bracket, element_bound};
 use limitlab::analysis::certificate::{certify, eigenvalues_below};
 use limitlab::analysis::eigen::{End, Request, extreme};
 use limitlab::analysis::order_study::{gauss_southwell, order_study, random_spread};
 use limitlab::analysis::promise::Promise;
 use limitlab::analysis::radius::spectral_radius;
 use limitlab::analysis::singularity::{Prediction, Singularity, modes, numerical_kernel_dimension};
-use limitlab::analysis::spectrum::{Operator, Source, ends, symmetric};
+use limitlab::analysis::spectrum::{Operator, Source, ends, mesh_ends, symmetric};
 use limitlab::analysis::valence_study::{regular_band, valence_study};
 use limitlab::analysis::{comparison, dense};
 use limitlab::assemble::{LimitSystem, Scheme};
@@ -169,6 +170,225 @@ fn clusters_on_spheres_agree_with_dense_eigenvalues() {
     }
 }
 
+/// A torus with as many equal defects, half a turn apart both ways: a quad with a cube on it, or a triangle with a
+/// vertex in it.
+fn torus_with_defects(scheme: Scheme, n: usize, defects: usize) -> Mesh {
+    let plain = torus(scheme, n, n);
+    let mut lists: Vec<Vec<u32>> = plain.faces.iter().map(<[u32]>::to_vec).collect();
+    let mut positions = plain.positions.clone();
+    for k in 0..defects {
+        let first = k * (n / 2) * (n + 1);
+        let begins = |f: &Vec<u32>| f[0] as usize == first;
+        let face = lists.iter().position(begins).expect("a face begins there");
+        let bottom = lists[face].clone();
+        let m = bottom.len();
+        let new = positions.len() as u32;
+        if scheme.needs_triangles() {
+            positions.push(positions[first]);
+            lists[face] = vec![bottom[0], bottom[1], new];
+            lists.extend([1, 2].map(|s| vec![bottom[s], bottom[(s + 1) % m], new]));
+        } else {
+            positions.extend(bottom.iter().map(|&v| plain.positions[v as usize]));
+            let top = |s: usize| new + (s % m) as u32;
+            lists[face] = (0..m).map(top).collect();
+            lists.extend((0..m).map(|s| vec![bottom[s], bottom[(s + 1) % m], top(s + 1), top(s)]));
+        }
+    }
+    Mesh::new(positions, Faces::from_lists(&lists))
+}
+
+#[test]
+fn brackets_hold_the_ends_and_count_them() {
+    let mut closed = Vec::new();
+    for scheme in [Scheme::CatmullClark, Scheme::Loop, Scheme::Sqrt3] {
+        let one = torus_with_defects(scheme, 30, 1);
+        let mut meshes = vec![("apart", generate::union(&[one.clone(), one]))];
+        if scheme == Scheme::CatmullClark {
+            meshes.push(("together", torus_with_defects(scheme, 42, 2)));
+        }
+        for (kind, mesh) in meshes {
+            let topology = Topology::new(&mesh.faces, mesh.len());
+            assert!(topology.is_closed() && topology.euler_characteristic(&mesh.faces) == 0);
+            let all = dense::full_eigenvalues(&assemble(&mesh, scheme)).expect("below the limit");
+            for (operator, values) in [(Operator::A, &all.a), (Operator::Jacobi, &all.jacobi)] {
+                for end in [End::Lowest, End::Highest] {
+                    let found = bracket(&mesh.faces, &topology, scheme, operator, end, 1e-9)
+                        .expect("finite numbers");
+                    let Some(found) = found else { continue };
+                    closed.push((scheme, kind, operator, end, found.width));
+                    let name = format!("{scheme}, {kind}, {operator:?} {end:?}: {found:?}");
+                    let outwards = match end {
+                        End::Lowest => -1.0,
+                        End::Highest => 1.0,
+                    };
+                    let mut out: Vec<f64> = values
+                        .iter()
+                        .map(|v| outwards * (v - found.value))
+                        .collect();
+                    out.sort_by(|a, b| b.total_cmp(a));
+                    // Nothing further out than the width, as many as are said within it, the next as far as is said.
+                    assert!(out[0] <= found.width + 1e-13, "{name} {:e}", out[0]);
+                    assert!(out[0] >= -1e-13, "{name} {:e}", out[0]);
+                    let equal = out.iter().filter(|v| **v >= -found.width).count();
+                    assert_eq!(equal, found.multiplicity, "{name}");
+                    let next = outwards * (found.next - found.value);
+                    assert!(out[equal] <= next + 1e-13, "{name} {:e}", out[equal]);
+                    assert!(found.patches <= 2 && found.kinds == 1, "{name}");
+                }
+            }
+        }
+    }
+    assert!(closed.len() >= 7, "{closed:?}");
+}
+
+#[test]
+fn ends_of_meshes_have_the_multiplicities_of_dense_eigenvalues() {
+    let three = generate::union(&[
+        named("quad-sphere:3"),
+        named("quad-sphere:3"),
+        named("cube"),
+    ]);
+    let meshes = [
+        (
+            "a sphere of quads",
+            named("quad-sphere:4"),
+            Scheme::CatmullClark,
+        ),
+        ("a sphere of triangles", named("icosphere:3"), Scheme::Loop),
+        ("a sphere of triangles", named("icosphere:3"), Scheme::Sqrt3),
+        ("an odd torus", builtin::torus(31, 23), Scheme::CatmullClark),
+        (
+            "a torus of triangles",
+            builtin::tri_torus(31, 23),
+            Scheme::Loop,
+        ),
+        ("three components", three, Scheme::CatmullClark),
+        (
+            "defects",
+            torus_with_defects(Scheme::Loop, 26, 2),
+            Scheme::Loop,
+        ),
+        (
+            "irregular quads",
+            named("irregular-quad:700"),
+            Scheme::CatmullClark,
+        ),
+        (
+            "irregular polygons",
+            named("irregular-poly:700"),
+            Scheme::Nasri,
+        ),
+    ];
+    let mut counted = 0;
+    for (name, mesh, scheme) in meshes {
+        let topology = Topology::new(&mesh.faces, mesh.len());
+        let found = mesh_ends(&mesh, &topology, scheme).expect("values");
+        assert!(found.converged(), "{name}: {found:?}");
+        let all = dense::full_eigenvalues(&assemble(&mesh, scheme)).expect("below the limit");
+        for (estimate, values, lowest) in [
+            (found.lambda_min, &all.a, true),
+            (found.lambda_max, &all.a, false),
+            (found.jacobi_lambda_min, &all.jacobi, true),
+            (found.jacobi_lambda_max, &all.jacobi, false),
+        ] {
+            let exact = values[if lowest { 0 } else { values.len() - 1 }];
+            let error = (estimate.value - exact).abs();
+            assert!(
+                error <= 1e-9 * exact + 1e-14,
+                "{name} {scheme}: {estimate:?} {exact}"
+            );
+            if let Some(m) = estimate.multiplicity {
+                let slack = (m.within * exact).max(1e-12);
+                let equal = values
+                    .iter()
+                    .filter(|v| (*v - exact).abs() <= slack)
+                    .count();
+                assert_eq!(m.count, equal, "{name} {scheme}: {estimate:?}");
+                counted += 1;
+            }
+        }
+    }
+    assert!(counted >= 34, "{counted} of 36 were decided");
+}
+
+#[test]
+fn a_cluster_of_eight_on_a_sphere_of_quads() {
+    // Held against a block iteration on the whole mesh.
+    let mesh = named("quad-sphere:7");
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    let scheme = Scheme::CatmullClark;
+    let found = bracket(
+        &mesh.faces,
+        &topology,
+        scheme,
+        Operator::A,
+        End::Lowest,
+        1e-9,
+    )
+    .expect("finite numbers")
+    .expect("eight corners");
+    assert_eq!((found.multiplicity, found.patches, found.kinds), (8, 8, 1));
+    let system = assemble(&mesh, scheme);
+    let request = Request {
+        end: End::Lowest,
+        count: 9,
+        tolerance: 1e-10,
+        spectrum: (0.0, 1.0),
+    };
+    let pairs = extreme(&symmetric(&system, Operator::A), &request).expect("large enough");
+    for v in &pairs.values[..8] {
+        assert!(
+            (v.value - found.value).abs() <= found.width + v.error,
+            "{v:?} {found:?}"
+        );
+    }
+    assert!(pairs.values[8].value >= found.next);
+}
+
+#[test]
+fn elements_prove_at_least_what_valences_do() {
+    let mut better = 0;
+    for (name, mesh, scheme, system) in random_systems(120) {
+        let topology = Topology::new(&mesh.faces, mesh.len());
+        let all = dense::eigenvalues(&system).expect("small");
+        let b = system.bounds;
+        let last = all.a.len() - 1;
+        for (operator, end, valences, exact) in [
+            (Operator::A, End::Lowest, b.lambda_min, all.a[0]),
+            (Operator::A, End::Highest, b.lambda_max, all.a[last]),
+            (
+                Operator::Jacobi,
+                End::Lowest,
+                b.jacobi_lambda_min,
+                all.jacobi[0],
+            ),
+            (
+                Operator::Jacobi,
+                End::Highest,
+                b.jacobi_lambda_max,
+                all.jacobi[last],
+            ),
+        ] {
+            let bound =
+                element_bound(&mesh.faces, &topology, scheme, operator, end).expect("closed");
+            let outwards = match end {
+                End::Lowest => -1.0,
+                End::Highest => 1.0,
+            };
+            assert!(
+                outwards * (bound - exact) > -1e-12,
+                "{name}: {bound} {exact}"
+            );
+            assert!(
+                outwards * (valences - bound) > -1e-12,
+                "{name}: {bound} {valences}"
+            );
+            better += usize::from(outwards * (valences - bound) > 1e-3);
+        }
+    }
+    assert!(better > 50, "{better}");
+}
+
 /// Meshes of all kinds, small enough for dense eigenvalues.
 fn random_systems(count: u64) -> impl Iterator<Item = (String, Mesh, Scheme, LimitSystem)> {
     (0..count).flat_map(|seed| {
@@ -218,7 +438,7 @@ fn proven_bounds_hold_on_hundreds_of_random_meshes() {
             Scheme::ZhengCai => 2.0,
         };
         assert!(b.jacobi_lambda_max <= ceiling + slack, "{name}");
-        let promise = Promise::new(&system);
+        let promise = Promise::new(&system.bounds);
         assert!(promise.safe_omega_jacobi >= 0.5 - slack);
         // The detective's theory against the numbers.
         let topology = Topology::new(&mesh.faces, mesh.len());
@@ -236,7 +456,7 @@ fn promised_counts_are_kept_by_runs() {
     for (name, mut mesh, _, system) in random_systems(60) {
         add_noise(&mut mesh, 0.1, 5);
         let tolerance = 1e-8 * mesh.diagonal();
-        let promise = Promise::new(&system);
+        let promise = Promise::new(&system.bounds);
         let counts = promise.counts(&system, &mesh.positions, tolerance);
         let stop = Stop {
             tolerance,

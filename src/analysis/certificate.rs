@@ -123,20 +123,27 @@ const LARGEST_BACKWARD_ERROR: f64 = 1e-11;
 /// A factor too large (some 200 000 vertices), a vanishing pivot (σ is an eigenvalue of a leading block), or a
 /// factorization without pivoting that was not stable: then another σ will do.
 pub fn eigenvalues_below(system: &LimitSystem, operator: Operator, sigma: f64) -> Result<Inertia> {
-    let s = symmetric(system, operator);
+    inertia(&symmetric(system, operator), sigma)
+}
+
+/// The number of eigenvalues of the symmetric matrix `s` below `sigma`, as [`eigenvalues_below`].
+///
+/// # Errors
+/// As there.
+pub fn inertia(s: &Csr, sigma: f64) -> Result<Inertia> {
     let symbolic = analyse(
-        &s,
+        s,
         SupernodalThreshold::FORCE_SIMPLICIAL,
         MOST_ENTRIES_INERTIA,
     )?;
     let need = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
     let mut memory = MemBuffer::try_new(need).map_err(|_| out_of_memory(s.len()))?;
     let mut factor = vec![0.0; symbolic.len_val()];
-    let values = shifted(&s, sigma, 1.0);
+    let values = shifted(s, sigma, 1.0);
     symbolic
         .factorize_numeric_ldlt(
             &mut factor,
-            SparseColMatRef::new(pattern(&s), &values),
+            SparseColMatRef::new(pattern(s), &values),
             Side::Upper,
             Default::default(),
             Par::Seq,

@@ -1,12 +1,16 @@
-//! Extreme eigenvalues of a sparse symmetric matrix by the Lanczos process, in three vectors.
+//! Extreme eigenvalues of a sparse symmetric matrix, or of one that is self-adjoint in a weighted inner product, by
+//! the Lanczos process, in three vectors.
 //!
 //! One vector's Krylov space needs far fewer products for an extreme value than a block, but shows a multiple
 //! eigenvalue once: [`eigen`](super::eigen) has the multiplicities and the vectors.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
+use super::spectrum::Operator as Which;
 use super::tridiagonal::Tridiagonal;
-use crate::assemble::Csr;
+use crate::assemble::{Csr, LimitSystem, Operator};
 use crate::error::{Error, Result};
 
 /// A Ritz value with what is known of its error.
@@ -27,7 +31,7 @@ pub struct Ritz {
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Relative accuracy T of the values looked at: error ≤ T|θ|, residual ≤ 10 T|θ|, and θ moved by no more than
-    /// T|θ| while the steps grew by a quarter. (The residual keeps a group of nearly equal values, which the error
+    /// T|θ| while the steps grew by an eighth. (The residual keeps a group of nearly equal values, which the error
     /// estimate takes for one, from passing as its mean.)
     pub tolerance: f64,
     pub max_steps: usize,
@@ -61,32 +65,224 @@ const CHUNK: usize = 4096;
 /// Ritz values beside an extreme one that its error estimate looks at.
 const NEIGHBOURS: usize = 24;
 
-/// The smallest and largest Ritz value of the symmetric matrix `s` from the start `x`.
+/// A matrix B that is self-adjoint in the inner product `Σ g_i x_i y_i`.
+pub trait SelfAdjoint: Sync {
+    fn len(&self) -> usize;
+
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// g_i > 0.
+    fn weight(&self, i: usize) -> f64;
+
+    /// Sums over x that the rows of one whole product share; none unless the matrix has some.
+    fn prepare(&self, _x: &[f64], _shared: &mut Vec<[f64; 3]>) {}
+
+    /// Calls `visit(k, (B x)_i)` for the k-th row i of `rows`; `shared` comes from [`prepare`](Self::prepare).
+    fn rows(
+        &self,
+        rows: Range<usize>,
+        x: &[f64],
+        shared: &[[f64; 3]],
+        visit: impl FnMut(usize, f64),
+    );
+}
+
+/// A symmetric matrix: all weights are 1.
+impl SelfAdjoint for Csr {
+    fn len(&self) -> usize {
+        Csr::len(self)
+    }
+
+    fn weight(&self, _i: usize) -> f64 {
+        1.0
+    }
+
+    fn rows(
+        &self,
+        rows: Range<usize>,
+        x: &[f64],
+        _shared: &[[f64; 3]],
+        mut visit: impl FnMut(usize, f64),
+    ) {
+        for (k, i) in rows.enumerate() {
+            visit(k, self.row_times_scalar(i, x));
+        }
+    }
+}
+
+/// A limit system's matrix A = H·M as it acts on one number a vertex.
+pub trait Scalar: Sync {
+    /// The diagonal of H.
+    fn weights(&self) -> &[f64];
+
+    /// The diagonal of A.
+    fn diagonal(&self) -> &[f64];
+
+    fn prepare(&self, _x: &[f64], _shared: &mut Vec<[f64; 3]>) {}
+
+    /// Calls `visit(k, (A x)_i)` for the k-th row i of `rows`.
+    fn rows(
+        &self,
+        rows: Range<usize>,
+        x: &[f64],
+        shared: &[[f64; 3]],
+        visit: impl FnMut(usize, f64),
+    );
+}
+
+impl Scalar for LimitSystem {
+    fn weights(&self) -> &[f64] {
+        &self.h
+    }
+
+    fn diagonal(&self) -> &[f64] {
+        &self.diagonal
+    }
+
+    fn rows(
+        &self,
+        rows: Range<usize>,
+        x: &[f64],
+        shared: &[[f64; 3]],
+        visit: impl FnMut(usize, f64),
+    ) {
+        SelfAdjoint::rows(&self.a, rows, x, shared, visit);
+    }
+}
+
+impl Scalar for Operator {
+    fn weights(&self) -> &[f64] {
+        Operator::weights(self)
+    }
+
+    fn diagonal(&self) -> &[f64] {
+        Operator::diagonal(self)
+    }
+
+    fn prepare(&self, x: &[f64], shared: &mut Vec<[f64; 3]>) {
+        self.moments(x, shared);
+    }
+
+    fn rows(
+        &self,
+        rows: Range<usize>,
+        x: &[f64],
+        shared: &[[f64; 3]],
+        visit: impl FnMut(usize, f64),
+    ) {
+        Operator::rows(self, rows, (x, 0), shared, visit);
+    }
+}
+
+/// A, self-adjoint with the weights 1/h_i, or D⁻¹A, with m_ii = a_ii/h_i.
+#[derive(Debug)]
+pub struct Matrix<'a, T> {
+    pub system: &'a T,
+    pub which: Which,
+}
+
+impl<T: Scalar> SelfAdjoint for Matrix<'_, T> {
+    fn len(&self) -> usize {
+        self.system.weights().len()
+    }
+
+    #[inline]
+    fn weight(&self, i: usize) -> f64 {
+        let h = self.system.weights()[i];
+        match self.which {
+            Which::A => 1.0 / h,
+            Which::Jacobi => self.system.diagonal()[i] / h,
+        }
+    }
+
+    fn prepare(&self, x: &[f64], shared: &mut Vec<[f64; 3]>) {
+        self.system.prepare(x, shared);
+    }
+
+    fn rows(
+        &self,
+        rows: Range<usize>,
+        x: &[f64],
+        shared: &[[f64; 3]],
+        mut visit: impl FnMut(usize, f64),
+    ) {
+        match self.which {
+            Which::A => self.system.rows(rows, x, shared, visit),
+            Which::Jacobi => {
+                let diagonal = &self.system.diagonal()[rows.start..];
+                self.system
+                    .rows(rows, x, shared, |k, ax| visit(k, ax / diagonal[k]));
+            }
+        }
+    }
+}
+
+/// The Rayleigh quotient of x and the residual of x/‖x‖, in the inner product of `s`.
+pub fn rayleigh(s: &impl SelfAdjoint, x: &[f64]) -> (f64, f64) {
+    let mut shared = Vec::new();
+    s.prepare(x, &mut shared);
+    // Σ g x², Σ g x·Bx and Σ g (Bx)² would lose half of the residual's digits, so B x is kept.
+    let mut image = vec![0.0; s.len()];
+    let sums = |parts: Vec<(f64, f64)>| {
+        parts
+            .iter()
+            .fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1))
+    };
+    let parts = image.par_chunks_mut(CHUNK).enumerate().map(|(c, image)| {
+        let first = c * CHUNK;
+        let (mut square, mut product) = (0.0, 0.0);
+        s.rows(first..first + image.len(), x, &shared, |k, y| {
+            let (g, x) = (s.weight(first + k), x[first + k]);
+            square += g * x * x;
+            product += g * x * y;
+            image[k] = y;
+        });
+        (square, product)
+    });
+    let (square, product) = sums(parts.collect());
+    let value = product / square;
+    let parts = image.par_chunks(CHUNK).enumerate().map(|(c, image)| {
+        let rest = |(k, y): (usize, &f64)| {
+            let i = c * CHUNK + k;
+            s.weight(i) * (y - value * x[i]).powi(2)
+        };
+        (image.iter().enumerate().map(rest).sum(), 0.0)
+    });
+    let (rest, _) = sums(parts.collect());
+    (value, (rest / square).sqrt())
+}
+
+/// The smallest and largest Ritz value of `s` from the start `x`.
 ///
 /// Plain three-term recurrence: lost orthogonality repeats converged Ritz values but does not falsify extreme ones
-/// (Paige 1976). The projected problem is looked at each time the steps have grown by a quarter; values must have
+/// (Paige 1976). The projected problem is looked at each time the steps have grown by an eighth; values must have
 /// stood still since the last look.
 ///
 /// # Errors
 /// A start that is zero or not finite.
-pub fn extremes(s: &Csr, start: Vec<f64>, limits: Limits) -> Result<Run> {
+pub fn extremes(s: &impl SelfAdjoint, start: Vec<f64>, limits: Limits) -> Result<Run> {
     let n = start.len();
     let mut v = start;
-    let norm = norm2(&v);
+    // The vectors are kept as they come, each with its norm.
+    let mut norm = weighted_norm(s, &v);
     if !(norm > 0.0 && norm.is_finite()) {
         return Err(Error::Computation(
             "the start of the Lanczos process must be finite and not zero".into(),
         ));
     }
-    v.iter_mut().for_each(|x| *x /= norm);
     let mut w = vec![0.0; n];
+    let mut norm_before = f64::INFINITY;
+    let mut shared = Vec::new();
     let (mut alphas, mut betas): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
     let mut next_check = 8;
     let mut before: Option<(f64, f64)> = None;
     loop {
         // w holds the vector before v.
-        let alpha = product(s, &v, &mut w, betas.last().copied().unwrap_or(0.0));
-        let beta = orthogonalize(&v, &mut w, alpha);
+        s.prepare(&v, &mut shared);
+        let alpha = product(s, (&v, norm), (&mut w, norm_before), &shared);
+        let beta = orthogonalize(s, (&v, norm), &mut w, alpha);
         alphas.push(alpha);
         betas.push(beta);
         if !beta.is_finite() {
@@ -99,7 +295,7 @@ pub fn extremes(s: &Csr, start: Vec<f64>, limits: Limits) -> Result<Run> {
         // An invariant subspace: rounding leaves β at a few ε of the operator's norm.
         let closed = beta <= 1e-14 * scale;
         if steps >= next_check || closed || steps == limits.max_steps || steps == n {
-            next_check = steps + steps.div_ceil(4);
+            next_check = steps + steps.div_ceil(8);
             let (low, high) = projected(&alphas, &betas, limits.least_weight)?;
             let good = |r: Ritz, old: f64| {
                 let allowed = (limits.tolerance * r.value.abs()).max(8.0 * f64::EPSILON * scale);
@@ -123,40 +319,49 @@ pub fn extremes(s: &Csr, start: Vec<f64>, limits: Limits) -> Result<Run> {
             before = Some((low.value, high.value));
         }
         std::mem::swap(&mut v, &mut w);
-        v.par_iter_mut()
-            .with_min_len(CHUNK)
-            .for_each(|x| *x /= beta);
+        (norm_before, norm) = (norm, beta);
     }
 }
 
-/// `w ← S v − β w` and vᵀw, in one pass.
-fn product(s: &Csr, v: &[f64], w: &mut [f64], beta: f64) -> f64 {
+/// `w ← B v − β u` for the unit vectors v and u along `v` and `w`, β = ‖`v`‖, and the inner product of v and w, in
+/// one pass.
+fn product(
+    s: &impl SelfAdjoint,
+    (v, norm): (&[f64], f64),
+    (w, norm_before): (&mut [f64], f64),
+    shared: &[[f64; 3]],
+) -> f64 {
+    // In the first step there is no vector before, and its norm is infinite.
+    let (unit, back) = (1.0 / norm, norm / norm_before);
     let parts: Vec<f64> = w
         .par_chunks_mut(CHUNK)
         .enumerate()
         .map(|(k, w)| {
+            let first = k * CHUNK;
             let mut dot = 0.0;
-            for (offset, w) in w.iter_mut().enumerate() {
-                let i = k * CHUNK + offset;
-                *w = s.row_times_scalar(i, v) - beta * *w;
-                dot += *w * v[i];
-            }
+            s.rows(first..first + w.len(), v, shared, |k, image| {
+                let new = unit * image - back * w[k];
+                dot += s.weight(first + k) * new * (unit * v[first + k]);
+                w[k] = new;
+            });
             dot
         })
         .collect();
     parts.iter().sum()
 }
 
-/// `w ← w − α v` and its norm, in one pass.
-fn orthogonalize(v: &[f64], w: &mut [f64], alpha: f64) -> f64 {
+/// `w ← w − α v` for the unit vector v along `v`, and the norm of w, in one pass.
+fn orthogonalize(s: &impl SelfAdjoint, (v, norm): (&[f64], f64), w: &mut [f64], alpha: f64) -> f64 {
+    let step = alpha / norm;
     let parts: Vec<f64> = w
         .par_chunks_mut(CHUNK)
         .zip(v.par_chunks(CHUNK))
-        .map(|(w, v)| {
+        .enumerate()
+        .map(|(k, (w, v))| {
             let mut square = 0.0;
-            for (w, v) in w.iter_mut().zip(v) {
-                *w -= alpha * v;
-                square += *w * *w;
+            for (offset, (w, v)) in w.iter_mut().zip(v).enumerate() {
+                *w -= step * v;
+                square += s.weight(k * CHUNK + offset) * *w * *w;
             }
             square
         })
@@ -205,10 +410,14 @@ fn projected(alphas: &[f64], betas: &[f64], least_weight: f64) -> Result<(Ritz, 
     Ok((end(true)?, end(false)?))
 }
 
-fn norm2(x: &[f64]) -> f64 {
+fn weighted_norm(s: &impl SelfAdjoint, x: &[f64]) -> f64 {
     let parts: Vec<f64> = x
         .par_chunks(CHUNK)
-        .map(|x| x.iter().map(|x| x * x).sum())
+        .enumerate()
+        .map(|(k, x)| {
+            let square = |(offset, x): (usize, &f64)| s.weight(k * CHUNK + offset) * x * x;
+            x.iter().enumerate().map(square).sum()
+        })
         .collect();
     parts.iter().sum::<f64>().sqrt()
 }

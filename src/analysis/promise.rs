@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::spectrum::Extremes;
-use crate::assemble::LimitSystem;
+use crate::assemble::bounds::SpectralBounds;
 use crate::solvers::System;
 use crate::solvers::chebyshev::promised_iterations;
 
@@ -32,8 +32,7 @@ pub struct Counts {
 }
 
 impl Promise {
-    pub fn new(system: &LimitSystem) -> Self {
-        let b = &system.bounds;
+    pub fn new(b: &SpectralBounds) -> Self {
         let a = Extremes {
             min: b.lambda_min,
             max: b.lambda_max,
@@ -59,14 +58,14 @@ impl Promise {
     ///
     /// # Panics
     /// If there is not one point a vertex.
-    pub fn counts(&self, system: &LimitSystem, points: &[DVec3], tolerance: f64) -> Counts {
+    pub fn counts(&self, system: &impl System, points: &[DVec3], tolerance: f64) -> Counts {
         assert_eq!(points.len(), system.len(), "one point a vertex");
         let (mut in_h, mut in_d) = (0.0, 0.0);
         let (mut h_max, mut d_max) = (0.0f64, 0.0f64);
         for (i, &p) in points.iter().enumerate() {
             let e = p - system.row(i, points);
-            let h = system.h[i];
-            let m = system.diagonal[i] / h;
+            let h = system.weights()[i];
+            let m = system.diagonal()[i] / h;
             in_h += e.length_squared() / h;
             in_d += e.length_squared() / (h * h * m);
             h_max = h_max.max(h);

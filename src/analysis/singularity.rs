@@ -150,7 +150,7 @@ impl Singularity {
 }
 
 /// ±1 by breadth-first levels along edges.
-fn colour(mesh: &Mesh, topology: &Topology) -> Vec<i8> {
+pub(super) fn colour(mesh: &Mesh, topology: &Topology) -> Vec<i8> {
     let mut colour = vec![0i8; mesh.len()];
     let mut queue: Vec<usize> = Vec::with_capacity(mesh.len());
     for seed in 0..mesh.len() {
@@ -235,7 +235,7 @@ pub fn modes(
         pairs
             .into_iter()
             .map(|(value, x)| {
-                let (_, residual) = super::spectrum::rayleigh(&s, &x);
+                let (_, residual) = super::lanczos::rayleigh(&s, &x);
                 let error = residual;
                 (
                     Eigenvalue {

@@ -4,12 +4,20 @@
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
+use super::bracket::{alternation_is_all, bracket};
+use super::certificate::inertia;
+use super::eigen::End;
+use super::lanczos::{Matrix, Scalar, SelfAdjoint, rayleigh};
+use super::singularity::{ZERO, colour};
 use super::{dense, lanczos};
-use crate::assemble::{Csr, LimitSystem};
+use crate::assemble::bounds::SpectralBounds;
+use crate::assemble::operator::gather;
+use crate::assemble::{Csr, LimitSystem, Scheme};
 use crate::error::Result;
+use crate::mesh::{Mesh, Topology};
 use crate::solvers::System;
+use crate::solvers::system::Rows;
 
 /// The smallest and the largest eigenvalue of a matrix with a real spectrum.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,6 +78,8 @@ pub enum Operator {
 
 /// Relative accuracy of λ_min and λ_max.
 const ACCURACY: f64 = 1e-9;
+/// Vertices up to which the eigenvalues at an end that Lanczos found are counted by factorizations of the whole matrix.
+const COUNTED: usize = 20_000;
 /// Lanczos steps at most: enough for the gap 10⁻⁶ of a regular grid of a million vertices.
 const STEPS: usize = 8000;
 /// The same for what the data excite, which no proof rests on.
@@ -86,6 +96,16 @@ pub struct Estimate {
     /// The estimated error of the value as the end of the spectrum.
     pub error: f64,
     pub source: Source,
+    pub multiplicity: Option<Multiplicity>,
+}
+
+/// How many eigenvalues are equal to an end of the spectrum, where that was decided: among all eigenvalues, by
+/// proof, or by counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Multiplicity {
+    pub count: usize,
+    /// What counts as equal: relative to the value.
+    pub within: f64,
 }
 
 /// How a value was found.
@@ -95,6 +115,8 @@ pub enum Source {
     Dense,
     /// A vector attains a proven bound.
     Proven,
+    /// Proven bounds on both sides, around a few exceptional vertices ([`bracket`](mod@super::bracket)).
+    Bracketed,
     /// The Lanczos process.
     Lanczos,
     /// The Lanczos process, which did not reach its accuracy in the steps allowed.
@@ -106,6 +128,7 @@ impl Source {
         match self {
             Source::Dense => "dense",
             Source::Proven => "proven",
+            Source::Bracketed => "bracketed",
             Source::Lanczos => "lanczos",
             Source::Unconverged => "unconverged",
         }
@@ -136,6 +159,15 @@ impl Ends {
         }
     }
 
+    fn each(&mut self) -> [(Operator, End, &mut Estimate); 4] {
+        [
+            (Operator::A, End::Lowest, &mut self.lambda_min),
+            (Operator::A, End::Highest, &mut self.lambda_max),
+            (Operator::Jacobi, End::Lowest, &mut self.jacobi_lambda_min),
+            (Operator::Jacobi, End::Highest, &mut self.jacobi_lambda_max),
+        ]
+    }
+
     pub fn converged(&self) -> bool {
         [
             self.lambda_min,
@@ -160,7 +192,8 @@ pub fn spectrum(system: &LimitSystem) -> Result<Spectrum> {
 ///
 /// Up to [`dense::LARGEST`] vertices all eigenvalues are computed. Beyond, a vector that attains a proven bound
 /// settles an end at once: the constant one, and the ±1 colouring by breadth-first levels (regular grids); the other
-/// ends come from Lanczos processes with a seeded random start. Time: some hundred products with the matrix where
+/// ends come from Lanczos processes with a seeded random start. [`mesh_ends`] is faster on large meshes, and knows
+/// more multiplicities. Time: some hundred products with the matrix where
 /// the end is separated, up to 8000 where it is the edge of a dense band (then `Source::Unconverged` may be the
 /// answer). Memory: one matrix and three vectors beside the system.
 ///
@@ -178,125 +211,255 @@ pub fn ends(system: &LimitSystem) -> Result<Ends> {
             applications: 0,
         });
     }
-    let b = &system.bounds;
-    let signs = alternating(&system.m);
-    let constant = vec![1.0; system.len()];
-    let a = operator_ends(
-        system,
-        Operator::A,
-        &[(b.lambda_min, &signs), (b.lambda_max, &constant)],
-    )?;
-    let jacobi = operator_ends(
-        system,
-        Operator::Jacobi,
-        &[
-            (b.jacobi_lambda_min, &signs),
-            (b.jacobi_lambda_max, &constant),
-        ],
-    )?;
-    Ok(Ends {
-        lambda_min: a.0,
-        lambda_max: a.1,
-        jacobi_lambda_min: jacobi.0,
-        jacobi_lambda_max: jacobi.1,
-        applications: a.2 + jacobi.2,
-    })
+    let (signs, components) = alternating(&system.m);
+    let known = Known {
+        bounds: system.bounds,
+        signs,
+        alternation_is_all: false,
+        components,
+    };
+    known.ends(system, |_, _| Ok(None))
+}
+
+/// As [`ends`], for large meshes: the matrix is not stored; an end that belongs to modes around a few exceptional
+/// vertices is enclosed there ([`bracket`](mod@super::bracket)), with its multiplicity; other ends come from Lanczos
+/// processes on the [`Operator`](crate::assemble::Operator) in an order of its own. Up to 20 000 vertices the
+/// eigenvalues at these are counted, and none is missed beyond, by factorizations of the whole matrix.
+///
+/// Memory: the operator and four vectors; the factor of a small mesh.
+///
+/// # Errors
+/// As [`LimitSystem::new`]; if an eigenvalue computation does not converge.
+///
+/// ```
+/// use limitlab::analysis::spectrum::{Source, mesh_ends};
+/// use limitlab::assemble::Scheme;
+/// use limitlab::mesh::{Topology, builtin};
+///
+/// let mesh = builtin::builtin("quad-sphere:7")?;
+/// let topology = Topology::new(&mesh.faces, mesh.len());
+/// let ends = mesh_ends(&mesh, &topology, Scheme::CatmullClark)?;
+/// assert_eq!(ends.lambda_min.multiplicity.map(|m| m.count), Some(8));
+/// assert_eq!(ends.lambda_max.source, Source::Proven);
+/// assert_eq!(ends.lambda_max.multiplicity.map(|m| m.count), Some(1));
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn mesh_ends(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Result<Ends> {
+    if mesh.len() <= dense::LARGEST {
+        return ends(&LimitSystem::new(mesh, topology, scheme)?);
+    }
+    let operator = crate::assemble::Operator::new(&mesh.faces, topology, scheme)?;
+    let order = operator.front_order();
+    let operator = operator.renumbered(&order);
+    let signs: Vec<f64> = colour(mesh, topology).into_iter().map(f64::from).collect();
+    let known = Known {
+        bounds: operator.bounds(),
+        signs: gather(&signs, &order),
+        alternation_is_all: alternation_is_all(&mesh.faces, scheme),
+        components: topology.components(&mesh.faces).1,
+    };
+    let mut ends = known.ends(&operator, |which, end| {
+        let found = bracket(&mesh.faces, topology, scheme, which, end, ACCURACY)?;
+        Ok(found.map(|found| Estimate {
+            value: found.value,
+            residual: found.width,
+            error: found.width,
+            source: Source::Bracketed,
+            multiplicity: Some(Multiplicity {
+                count: found.multiplicity,
+                within: found.width / found.value.abs(),
+            }),
+        }))
+    })?;
+    if mesh.len() <= COUNTED {
+        let mut system = None;
+        for (which, end, estimate) in ends.each() {
+            if estimate.source == Source::Lanczos && estimate.multiplicity.is_none() {
+                let system = match &system {
+                    Some(system) => system,
+                    None => system.insert(LimitSystem::new(mesh, topology, scheme)?),
+                };
+                count(&symmetric(system, which), end, estimate);
+            }
+        }
+    }
+    Ok(ends)
+}
+
+/// Counts the eigenvalues at an end that Lanczos has found, and those beyond, which it has missed if there are any.
+/// Leaves the estimate as it is if a factorization is not stable.
+fn count(s: &Csr, end: End, estimate: &mut Estimate) {
+    let within = 2.0 * ACCURACY;
+    let slack = (within * estimate.value.abs()).max(ZERO);
+    let below = |sigma: f64| inertia(s, sigma).ok().map(|i| i.below);
+    let (lower, upper) = rayon::join(
+        || below(estimate.value - slack),
+        || below(estimate.value + slack),
+    );
+    if let (Some(lower), Some(upper)) = (lower, upper) {
+        let beyond = match end {
+            End::Lowest => lower,
+            End::Highest => s.len() - upper,
+        };
+        if beyond > 0 {
+            estimate.source = Source::Unconverged;
+        } else {
+            let count = upper - lower;
+            estimate.multiplicity = Some(Multiplicity { count, within });
+        }
+    }
 }
 
 fn dense_ends(ascending: &[f64]) -> (Estimate, Estimate) {
-    let nan = f64::NAN;
     let scale = ascending.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     // Backward stable: the error is a small multiple of ε‖S‖.
     let error = 8.0 * f64::EPSILON * scale;
-    let estimate = |value: Option<&f64>| Estimate {
-        value: value.copied().unwrap_or(nan),
-        residual: error,
-        error,
-        source: Source::Dense,
+    let estimate = |value: Option<&f64>| {
+        let value = value.copied().unwrap_or(f64::NAN);
+        let equal = |x: &&f64| (*x - value).abs() <= ACCURACY * value.abs() + error;
+        Estimate {
+            value,
+            residual: error,
+            error,
+            source: Source::Dense,
+            multiplicity: Some(Multiplicity {
+                count: ascending.iter().filter(equal).count(),
+                within: ACCURACY,
+            }),
+        }
     };
     (estimate(ascending.first()), estimate(ascending.last()))
 }
 
-/// Both ends of one operator, and the products made. `attained` pairs the proven bounds of the lower and the upper
-/// end with vectors, in the coordinates of A, that may attain them.
-fn operator_ends(
-    system: &LimitSystem,
-    operator: Operator,
-    attained: &[(f64, &[f64]); 2],
-) -> Result<(Estimate, Estimate, usize)> {
-    let s = symmetric(system, operator);
-    let scale = scales(system, operator);
-    let mut applications = 0;
-    let [low, high] = attained.map(|(bound, v)| {
-        applications += 1;
-        let x: Vec<f64> = v.iter().zip(&scale).map(|(v, s)| v / s).collect();
-        let (value, residual) = rayleigh(&s, &x);
-        // Within rounding of the bound, as a value and as an eigenvector.
-        let rounding = 64.0 * f64::EPSILON;
-        let attains = (value - bound).abs() <= rounding && residual <= rounding.sqrt() * 1e-3;
-        attains.then_some(Estimate {
-            value,
-            residual,
-            error: rounding,
-            source: Source::Proven,
-        })
-    });
-    if let (Some(low), Some(high)) = (low, high) {
-        return Ok((low, high, applications));
-    }
-    let limits = lanczos::Limits {
-        tolerance: ACCURACY,
-        max_steps: STEPS,
-        least_weight: 0.0,
-        ends: match (low, high) {
-            (Some(_), _) => lanczos::Wanted::Highest,
-            (_, Some(_)) => lanczos::Wanted::Lowest,
-            _ => lanczos::Wanted::Both,
-        },
-    };
-    let mut rng = ChaCha8Rng::seed_from_u64(0x5370_6563);
-    let start: Vec<f64> = (0..system.len())
-        .map(|_| rng.random_range(-1.0..1.0))
-        .collect();
-    let run = lanczos::extremes(&s, start, limits)?;
-    applications += run.steps;
-    let estimate = |r: lanczos::Ritz| Estimate {
-        value: r.value,
-        residual: r.residual,
-        error: r.error,
-        source: if run.converged {
-            Source::Lanczos
-        } else {
-            Source::Unconverged
-        },
-    };
-    Ok((
-        low.unwrap_or_else(|| estimate(run.low)),
-        high.unwrap_or_else(|| estimate(run.high)),
-        applications,
-    ))
+/// What is known of a system before any iteration.
+struct Known {
+    bounds: SpectralBounds,
+    /// ±1 at every vertex: what may attain the lower bounds. The constant vector may attain the upper ones.
+    signs: Vec<f64>,
+    /// Whether nothing else attains the lower bounds on a connected mesh.
+    alternation_is_all: bool,
+    components: usize,
 }
 
-/// The Rayleigh quotient of x and the residual of x/‖x‖.
-pub fn rayleigh(s: &Csr, x: &[f64]) -> (f64, f64) {
-    let image: Vec<f64> = (0..s.len())
-        .into_par_iter()
-        .with_min_len(4096)
-        .map(|i| s.row_times_scalar(i, x))
-        .collect();
-    let square: f64 = x.iter().map(|x| x * x).sum();
-    let value = x.iter().zip(&image).map(|(x, y)| x * y).sum::<f64>() / square;
-    let residual: f64 = x
-        .iter()
-        .zip(&image)
-        .map(|(x, y)| (y - value * x).powi(2))
-        .sum();
-    (value, (residual / square).sqrt())
+impl Known {
+    /// The ends of both operators; `enclose` may know an end that attains no bound.
+    fn ends<T: Scalar>(
+        &self,
+        system: &T,
+        enclose: impl Fn(Operator, End) -> Result<Option<Estimate>>,
+    ) -> Result<Ends> {
+        let b = &self.bounds;
+        let mut applications = 0;
+        let a = self.operator_ends(
+            &Matrix {
+                system,
+                which: Operator::A,
+            },
+            (b.lambda_min, b.lambda_max),
+            &enclose,
+            &mut applications,
+        )?;
+        let jacobi = self.operator_ends(
+            &Matrix {
+                system,
+                which: Operator::Jacobi,
+            },
+            (b.jacobi_lambda_min, b.jacobi_lambda_max),
+            &enclose,
+            &mut applications,
+        )?;
+        Ok(Ends {
+            lambda_min: a.0,
+            lambda_max: a.1,
+            jacobi_lambda_min: jacobi.0,
+            jacobi_lambda_max: jacobi.1,
+            applications,
+        })
+    }
+
+    /// Both ends of one operator: by a vector that attains a proven bound, else enclosed, else by Lanczos, where a
+    /// less accurate enclosure may still tell the multiplicity.
+    fn operator_ends<T: Scalar>(
+        &self,
+        matrix: &Matrix<'_, T>,
+        (least, greatest): (f64, f64),
+        enclose: &impl Fn(Operator, End) -> Result<Option<Estimate>>,
+        applications: &mut usize,
+    ) -> Result<(Estimate, Estimate)> {
+        let exactly = |count| Multiplicity { count, within: 0.0 };
+        let mut attained = |bound: f64, x: &[f64], multiplicity| {
+            *applications += 1;
+            let (value, residual) = rayleigh(matrix, x);
+            // Within rounding of the bound, as a value and as an eigenvector.
+            let rounding = 64.0 * f64::EPSILON;
+            let attains = (value - bound).abs() <= rounding && residual <= rounding.sqrt() * 1e-3;
+            attains.then_some(Estimate {
+                value,
+                residual,
+                error: rounding,
+                source: Source::Proven,
+                multiplicity,
+            })
+        };
+        let once = exactly(self.components);
+        let low = attained(least, &self.signs, self.alternation_is_all.then_some(once));
+        // No entry is negative and rows of A sum to 1: a positive eigenvector belongs to the largest eigenvalue, once
+        // in each component (Perron, Frobenius).
+        let constant = vec![1.0; self.signs.len()];
+        let high = attained(greatest, &constant, Some(once));
+        let mut iterate = |end: End, known: Option<Estimate>| -> Result<Estimate> {
+            if let Some(known) = known {
+                return Ok(known);
+            }
+            let enclosed = enclose(matrix.which, end)?;
+            if let Some(enclosed) = enclosed.filter(|e| e.error <= 1.01 * ACCURACY * e.value.abs())
+            {
+                return Ok(enclosed);
+            }
+            let (ends, start) = match end {
+                End::Lowest => {
+                    let mut rng = ChaCha8Rng::seed_from_u64(0x5370_6563);
+                    let random = || rng.random_range(-1.0..1.0);
+                    let start = std::iter::repeat_with(random).take(matrix.len());
+                    (lanczos::Wanted::Lowest, start.collect())
+                }
+                // Positive, so with a part in the positive eigenvector that belongs to the largest eigenvalue of each
+                // component; and of all the symmetries that this one has, which leaves fewer values near it.
+                End::Highest => (lanczos::Wanted::Highest, constant.clone()),
+            };
+            let limits = lanczos::Limits {
+                tolerance: ACCURACY,
+                max_steps: STEPS,
+                least_weight: 0.0,
+                ends,
+            };
+            let run = lanczos::extremes(matrix, start, limits)?;
+            *applications += run.steps;
+            let found = match end {
+                End::Lowest => run.low,
+                End::Highest => run.high,
+            };
+            Ok(Estimate {
+                value: found.value,
+                residual: found.residual,
+                error: found.error,
+                source: if run.converged {
+                    Source::Lanczos
+                } else {
+                    Source::Unconverged
+                },
+                multiplicity: enclosed.and_then(|e| e.multiplicity),
+            })
+        };
+        Ok((iterate(End::Lowest, low)?, iterate(End::Highest, high)?))
+    }
 }
 
 /// A sign for every vertex, alternating along the heaviest couplings of each row in a breadth-first search: the
-/// two-colouring of the edges' graph on quads, where an edge couples four times as much as a face's diagonal.
-fn alternating(m: &Csr) -> Vec<f64> {
+/// two-colouring of the edges' graph on quads, where an edge couples four times as much as a face's diagonal. And
+/// the number of components.
+fn alternating(m: &Csr) -> (Vec<f64>, usize) {
+    let mut components = 0;
     let mut sign = vec![0.0; m.len()];
     let mut queue: Vec<u32> = Vec::with_capacity(m.len());
     for seed in 0..m.len() {
@@ -304,6 +467,7 @@ fn alternating(m: &Csr) -> Vec<f64> {
             continue;
         }
         sign[seed] = 1.0;
+        components += 1;
         let mut next = queue.len();
         queue.push(seed as u32);
         while let Some(&i) = queue.get(next) {
@@ -319,7 +483,7 @@ fn alternating(m: &Csr) -> Vec<f64> {
             }
         }
     }
-    sign
+    (sign, components)
 }
 
 /// The ends of the part of the spectrum that the run from V = P excites: Lanczos from the first differences
@@ -331,35 +495,39 @@ fn alternating(m: &Csr) -> Vec<f64> {
 /// # Panics
 /// If there is not one point a vertex.
 pub fn excited(
-    system: &LimitSystem,
+    system: &(impl System + Scalar),
     points: &[DVec3],
     operator: Operator,
 ) -> Result<Option<Extremes>> {
-    let e: Vec<DVec3> = (0..system.len())
-        .map(|i| points[i] - system.row(i, points))
-        .collect();
-    let largest = e.iter().fold(0.0f64, |m, e| m.max(e.abs().max_element()));
-    let scale = scales(system, operator);
-    let s = symmetric(system, operator);
+    let n = points.len();
+    let mut e = vec![DVec3::ZERO; n];
+    let errors = Rows::new(n).residual(system, points, points, &mut e, |_, e, out, _| *out = e);
+    let largest = errors.errors.max;
+    let matrix = Matrix {
+        system,
+        which: operator,
+    };
     let mut found: Option<Extremes> = None;
     for axis in 0..3 {
-        // The residual H⁻¹e of the symmetric system in the operator's coordinates.
-        let start: Vec<f64> = e
-            .iter()
-            .zip(&scale)
-            .zip(&system.h)
-            .map(|((e, s), h)| s * e[axis] / h)
-            .collect();
         if e.iter().all(|e| e[axis].abs() <= 1e-12 * largest) {
             continue;
         }
+        // The residual of A V = P, or of D⁻¹A V = D⁻¹P.
+        let start: Vec<f64> = match operator {
+            Operator::A => e.iter().map(|e| e[axis]).collect(),
+            Operator::Jacobi => e
+                .iter()
+                .zip(Scalar::diagonal(system))
+                .map(|(e, a)| e[axis] / a)
+                .collect(),
+        };
         let limits = lanczos::Limits {
             tolerance: ACCURACY,
             max_steps: STEPS_DATA,
             least_weight: EXCITED,
             ends: lanczos::Wanted::Both,
         };
-        let run = lanczos::extremes(&s, start, limits)?;
+        let run = lanczos::extremes(&matrix, start, limits)?;
         let here = Extremes {
             min: run.low.value,
             max: run.high.value,

@@ -6,7 +6,8 @@ use std::ops::{Add, AddAssign, Range, Sub};
 
 use glam::{DVec3, Vec3A};
 
-/// Three right-hand sides of one vertex, interleaved: doubles (24 bytes) or singles (16 bytes, one vector register).
+/// What an operator acts on: three right-hand sides of one vertex, interleaved, in doubles (24 bytes) or singles
+/// (16 bytes, one vector register); or a single one, for eigenvectors.
 pub trait Point: Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + AddAssign {
     const ZERO: Self;
     /// A weight as the kernel multiplies by it.
@@ -20,6 +21,24 @@ pub trait Point: Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + 
 
 impl Point for DVec3 {
     const ZERO: Self = DVec3::ZERO;
+    type Weight = f64;
+
+    #[inline(always)]
+    fn weight(w: f64) -> f64 {
+        w
+    }
+    #[inline(always)]
+    fn times(self, w: f64) -> Self {
+        w * self
+    }
+    #[inline(always)]
+    fn rings(stencil: &Stencil) -> &Rings<f64> {
+        &stencil.double
+    }
+}
+
+impl Point for f64 {
+    const ZERO: Self = 0.0;
     type Weight = f64;
 
     #[inline(always)]
