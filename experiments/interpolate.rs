@@ -80,7 +80,7 @@ struct ShapeFlags {
     #[arg(long)]
     write_normals: bool,
     /// Interpolate these vertices only: numbers and ranges A..B, separated by commas, or a file of them; the other
-    /// control points stay where they are
+    /// control points stay where they are, or with --method halstead go where the surface is fairest
     #[arg(long, value_name = "LIST|FILE")]
     vertices: Option<String>,
     /// Normals of the surface at given points: a file with lines `vertex nx ny nz`, or a mesh file with normals
@@ -171,8 +171,10 @@ fn main() -> ExitCode {
         if *arguments.mesh.scheme.get_or_insert(Scheme::CatmullClark) != Scheme::CatmullClark {
             conflict("--method halstead belongs to --scheme catmull-clark");
         }
-        if arguments.shape.vertices.is_some() || arguments.shape.shape_handle.is_some() {
-            conflict("--method halstead interpolates all vertices and has no shape handles");
+        if arguments.shape.shape_handle.is_some() {
+            conflict(
+                "--method halstead has no type-V faces for shape handles: use --scheme zheng-cai or nasri",
+            );
         }
         if arguments.shape.subdivide == 1 {
             conflict(
@@ -524,7 +526,7 @@ fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Fini
         membrane: flags.membrane,
     };
     let points = &input.mesh.positions;
-    let found = fit(&fairness, points, wishes.normals.as_deref(), weights)?;
+    let found = fit(&fairness, points, &wishes.constraints(), weights)?;
     let solve = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let request = Request {

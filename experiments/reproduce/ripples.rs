@@ -3,6 +3,7 @@
 use limitlab::Result;
 use limitlab::assemble::Scheme;
 use limitlab::interpolate::halstead::{Fairness, Weights, fit, follow};
+use limitlab::interpolate::zheng_cai::Constraints;
 use limitlab::mesh::Topology;
 use limitlab::mesh::validate::Boundary;
 use limitlab::report::{Column, Figure, LinePlot, Scale, Series, Table};
@@ -66,7 +67,8 @@ fn run(context: &mut Context) -> Result<()> {
     }
     let system = subject.system(Scheme::CatmullClark)?;
     let fairness = Fairness::new(&subject.mesh)?;
-    let fairest = fit(&fairness, &subject.mesh.positions, None, Weights::default())?;
+    let all = Constraints::default();
+    let fairest = fit(&fairness, &subject.mesh.positions, &all, Weights::default())?;
     let topology = Topology::new(&fairest.mesh.faces, fairest.mesh.len());
     let mut normals = limit_normals(&fairest.mesh, &topology)?;
     normals.truncate(subject.mesh.len());

@@ -64,7 +64,7 @@ impl Constraints<'_> {
 
     /// Lists of the right length, at least one interpolated vertex, positive handles, normals and handles at
     /// interpolated vertices only.
-    fn check(&self, vertices: usize) -> Result<()> {
+    pub(super) fn check(&self, vertices: usize) -> Result<()> {
         let lengths = [
             self.interpolated.map(<[_]>::len),
             self.normals.map(<[_]>::len),

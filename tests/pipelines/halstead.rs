@@ -3,6 +3,7 @@
 use glam::DVec3;
 use limitlab::assemble::{LimitSystem, Scheme};
 use limitlab::interpolate::halstead::{Fairness, LEVELS, Weights, fit, follow};
+use limitlab::interpolate::zheng_cai::Constraints;
 use limitlab::mesh::{Mesh, Topology, builtin};
 use limitlab::solvers::{Outcome, Setup, Stop, run};
 use limitlab::subdivide::{Refinement, catmull_clark};
@@ -10,6 +11,13 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::{distance, noisy, topology};
+
+/// All points, nothing else.
+const ALL: Constraints = Constraints {
+    interpolated: None,
+    normals: None,
+    handles: None,
+};
 
 /// Rounding of a system of some thousand unknowns, for points of size 1.
 const SOLVED: f64 = 1e-10;
@@ -30,7 +38,7 @@ fn the_fit_meets_points_and_normals() {
     for name in MESHES {
         let mesh = noisy(name);
         let fairness = Fairness::new(&mesh).unwrap();
-        let plain = fit(&fairness, &mesh.positions, None, Weights::default()).unwrap();
+        let plain = fit(&fairness, &mesh.positions, &ALL, Weights::default()).unwrap();
         let (limits, before) = limits_and_normals(&plain.mesh, mesh.len());
         assert!(distance(&limits, &mesh.positions) < SOLVED, "{name}");
         let wanted: Vec<Option<DVec3>> = before
@@ -40,13 +48,11 @@ fn the_fit_meets_points_and_normals() {
                 (v % 2 == 0).then(|| *n + 0.3 * DVec3::new((v as f64).sin(), 0.5, (v as f64).cos()))
             })
             .collect();
-        let with = fit(
-            &fairness,
-            &mesh.positions,
-            Some(&wanted),
-            Weights::default(),
-        )
-        .unwrap();
+        let wishes = Constraints {
+            normals: Some(&wanted),
+            ..ALL
+        };
+        let with = fit(&fairness, &mesh.positions, &wishes, Weights::default()).unwrap();
         let (limits, found) = limits_and_normals(&with.mesh, mesh.len());
         assert!(distance(&limits, &mesh.positions) < SOLVED);
         for (n, wanted) in found.iter().zip(&wanted) {
@@ -79,7 +85,7 @@ fn the_fit_is_the_fairest() {
     ]) {
         let mesh = noisy(name);
         let fairness = Fairness::new(&mesh).unwrap();
-        let best = fit(&fairness, &mesh.positions, None, weights).unwrap();
+        let best = fit(&fairness, &mesh.positions, &ALL, weights).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(11);
         let fine = topology(&best.mesh);
         for _ in 0..5 {
@@ -133,8 +139,8 @@ fn the_fit_follows_affine_maps() {
     let map = |p: &DVec3| DVec3::new(p.x + 2.0 * p.y, p.z - 3.0, 0.5 * p.x - p.y + 4.0 * p.z);
     let moved: Vec<DVec3> = mesh.positions.iter().map(map).collect();
     let fairness = Fairness::new(&mesh).unwrap();
-    let here = fit(&fairness, &mesh.positions, None, Weights::default()).unwrap();
-    let there = fit(&fairness, &moved, None, Weights::default()).unwrap();
+    let here = fit(&fairness, &mesh.positions, &ALL, Weights::default()).unwrap();
+    let there = fit(&fairness, &moved, &ALL, Weights::default()).unwrap();
     let here: Vec<DVec3> = here.mesh.positions.iter().map(map).collect();
     assert!(distance(&here, &there.mesh.positions) < 10.0 * SOLVED);
 }
@@ -153,22 +159,103 @@ fn weights_and_normals_without_sense_are_errors() {
             thin_plate,
             membrane,
         };
-        let text = fit(&fairness, &mesh.positions, None, weights)
+        let text = fit(&fairness, &mesh.positions, &ALL, weights)
             .unwrap_err()
             .to_string();
         assert!(text.contains("fairness weights"), "{text}");
     }
     let mut normals = vec![None; 12];
     normals[3] = Some(DVec3::ZERO);
-    let text = fit(
-        &fairness,
-        &mesh.positions,
-        Some(&normals),
-        Weights::default(),
-    )
-    .unwrap_err()
-    .to_string();
+    let refused = |wishes: Constraints| {
+        let found = fit(&fairness, &mesh.positions, &wishes, Weights::default());
+        found.unwrap_err().to_string()
+    };
+    let text = refused(Constraints {
+        normals: Some(&normals),
+        ..ALL
+    });
     assert!(text.contains("vertex 3"), "{text}");
+    let mut marks = vec![true; 12];
+    marks[3] = false;
+    normals[3] = Some(DVec3::Z);
+    let text = refused(Constraints {
+        interpolated: Some(&marks),
+        normals: Some(&normals),
+        ..ALL
+    });
+    assert!(text.contains("vertex 3: a normal is given where"), "{text}");
+    let text = refused(Constraints {
+        handles: Some(&[1.0; 12]),
+        ..ALL
+    });
+    assert!(text.contains("type-V faces"), "{text}");
+    let text = refused(Constraints {
+        interpolated: Some(&[false; 12]),
+        ..ALL
+    });
+    assert!(text.contains("no vertex"), "{text}");
+}
+
+/// With fewer points the surface is fairer, still meets those, and is determined: at an optimum the energy's gradient
+/// is a combination of the constraints, so no admissible direction lowers it.
+#[test]
+fn a_subset_is_met_by_a_fairer_surface() {
+    for name in MESHES {
+        let mesh = noisy(name);
+        let fairness = Fairness::new(&mesh).unwrap();
+        let weights = Weights::default();
+        let all = fit(&fairness, &mesh.positions, &ALL, weights).unwrap();
+        let marks: Vec<bool> = (0..mesh.len()).map(|v| v % 3 != 1).collect();
+        let wishes = Constraints {
+            interpolated: Some(&marks),
+            ..ALL
+        };
+        let some = fit(&fairness, &mesh.positions, &wishes, weights).unwrap();
+        let (limits, _) = limits_and_normals(&some.mesh, mesh.len());
+        let mut moved = 0.0f64;
+        for (v, marked) in marks.iter().enumerate() {
+            let off = limits[v].distance(mesh.positions[v]);
+            assert!(!marked || off < SOLVED, "{name} {v}");
+            moved = moved.max(off);
+        }
+        assert!(moved > 1e-3, "{name}: the others are free");
+        assert!(some.errors.max < SOLVED);
+        let energy = some.energies.weighted(weights);
+        assert!(
+            energy < all.energies.weighted(weights) * (1.0 - 1e-4),
+            "{name}"
+        );
+        // Moving towards another surface through the same points costs energy to second order only.
+        let towards = |t: f64| {
+            let pairs = some.mesh.positions.iter().zip(&all.mesh.positions);
+            let x: Vec<DVec3> = pairs.map(|(a, b)| a.lerp(*b, t)).collect();
+            fairness.energies(&x).weighted(weights) - energy
+        };
+        let ratio = towards(-0.5) / towards(0.5);
+        assert!((ratio - 1.0).abs() < 1e-6, "{name} {ratio}");
+    }
+    // Two components, one of them held by nothing.
+    let one = noisy("torus:4x5");
+    let n = one.len();
+    let mut two = one.clone();
+    for p in &one.positions {
+        two.positions.push(*p + 10.0 * DVec3::X);
+    }
+    for face in one.faces.iter() {
+        let moved: Vec<u32> = face.iter().map(|v| v + n as u32).collect();
+        two.faces.push(&moved);
+    }
+    let marks: Vec<bool> = (0..2 * n).map(|v| v < n).collect();
+    let wishes = Constraints {
+        interpolated: Some(&marks),
+        ..ALL
+    };
+    let fairness = Fairness::new(&two).unwrap();
+    let error = fit(&fairness, &two.positions, &wishes, Weights::default()).unwrap_err();
+    assert!(
+        error.to_string().contains("component of vertex 20"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -211,7 +298,7 @@ fn every_iterate_is_measured_and_the_last_is_the_control_mesh() {
     assert!((last.deviation_max - worst).abs() < 1e-7);
     // Interpolating noise ripples: the energy grows from the start, and the fairest surface lies below the end.
     let weights = Weights::default();
-    let fair = fit(&fairness, &mesh.positions, None, weights).unwrap();
+    let fair = fit(&fairness, &mesh.positions, &ALL, weights).unwrap();
     assert!(last.energies.weighted(weights) > rows[0].energies.weighted(weights));
     assert!(fair.energies.weighted(weights) < last.energies.weighted(weights));
 }

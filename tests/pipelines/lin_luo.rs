@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
+use limitlab::interpolate::lin_luo::curve::Ends;
 use limitlab::interpolate::lin_luo::{curve, surface};
 use limitlab::mesh::{Mesh, builtin};
 use limitlab::subdivide::{Refinement, sqrt3};
@@ -26,8 +27,8 @@ fn polygon(n: usize) -> Vec<DVec3> {
 fn curve_ends_are_the_four_point_scheme_and_the_cubic_spline() {
     let p = polygon(9);
     let at = |i: usize| p[i % 9];
-    let (four_point, _) = curve::refine(&p, &[0.0; 9]);
-    let (spline, _) = curve::refine(&p, &[1.0; 9]);
+    let (four_point, _) = curve::refine(&p, &[0.0; 9], Ends::Closed);
+    let (spline, _) = curve::refine(&p, &[1.0; 9], Ends::Closed);
     for i in 0..9 {
         let (a, b, c, d) = (at(i + 8), at(i), at(i + 1), at(i + 2));
         assert_eq!(four_point[2 * i], b);
@@ -41,7 +42,7 @@ fn curve_ends_are_the_four_point_scheme_and_the_cubic_spline() {
     }
     // L2: between the ends, with mixed parameters, each point blends the two by its own α.
     let alpha: Vec<f64> = (0..9).map(|i| i as f64 / 8.0).collect();
-    let (mixed, parameters) = curve::refine(&p, &alpha);
+    let (mixed, parameters) = curve::refine(&p, &alpha, Ends::Closed);
     for (i, a) in parameters.iter().enumerate() {
         let blend = (1.0 - a) * four_point[i] + *a * spline[i];
         assert!(mixed[i].distance(blend) < ROUNDING);
@@ -53,10 +54,39 @@ fn curve_ends_are_the_four_point_scheme_and_the_cubic_spline() {
 }
 
 #[test]
+fn open_curves_keep_their_ends_and_lines_and_are_the_closed_ones_inside() {
+    let p = polygon(9);
+    let alpha: Vec<f64> = (0..9).map(|i| 0.3 * i as f64).collect();
+    let (open, parameters) = curve::refine(&p, &alpha, Ends::Open);
+    let (closed, others) = curve::refine(&p, &alpha, Ends::Closed);
+    assert_eq!((open.len(), parameters.len()), (17, 17));
+    assert_eq!(parameters[..], others[..17]);
+    assert_eq!(open[3..14], closed[3..14]);
+    let (fine, _) = curve::refine_n(&p, &alpha, Ends::Open, 6);
+    assert_eq!(fine.len(), 8 * 64 + 1);
+    assert!(fine[0].distance(p[0]) < ROUNDING && fine[512].distance(p[8]) < ROUNDING);
+    // At α = 1 the limit of a point inside is the cubic B-spline's.
+    let (spline, _) = curve::refine_n(&p, &[1.0; 9], Ends::Open, 14);
+    for i in 1..8 {
+        let limit = (p[i - 1] + 4.0 * p[i] + p[i + 1]) / 6.0;
+        assert!(spline[i << 14].distance(limit) < 1e-7);
+    }
+    let line: Vec<DVec3> = (0..5)
+        .map(|i| DVec3::new(i as f64, 2.0, -3.0 * i as f64))
+        .collect();
+    let (fine, _) = curve::refine_n(&line, &alpha[..5], Ends::Open, 4);
+    for (k, point) in fine.iter().enumerate() {
+        let t = k as f64 / 16.0;
+        assert!(point.distance(DVec3::new(t, 2.0, -3.0 * t)) < ROUNDING);
+    }
+    assert_eq!(curve::refine(&p[..1], &alpha[..1], Ends::Open).0, p[..1]);
+}
+
+#[test]
 fn a_curve_passes_through_the_points_whose_alpha_is_zero() {
     let p = polygon(8);
     let alpha: Vec<f64> = (0..8).map(|i| [0.0, 0.6, 1.0, 0.0][i % 4]).collect();
-    let (fine, _) = curve::refine_n(&p, &alpha, 6);
+    let (fine, _) = curve::refine_n(&p, &alpha, Ends::Closed, 6);
     for (i, a) in alpha.iter().enumerate() {
         let moved = fine[i << 6].distance(p[i]);
         assert!(if *a == 0.0 {
@@ -78,7 +108,7 @@ fn jumps_follow_their_own_mask() {
             .map(|d| *d * h)
             .collect()
     };
-    let (fine, _) = curve::refine(&p, &[alpha; 12]);
+    let (fine, _) = curve::refine(&p, &[alpha; 12], Ends::Closed);
     let (coarse, fine) = (second(&p, 1.0), second(&fine, 0.5));
     let (outer, inner) = ((alpha - 1.0) / 8.0, (3.0 - alpha) / 4.0);
     for i in 0..12 {
@@ -150,7 +180,7 @@ fn a_closed_spline_of_a_regular_polygon_is_nearly_a_circle() {
             )
         })
         .collect();
-    let (fine, _) = curve::refine_n(&circle, &vec![0.0; n], 5);
+    let (fine, _) = curve::refine_n(&circle, &vec![0.0; n], Ends::Closed, 5);
     assert!(fine.iter().all(|p| (p.length() - 1.0).abs() < 1e-4));
 }
 

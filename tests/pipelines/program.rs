@@ -316,7 +316,7 @@ fn failures_say_what_is_wrong_and_write_nothing() {
         "icosahedron --method butterfly --scheme loop --subdivide 2",
         "icosahedron --method butterfly --vertices 1 --subdivide 2",
         "icosahedron --method halstead --subdivide 1",
-        "icosahedron --method halstead --vertices 1",
+        "icosahedron --method halstead --shape-handle 2",
         "icosahedron --normal-levels 2",
         "icosahedron --subdivide 13",
     ] {

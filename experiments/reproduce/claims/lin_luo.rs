@@ -8,7 +8,7 @@ use limitlab::Result;
 use limitlab::analysis::splitting::{
     LocalScheme, SplittingMatrix, characteristic_map, condition_over_alpha, crossings,
 };
-use limitlab::interpolate::lin_luo::curve::{self, fixed_point_radius, jump_norm, jumps};
+use limitlab::interpolate::lin_luo::curve::{self, Ends, fixed_point_radius, jump_norm, jumps};
 use limitlab::interpolate::lin_luo::surface::{choose, largest_fold, popping, refine_n, volume};
 use limitlab::mesh::{Mesh, Topology};
 use limitlab::subdivide::{Refinement, labsik_greiner, sqrt3, unified_sqrt3};
@@ -165,13 +165,13 @@ fn curve_ends(_: &Lab) -> Result<Finding> {
     let n = p.len();
     let at = |i: usize| p[i % n];
     let (moved, middle) = b_spline(&p);
-    let (even_1, odd_1) = split(&curve::refine(&p, &vec![1.0; n]).0);
-    let (even_0, odd_0) = split(&curve::refine(&p, &vec![0.0; n]).0);
+    let (even_1, odd_1) = split(&curve::refine(&p, &vec![1.0; n], Ends::Closed).0);
+    let (even_0, odd_0) = split(&curve::refine(&p, &vec![0.0; n], Ends::Closed).0);
     let four: Vec<DVec3> = (0..n)
         .map(|i| (9.0 * (at(i) + at(i + 1)) - at(i + n - 1) - at(i + 2)) / 16.0)
         .collect();
     // In between: points after six levels on the segment between those of the ends.
-    let fine = |alpha: f64| curve::refine_n(&p, &vec![alpha; n], 6).0;
+    let fine = |alpha: f64| curve::refine_n(&p, &vec![alpha; n], Ends::Closed, 6).0;
     let (low, high) = (fine(0.0), fine(1.0));
     let mut outside = 0.0f64;
     for alpha in [0.25, 0.5, 0.75] {
@@ -660,7 +660,7 @@ fn range(_: &Lab) -> Result<Finding> {
 fn senses(_: &Lab) -> Result<Finding> {
     let points = random_points(10, 3);
     let curve_moves = |alpha: f64| {
-        let (even, _) = split(&curve::refine(&points, &[alpha; 10]).0);
+        let (even, _) = split(&curve::refine(&points, &[alpha; 10], Ends::Closed).0);
         distance(&even, &points)
     };
     let (mesh, topology) = star(7)?;

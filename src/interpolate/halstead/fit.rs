@@ -9,6 +9,7 @@ use super::energy::{Energies, Fairness, Weights};
 use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
 use crate::interpolate::normals::unit_normals;
+use crate::interpolate::zheng_cai::Constraints;
 use crate::mesh::topology::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::solvers::Errors;
@@ -23,7 +24,7 @@ pub struct Fit {
     /// The control mesh two refinements below the given one; original vertices come first.
     pub mesh: Mesh,
     pub energies: Energies,
-    /// The distances of the limit points from the given ones, in mesh units.
+    /// The distances of the limit points from the given ones, in mesh units, over the interpolated vertices.
     pub errors: Errors,
 }
 
@@ -37,8 +38,8 @@ const MOST_REFINEMENTS: usize = 20;
 const MISS: f64 = 1e-8;
 
 /// Minimises xᵀKx, K the weighted forms of `fairness`, over the fine control points x, under the limit masks' equations
-/// at all original vertices, ℓ_v·x = P_v, and where a normal n is given under the tangent masks' (τ·x)·n = 0 for both
-/// tangents.
+/// at the interpolated vertices (all unless told), ℓ_v·x = P_v, and where a normal n is given under the tangent masks'
+/// (τ·x)·n = 0 for both tangents. The other vertices go where the surface is fairest.
 ///
 /// Solved by the Karush-Kuhn-Tucker system [K Cᵀ; C 0], symmetric and indefinite: with points alone one system of n + N
 /// unknowns for all three coordinates; with normals, which couple them, one of 3n + 3N + 2·(normals). A positive membrane
@@ -47,16 +48,17 @@ const MISS: f64 = 1e-8;
 /// matrix takes the shifts out again.
 ///
 /// # Errors
-/// Weights that are negative, not finite, or without a membrane part; a normal without direction; a factorization
-/// that breaks down or misses the constraints.
+/// Weights that are negative, not finite, or without a membrane part; a component without an interpolated vertex, which
+/// could be anywhere; a normal without direction, or at a vertex that is not interpolated; shape handles, which scale
+/// faces of Doo-Sabin surfaces; a factorization that breaks down or misses the constraints.
 ///
 /// # Panics
-/// If there is not one point, and one optional normal, for each original vertex of the mesh that `fairness` was made
-/// of.
+/// If there is not one point, and one entry in each list of `wishes`, for each original vertex of the mesh that
+/// `fairness` was made of.
 pub fn fit(
     fairness: &Fairness,
     points: &[DVec3],
-    normals: Option<&[Option<DVec3>]>,
+    wishes: &Constraints,
     weights: Weights,
 ) -> Result<Fit> {
     let valid = |w: f64| w >= 0.0 && w.is_finite();
@@ -71,19 +73,29 @@ pub fn fit(
         points.len() < fairness.fine.len(),
         "the given points, not the fine ones"
     );
-    let mut normals = normals.map(unit_normals).transpose()?;
-    if let Some(n) = &normals {
-        assert_eq!(n.len(), points.len(), "one entry a point");
+    wishes.check(points.len())?;
+    if wishes.handles.is_some() {
+        return Err(Error::Computation(
+            "shape handles scale the type-V faces of Doo-Sabin surfaces, and the fairest surface is none: use --scheme \
+             zheng-cai or nasri"
+                .into(),
+        ));
     }
-    normals = normals.filter(|n| n.iter().any(Option::is_some));
+    require_anchors(fairness, wishes, points.len())?;
+    let normals = wishes.normals.map(unit_normals).transpose()?;
+    let normals = normals.filter(|n| n.iter().any(Option::is_some));
+    let chosen: Vec<usize> = (0..points.len())
+        .filter(|&v| wishes.is_interpolated(v))
+        .collect();
     let rings = Rings::new(fairness, points.len());
     let x = match normals {
-        None => by_points(fairness, &rings, points, weights)?,
-        Some(normals) => by_normals(fairness, &rings, points, &normals, weights)?,
+        None => by_points(fairness, &rings, points, &chosen, weights)?,
+        Some(normals) => by_normals(fairness, &rings, points, &chosen, &normals, weights)?,
     };
     let mesh = Mesh::new(x, fairness.fine.faces.clone());
-    let mut nothing = vec![(); points.len()];
-    let totals = Rows::new(points.len()).pass_one(&mut nothing, |v, (), tally| {
+    let mut nothing = vec![(); chosen.len()];
+    let totals = Rows::new(chosen.len()).pass_one(&mut nothing, |k, (), tally| {
+        let v = chosen[k];
         let terms = rings.limits[v].iter();
         let limit: DVec3 = terms.map(|&(j, w)| w * mesh.positions[j as usize]).sum();
         tally.error(points[v] - limit);
@@ -103,6 +115,25 @@ pub fn fit(
         mesh,
         errors: totals.errors,
     })
+}
+
+/// Every component needs a point that holds it.
+fn require_anchors(fairness: &Fairness, wishes: &Constraints, originals: usize) -> Result<()> {
+    if wishes.interpolated.is_none() {
+        return Ok(());
+    }
+    let (component, count) = fairness.topology.components(&fairness.fine.faces);
+    let mut held = vec![false; count];
+    for v in (0..originals).filter(|&v| wishes.is_interpolated(v)) {
+        held[component[v] as usize] = true;
+    }
+    match (0..originals).find(|&v| !held[component[v] as usize]) {
+        None => Ok(()),
+        Some(v) => Err(Error::Computation(format!(
+            "no vertex of the component of vertex {v} is interpolated, so that its place is not determined: name at \
+             least one"
+        ))),
+    }
 }
 
 type Row = Vec<(u32, f64)>;
@@ -169,15 +200,16 @@ fn by_points(
     fairness: &Fairness,
     rings: &Rings,
     points: &[DVec3],
+    chosen: &[usize],
     weights: Weights,
 ) -> Result<Vec<DVec3>> {
     let n = fairness.fine.len();
     let mut kkt = Kkt::new(n);
     kkt.energy(fairness, weights, 0);
     let mut right = vec![DVec3::ZERO; n];
-    for (row, &p) in rings.limits.iter().zip(points) {
-        kkt.constraint(row.iter().copied());
-        right.push(p);
+    for &v in chosen {
+        kkt.constraint(rings.limits[v].iter().copied());
+        right.push(points[v]);
     }
     let mut x = kkt.solve(right)?;
     x.truncate(n);
@@ -189,6 +221,7 @@ fn by_normals(
     fairness: &Fairness,
     rings: &Rings,
     points: &[DVec3],
+    chosen: &[usize],
     normals: &[Option<DVec3>],
     weights: Weights,
 ) -> Result<Vec<DVec3>> {
@@ -198,10 +231,10 @@ fn by_normals(
         kkt.energy(fairness, weights, axis);
     }
     let mut right = vec![DVec3::ZERO; 3 * n];
-    for (v, &p) in points.iter().enumerate() {
+    for &v in chosen {
         for axis in 0..3 {
             kkt.constraint(rings.limits[v].iter().map(|&(j, w)| (3 * j + axis, w)));
-            right.push(DVec3::X * p[axis as usize]);
+            right.push(DVec3::X * points[v][axis as usize]);
         }
         let Some(normal) = normals[v] else { continue };
         for tangent in &rings.tangents[v] {

@@ -2,34 +2,59 @@
 
 use glam::DVec3;
 
-/// One step for a closed polygon: the refined points and their parameters. Point i becomes point 2i,
+/// Whether the last point is followed by the first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ends {
+    Closed,
+    /// A point more is put beyond each end, mirrored at it: P_{−1} = 2P_0 − P_1. So the ends stay whatever their α is,
+    /// and lines are reproduced. The paper has no rule for ends.
+    Open,
+}
+
+/// One step: the refined points and their parameters. Point i becomes point 2i,
 /// α/8 P_{i−1} + (1 − α/4) P_i + α/8 P_{i+1}; point 2i+1 is new, between i and i+1, with
-/// weights (α−1, 9−α, 9−α, α−1)/16 and the mean α of its two neighbours. Any α is allowed.
+/// weights (α−1, 9−α, 9−α, α−1)/16 and the mean α of its two neighbours. Any α is allowed. Of n points an open polygon
+/// makes 2n − 1; of one point nothing can be made but that point.
 ///
 /// # Panics
 /// If there is not one α a point.
 ///
 /// ```
 /// use glam::DVec3;
-/// use limitlab::interpolate::lin_luo::curve::refine;
+/// use limitlab::interpolate::lin_luo::curve::{Ends, refine};
 /// let square = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]].map(DVec3::from_array);
 /// // The four-point scheme keeps the corners; (−1, 9, 9, −1)/16 puts the new point of a side outside it.
-/// let (points, _) = refine(&square, &[0.0; 4]);
+/// let (points, _) = refine(&square, &[0.0; 4], Ends::Closed);
 /// assert_eq!((points[0], points[1]), (square[0], DVec3::new(0.5, -0.125, 0.0)));
+/// let (points, _) = refine(&square, &[1.0; 4], Ends::Open);
+/// assert_eq!((points.len(), points[0], points[6]), (7, square[0], square[3]));
 /// ```
-pub fn refine(points: &[DVec3], alpha: &[f64]) -> (Vec<DVec3>, Vec<f64>) {
+pub fn refine(points: &[DVec3], alpha: &[f64], ends: Ends) -> (Vec<DVec3>, Vec<f64>) {
     assert_eq!(points.len(), alpha.len(), "one α a point");
     let n = points.len();
+    if ends == Ends::Open && n < 2 {
+        return (points.to_vec(), alpha.to_vec());
+    }
+    // Place k counts from the point before the first.
+    let at = |k: usize| match (ends, k) {
+        (Ends::Closed, _) => points[(k + n - 1) % n],
+        (Ends::Open, 0) => 2.0 * points[0] - points[1],
+        (Ends::Open, _) if k > n => 2.0 * points[n - 1] - points[n - 2],
+        (Ends::Open, _) => points[k - 1],
+    };
     let mut refined = Vec::with_capacity(2 * n);
     let mut parameters = Vec::with_capacity(2 * n);
     for i in 0..n {
-        let (before, next, after) = ((i + n - 1) % n, (i + 1) % n, (i + 2) % n);
-        let ends = points[before] + points[next];
+        let [before, here, next] = [at(i), at(i + 1), at(i + 2)];
         let a = alpha[i];
-        refined.push(a / 8.0 * ends + (1.0 - a / 4.0) * points[i]);
+        // As a displacement, so that a point that stays does so exactly.
+        refined.push(here + a / 8.0 * (before - 2.0 * here + next));
         parameters.push(a);
-        let a = 0.5 * (alpha[i] + alpha[next]);
-        let (outer, inner) = (points[before] + points[after], points[i] + points[next]);
+        if ends == Ends::Open && i + 1 == n {
+            break;
+        }
+        let a = 0.5 * (alpha[i] + alpha[(i + 1) % n]);
+        let (outer, inner) = (before + at(i + 3), here + next);
         refined.push((a - 1.0) / 16.0 * outer + (9.0 - a) / 16.0 * inner);
         parameters.push(a);
     }
@@ -40,9 +65,14 @@ pub fn refine(points: &[DVec3], alpha: &[f64]) -> (Vec<DVec3>, Vec<f64>) {
 ///
 /// # Panics
 /// As [`refine`].
-pub fn refine_n(points: &[DVec3], alpha: &[f64], levels: usize) -> (Vec<DVec3>, Vec<f64>) {
+pub fn refine_n(
+    points: &[DVec3],
+    alpha: &[f64],
+    ends: Ends,
+    levels: usize,
+) -> (Vec<DVec3>, Vec<f64>) {
     let start = (points.to_vec(), alpha.to_vec());
-    (0..levels).fold(start, |(points, alpha), _| refine(&points, &alpha))
+    (0..levels).fold(start, |(points, alpha), _| refine(&points, &alpha, ends))
 }
 
 /// The forward divided differences Δ^order P / spacing^order of a closed polygon with equal parameter steps (not
@@ -66,7 +96,7 @@ pub fn jumps(points: &[DVec3], alpha: &[f64], levels: usize, order: usize) -> Ve
     let mut jumps = Vec::with_capacity(levels + 1);
     for k in 0..=levels {
         if k > 0 {
-            level = refine(&level.0, &level.1);
+            level = refine(&level.0, &level.1, Ends::Closed);
             spacing *= 0.5;
         }
         let differences = divided_differences(&level.0, order, spacing);
