@@ -11,7 +11,7 @@ use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Mesh, Topology, builtin, io};
 use limitlab::output::create_dir;
 use limitlab::report::index::{self, Entry};
-use limitlab::report::{Figure, Table, compare};
+use limitlab::report::{Animation, Figure, Table, compare};
 
 use crate::claims::Record;
 
@@ -222,6 +222,18 @@ impl Context {
         figure
             .render()?
             .save(&self.folder().join(format!("{stem}.png")))
+    }
+
+    /// Writes figures of one size as an animation, `STEM.png`.
+    ///
+    /// # Errors
+    /// If one cannot be drawn, or the file not written.
+    pub fn animation(&self, stem: &str, figures: &[Figure]) -> Result<()> {
+        let animation = Animation {
+            frames: figures.iter().map(Figure::render).collect::<Result<_>>()?,
+            milliseconds: 700,
+        };
+        animation.save(&self.folder().join(format!("{stem}.png")))
     }
 
     /// Writes the index of all results in the report folder, those of earlier runs too.

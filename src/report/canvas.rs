@@ -286,6 +286,34 @@ impl Canvas<'_> {
         drawn(self.area.draw(&Rectangle::new(corners, colour.filled())))
     }
 
+    /// A straight upright line, its middle at `x`, that ends square at `from` and `to`.
+    pub fn upright(
+        &self,
+        x: f64,
+        (from, to): (f64, f64),
+        width: f64,
+        colour: Colour,
+    ) -> Result<()> {
+        let line = Rect {
+            left: x - width / 2.0,
+            right: x + width / 2.0,
+            top: from,
+            bottom: to,
+        };
+        self.fill(line, colour)
+    }
+
+    /// A straight level line, its middle at `y`, that ends square at `from` and `to`.
+    pub fn level(&self, y: f64, (from, to): (f64, f64), width: f64, colour: Colour) -> Result<()> {
+        let line = Rect {
+            left: from,
+            right: to,
+            top: y - width / 2.0,
+            bottom: y + width / 2.0,
+        };
+        self.fill(line, colour)
+    }
+
     /// Fills a rectangle with an image, made for its width and height in drawn pixels and the drawn pixels a point.
     pub fn image(
         &self,
@@ -305,25 +333,11 @@ impl Canvas<'_> {
     /// Draws the outline of a rectangle, its middle on the rectangle's edge.
     pub fn outline(&self, rect: Rect, width: f64, colour: Colour) -> Result<()> {
         let h = width / 2.0;
-        let Rect {
-            left,
-            top,
-            right,
-            bottom,
-        } = rect;
-        for (left, top, right, bottom) in [
-            (left - h, top - h, right + h, top + h),
-            (left - h, bottom - h, right + h, bottom + h),
-            (left - h, top - h, left + h, bottom + h),
-            (right - h, top - h, right + h, bottom + h),
-        ] {
-            let side = Rect {
-                left,
-                top,
-                right,
-                bottom,
-            };
-            self.fill(side, colour)?;
+        for y in [rect.top, rect.bottom] {
+            self.level(y, (rect.left - h, rect.right + h), width, colour)?;
+        }
+        for x in [rect.left, rect.right] {
+            self.upright(x, (rect.top - h, rect.bottom + h), width, colour)?;
         }
         Ok(())
     }

@@ -356,17 +356,11 @@ pub(super) fn draw_x_axis(
     label: &str,
     labelled: bool,
 ) -> Result<()> {
-    let h = FRAME_WIDTH / 2.0;
     let baseline = frame.bottom + TICK_LENGTH + TICK_GAP + CAP_HEIGHT * TICK_SIZE;
     for tick in ticks {
         let at = frame.left + tick.at * frame.width();
-        let mark = Rect {
-            left: at - h,
-            right: at + h,
-            top: frame.bottom,
-            bottom: frame.bottom + tick_length(tick),
-        };
-        canvas.fill(mark, FRAME_COLOUR)?;
+        let reach = (frame.bottom, frame.bottom + tick_length(tick));
+        canvas.upright(at, reach, FRAME_WIDTH, FRAME_COLOUR)?;
         if let Some(label) = tick.label.as_deref().filter(|_| labelled) {
             let place = (at, baseline);
             canvas.text(label, place, TICK_SIZE, Anchor::Middle, false, TEXT_COLOUR)?;
@@ -388,16 +382,10 @@ pub(super) fn draw_y_axis(
     ticks: &[Tick],
     label: &str,
 ) -> Result<()> {
-    let h = FRAME_WIDTH / 2.0;
     for tick in ticks {
         let at = frame.bottom - tick.at * frame.height();
-        let mark = Rect {
-            left: frame.left - tick_length(tick),
-            right: frame.left,
-            top: at - h,
-            bottom: at + h,
-        };
-        canvas.fill(mark, FRAME_COLOUR)?;
+        let reach = (frame.left - tick_length(tick), frame.left);
+        canvas.level(at, reach, FRAME_WIDTH, FRAME_COLOUR)?;
         if let Some(label) = &tick.label {
             let right = frame.left - TICK_LENGTH - TICK_GAP;
             let place = (right, at + CAP_HEIGHT / 2.0 * TICK_SIZE);

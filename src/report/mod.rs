@@ -33,7 +33,7 @@ pub use compare::compare;
 pub use figure::{Figure, Panel};
 pub use number::readable;
 pub use plot::LinePlot;
-pub use png::Image;
+pub use png::{Animation, Image};
 pub use render::{
     ColourMap, ColourScale, Finish, Paint, Picture, Points, Stroke, Surface, Vectors, View,
 };

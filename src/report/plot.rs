@@ -375,24 +375,13 @@ fn with_aspect(frame: Rect, aspect: f64) -> Rect {
 }
 
 fn draw_grid(canvas: &Canvas<'_>, frame: Rect, x: &[Tick], y: &[Tick]) -> Result<()> {
-    let h = GRID_WIDTH / 2.0;
     for tick in x.iter().filter(|t| t.label.is_some()) {
         let at = frame.left + tick.at * frame.width();
-        let line = Rect {
-            left: at - h,
-            right: at + h,
-            ..frame
-        };
-        canvas.fill(line, GRID_COLOUR)?;
+        canvas.upright(at, (frame.top, frame.bottom), GRID_WIDTH, GRID_COLOUR)?;
     }
     for tick in y.iter().filter(|t| t.label.is_some()) {
         let at = frame.bottom - tick.at * frame.height();
-        let line = Rect {
-            top: at - h,
-            bottom: at + h,
-            ..frame
-        };
-        canvas.fill(line, GRID_COLOUR)?;
+        canvas.level(at, (frame.left, frame.right), GRID_WIDTH, GRID_COLOUR)?;
     }
     Ok(())
 }

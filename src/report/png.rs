@@ -56,18 +56,66 @@ impl Image {
     /// # Errors
     /// Those of `out`, and a width or height of 0.
     pub fn write_png(&self, out: &mut dyn Write) -> io::Result<()> {
+        let mut writer = self.encoder(out).write_header()?;
+        writer.write_image_data(&self.rgb)?;
+        Ok(writer.finish()?)
+    }
+
+    fn encoder<W: Write>(&self, out: W) -> png::Encoder<'static, W> {
         let mut encoder = png::Encoder::new(out, self.width, self.height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(png::Compression::High);
         // Drawings are runs of one colour, which deflate sees best unfiltered.
         encoder.set_filter(png::Filter::NoFilter);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&self.rgb)?;
-        Ok(writer.finish()?)
+        encoder
     }
 
     /// Writes the PNG file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`](crate::Error::Io) if it cannot be written.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        write_file(path, |out| self.write_png(out))
+    }
+}
+
+/// Images of one size shown one after the other, again and again: an animated PNG, which every browser plays, and of
+/// which other programs show the first image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Animation {
+    pub frames: Vec<Image>,
+    /// How long each image is shown; the last one three times as long.
+    pub milliseconds: u16,
+}
+
+impl Animation {
+    /// Writes the animated PNG.
+    ///
+    /// # Errors
+    /// Those of `out`; no image at all, or images of different sizes.
+    pub fn write_png(&self, out: &mut dyn Write) -> io::Result<()> {
+        let refuse = |what| io::Error::new(io::ErrorKind::InvalidInput, what);
+        let (Some(first), Ok(count)) = (self.frames.first(), u32::try_from(self.frames.len()))
+        else {
+            return Err(refuse("an animation needs an image"));
+        };
+        let size = |image: &Image| (image.width, image.height);
+        if self.frames.iter().any(|f| size(f) != size(first)) {
+            return Err(refuse("the images of an animation are of one size"));
+        }
+        let mut encoder = first.encoder(out);
+        encoder.set_animated(count, 0)?;
+        let mut writer = encoder.write_header()?;
+        for (i, frame) in (1..).zip(&self.frames) {
+            let times = if i == count { 3 } else { 1 };
+            writer.set_frame_delay(self.milliseconds.saturating_mul(times), 1000)?;
+            writer.write_image_data(&frame.rgb)?;
+        }
+        Ok(writer.finish()?)
+    }
+
+    /// Writes the file at `path`.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io) if it cannot be written.
@@ -115,6 +163,39 @@ mod tests {
         let info = reader.next_frame(&mut decoded).unwrap();
         assert_eq!((info.width, info.height), (7, 5));
         assert_eq!(decoded, image.rgb);
+    }
+
+    #[test]
+    fn an_animation_decodes_to_its_images() {
+        let frame = |shade: u8| Image {
+            width: 4,
+            height: 3,
+            rgb: (0..36).map(|i| shade.wrapping_add(i)).collect(),
+        };
+        let animation = Animation {
+            frames: [7, 90, 200].map(frame).to_vec(),
+            milliseconds: 400,
+        };
+        let mut bytes = Vec::new();
+        animation.write_png(&mut bytes).unwrap();
+        let mut reader = png::Decoder::new(io::Cursor::new(&bytes))
+            .read_info()
+            .unwrap();
+        let control = *reader.info().animation_control().unwrap();
+        assert_eq!((control.num_frames, control.num_plays), (3, 0));
+        for (i, image) in animation.frames.iter().enumerate() {
+            let mut decoded = vec![0; reader.output_buffer_size().unwrap()];
+            reader.next_frame(&mut decoded).unwrap();
+            assert_eq!(decoded, image.rgb);
+            let shown = reader.info().frame_control().unwrap();
+            let expected = if i == 2 { 1200 } else { 400 };
+            assert_eq!((shown.delay_num, shown.delay_den), (expected, 1000));
+        }
+        let mut odd = animation.clone();
+        odd.frames[1].width = 2;
+        assert!(odd.write_png(&mut Vec::new()).is_err());
+        odd.frames.clear();
+        assert!(odd.write_png(&mut Vec::new()).is_err());
     }
 
     #[test]

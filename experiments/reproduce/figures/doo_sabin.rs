@@ -1,4 +1,4 @@
-//! Zheng-Cai Fig. 3–6 and 8: auxiliary meshes, corrected first refinements, Doo-Sabin surfaces, given normals and
+//! Zheng-Cai Fig. 3–8: auxiliary meshes, corrected first refinements, Doo-Sabin surfaces, given normals and
 //! shape handles; Nasri's method beside theirs.
 
 use glam::DVec3;
@@ -286,6 +286,42 @@ pub fn with_normals(album: &mut Album) -> Result<()> {
                  (green); their faces red";
     let line = tagged.line("zheng-cai-6", shows, &held);
     album.add(&line, &sheet(3, (150, 115), panels))
+}
+
+/// Fig. 7: what a shape handle does to a type-V face.
+pub fn scaled_faces(album: &mut Album) -> Result<()> {
+    let tagged = Tagged::new()?;
+    let tip = tagged.subject.mesh.positions[tagged.tips[1]];
+    let mut last = tagged.solve(false, 1.0)?;
+    let mut pictures = Vec::new();
+    let mut framed = Vec::new();
+    for (caption, handle) in [("s = 1", 1.0), ("s = 0.4", 0.4), ("s = 2.5", 2.5)] {
+        last = tagged.solve(false, handle)?;
+        let face = last.first.first_vertex_face + tagged.tips[1];
+        let corners = last.first.mesh.faces.face(face);
+        let corners: Vec<DVec3> = (corners.iter())
+            .map(|&c| last.first.mesh.positions[c as usize])
+            .collect();
+        let rays = Vectors {
+            tails: vec![tip; corners.len()],
+            vectors: corners.iter().map(|c| *c - tip).collect(),
+            width: 0.9,
+            colour: NORMAL,
+        };
+        let mut picture =
+            Picture::new(caption, view(DVec3::Y, 75.0, 20.0)).surface(tagged.first(&last));
+        picture.points.push(tagged.points());
+        picture.vectors.push(rays);
+        pictures.push(picture);
+        framed.extend(&last.first.mesh.positions);
+    }
+    for picture in &mut pictures {
+        picture.framed = Some(framed.clone());
+    }
+    let shows = "Zheng-Cai Fig. 7: the type-V face of an interpolated vertex (red) scaled by s about its centroid, which \
+                 is the given point; lines to its corners green";
+    let line = tagged.line("zheng-cai-7", shows, &last);
+    album.add(&line, &sheet(3, (130, 125), pictures))
 }
 
 /// Fig. 8: the same with shape handles.

@@ -4,11 +4,12 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::assemble::Scheme;
-use limitlab::report::{Picture, Points};
+use limitlab::report::{Figure, Picture, Points};
 use limitlab::solvers::Setup;
 use limitlab::subdivide::Refinement;
 
 use super::{Album, GIVEN, Line, POINT, cage, control, limit_surface, sheet, view};
+use crate::context::Subject;
 
 /// A figure of the PIA paper.
 struct Printed {
@@ -157,16 +158,15 @@ pub fn pia(album: &mut Album) -> Result<()> {
 /// Iterates of the series.
 const SERIES: [usize; 6] = [0, 1, 2, 3, 5, 10];
 
-/// Thall's iteration: the limit surface of every iterate, with the points that it has to reach.
-pub fn thall_series(album: &mut Album) -> Result<()> {
-    let subject = album.subject("closed/spot_188v_poly.off", "quad-sphere:2")?;
+/// The limit surfaces of Thall's iterates, with the points that they have to reach, and the last one's error.
+fn thall_pictures(subject: &Subject, iterates: &[usize]) -> Result<(Vec<Picture>, f64)> {
     let system = subject.system(Scheme::CatmullClark)?;
     let size = subject.mesh.diagonal();
     let view = view(DVec3::Y, 60.0, 12.0);
     let mut panels = Vec::new();
     let mut last = 0.0;
-    for k in SERIES {
-        let (cage_mesh, error) = control(&subject, &system, Setup::THALL, k);
+    for &k in iterates {
+        let (cage_mesh, error) = control(subject, &system, Setup::THALL, k);
         last = error;
         let caption = format!("k = {k}: error {:.2} %", 100.0 * error / size);
         let picture = Picture::new(caption, view)
@@ -179,6 +179,15 @@ pub fn thall_series(album: &mut Album) -> Result<()> {
             .frame(&subject.mesh.positions);
         panels.push(picture);
     }
+    Ok((panels, last))
+}
+
+const THALL_MODEL: (&str, &str) = ("closed/spot_188v_poly.off", "quad-sphere:2");
+
+/// Thall's iteration: the limit surface of every iterate, with the points that it has to reach.
+pub fn thall_series(album: &mut Album) -> Result<()> {
+    let subject = album.subject(THALL_MODEL.0, THALL_MODEL.1)?;
+    let (panels, last) = thall_pictures(&subject, &SERIES)?;
     let line = Line {
         name: "thall-iterations",
         shows: "Thall's iteration, ω = ½: the Catmull-Clark surface of iterate 0, 1, 2, … and the given points",
@@ -187,4 +196,22 @@ pub fn thall_series(album: &mut Album) -> Result<()> {
         error: Some(last),
     };
     album.add(&line, &sheet(3, (106, 116), panels))
+}
+
+/// The same, moving.
+pub fn thall_animation(album: &mut Album) -> Result<()> {
+    let subject = album.subject(THALL_MODEL.0, THALL_MODEL.1)?;
+    let iterates: Vec<usize> = (0..=6).collect();
+    let (panels, last) = thall_pictures(&subject, &iterates)?;
+    let frames: Vec<Figure> = (panels.into_iter())
+        .map(|panel| sheet(1, (106, 116), vec![panel]))
+        .collect();
+    let line = Line {
+        name: "thall-animation",
+        shows: "Thall's iteration, ω = ½, as an animated PNG: iterates 0 to 6 and the given points",
+        subject: &subject,
+        iterations: iterates.last().copied(),
+        error: Some(last),
+    };
+    album.animate(&line, &frames)
 }

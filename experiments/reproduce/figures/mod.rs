@@ -3,6 +3,7 @@
 //! A picture is `figures--NAME.png`; the table `figures` says what each shows, on which mesh, and how far the surface
 //! is from the points.
 
+mod curves;
 mod doo_sabin;
 mod errors;
 mod limits;
@@ -41,6 +42,7 @@ fn run(context: &mut Context) -> Result<()> {
     let mut album = Album::new(context);
     limits::thall_series(&mut album)?;
     if !album.context.quick {
+        limits::thall_animation(&mut album)?;
         limits::pia(&mut album)?;
         normals::bones(&mut album)?;
         normals::end_cap(&mut album)?;
@@ -50,7 +52,11 @@ fn run(context: &mut Context) -> Result<()> {
         doo_sabin::against_nasri(&mut album)?;
         doo_sabin::large(&mut album)?;
         doo_sabin::with_normals(&mut album)?;
+        doo_sabin::scaled_faces(&mut album)?;
         doo_sabin::with_handles(&mut album)?;
+        curves::relation(&mut album)?;
+        curves::samples(&mut album)?;
+        curves::stencils(&mut album)?;
         sqrt3::against_butterfly(&mut album)?;
         sqrt3::bunny(&mut album)?;
         sqrt3::parameters(&mut album)?;
@@ -119,6 +125,19 @@ impl<'a> Album<'a> {
     }
 
     fn add(&mut self, line: &Line, figure: &Figure) -> Result<()> {
+        self.list(line);
+        self.context
+            .figure(&format!("{}--{}", ALL.id, line.name), figure)
+    }
+
+    /// As [`add`](Self::add), figures one after the other.
+    fn animate(&mut self, line: &Line, figures: &[Figure]) -> Result<()> {
+        self.list(line);
+        self.context
+            .animation(&format!("{}--{}", ALL.id, line.name), figures)
+    }
+
+    fn list(&mut self, line: &Line) {
         let size = line.subject.mesh.diagonal();
         self.table.push(vec![
             line.name.into(),
@@ -128,8 +147,6 @@ impl<'a> Album<'a> {
             line.iterations.into(),
             line.error.map(|e| 100.0 * e / size).into(),
         ]);
-        self.context
-            .figure(&format!("{}--{}", ALL.id, line.name), figure)
     }
 }
 

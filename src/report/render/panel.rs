@@ -101,13 +101,8 @@ fn draw_bar(canvas: &Canvas<'_>, frame: Rect, scale: &ColourScale) -> Result<()>
     for tick in axis.ticks((length / TICK_PITCH) as usize) {
         let Some(label) = &tick.label else { continue };
         let y = bar.bottom - tick.at * bar.height();
-        let mark = Rect {
-            left: bar.right,
-            right: bar.right + TICK_LENGTH,
-            top: y - FRAME_WIDTH / 2.0,
-            bottom: y + FRAME_WIDTH / 2.0,
-        };
-        canvas.fill(mark, FRAME_COLOUR)?;
+        let reach = (bar.right, bar.right + TICK_LENGTH);
+        canvas.level(y, reach, FRAME_WIDTH, FRAME_COLOUR)?;
         let place = (
             bar.right + TICK_LENGTH + TICK_GAP,
             y + CAP_HEIGHT / 2.0 * TICK_SIZE,
