@@ -14,7 +14,7 @@ use faer::sparse::SparseColMat;
 use faer::sparse::linalg::matmul::sparse_dense_matmul;
 use faer::{Accum, Par};
 use glam::DVec3;
-use limitlab::assemble::operator::gather;
+use limitlab::mesh::order::in_fronts;
 use limitlab::assemble::{Csr, LimitSystem, Operator, Scheme};
 use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::noise::add_noise;
@@ -64,9 +64,12 @@ fn assembly(c: &mut Criterion) {
         b.iter(|| Operator::new(&mesh.faces, &topology, SCHEME));
     });
     let operator = Operator::new(&mesh.faces, &topology, SCHEME).expect("an operator");
-    group.bench_function("front order", |b| b.iter(|| operator.front_order()));
-    let order = operator.front_order();
-    group.bench_function("renumbering", |b| b.iter(|| operator.renumbered(&order)));
+    let incidence = &topology.incidence;
+    group.bench_function("front order", |b| b.iter(|| in_fronts(&mesh.faces, incidence)));
+    let fronts = in_fronts(&mesh.faces, incidence);
+    group.bench_function("operator in front order", |b| {
+        b.iter(|| Operator::closed_in_order(&mesh.faces, incidence, SCHEME, Some(&fronts)));
+    });
     // The libraries are given A's entries, summed already: their part is the conversion only.
     group.bench_function("faer, from triplets", |b| {
         let triplets: Vec<_> = entries
@@ -107,10 +110,11 @@ fn sweep(c: &mut Criterion) {
     let topology = Topology::new(&mesh.faces, n);
     let system = LimitSystem::new(&mesh, &topology, SCHEME).expect("a system");
     let file = Operator::new(&mesh.faces, &topology, SCHEME).expect("an operator");
-    let order = file.front_order();
-    let front = file.renumbered(&order);
+    let fronts = in_fronts(&mesh.faces, &topology.incidence);
+    let front = Operator::in_order(&mesh.faces, &topology, SCHEME, Some(&fronts));
+    let front = front.expect("an operator");
     let x = &mesh.positions;
-    let moved = gather(x, &order);
+    let moved = fronts.there(x);
     let mut y = vec![DVec3::ZERO; n];
     let mut rows = Rows::new(n);
     let mut group = c.benchmark_group("A times three columns");
@@ -184,9 +188,10 @@ fn methods(c: &mut Criterion) {
     let topology = Topology::new(&mesh.faces, n);
     let system = LimitSystem::new(&mesh, &topology, SCHEME).expect("a system");
     let file = Operator::new(&mesh.faces, &topology, SCHEME).expect("an operator");
-    let order = file.front_order();
-    let front = file.renumbered(&order);
-    let moved = gather(points, &order);
+    let fronts = in_fronts(&mesh.faces, &topology.incidence);
+    let front = Operator::in_order(&mesh.faces, &topology, SCHEME, Some(&fronts));
+    let front = front.expect("an operator");
+    let moved = fronts.there(points);
     let stop = Stop {
         tolerance: 1e-10 * mesh.diagonal(),
         max_iterations: 1000,
@@ -197,7 +202,7 @@ fn methods(c: &mut Criterion) {
         b.iter(|| control_points(&mesh, None, SCHEME, &stop));
     });
     group.bench_function("mixed precision", |b| {
-        b.iter(|| mixed::solve(&front, &moved, 0.0, &stop));
+        b.iter(|| mixed::solve(&front, &moved, &stop));
     });
     let plain = baseline::Plain::new(&mesh, SCHEME).expect("quads only");
     group.bench_function("plain index-only chebyshev", |b| {

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3A};
 use limitlab::assemble::{LimitSystem, Operator, Scheme};
 use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::generate::{dual, permute_vertices, random_polygons, shuffle_faces, union};
-use limitlab::mesh::order::{Order, along_curve, inverse, is_scattered};
+use limitlab::mesh::order::{Numbering, Order, along_curve, in_fronts, is_scattered};
 use limitlab::mesh::{Faces, Mesh, Topology, builtin::builtin, noise::add_noise};
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
 use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
@@ -56,9 +56,18 @@ fn meshes() -> Vec<(String, Mesh)> {
     meshes
 }
 
+/// The operator with its rows in fronts.
+fn in_front_order(case: &Both) -> (Operator, Numbering) {
+    let topology = Topology::new(&case.mesh.faces, case.mesh.len());
+    let numbering = in_fronts(&case.mesh.faces, &topology.incidence);
+    let operator = Operator::in_order(&case.mesh.faces, &topology, case.scheme, Some(&numbering));
+    (operator.expect("an operator"), numbering)
+}
+
 struct Both {
     name: String,
     mesh: Mesh,
+    scheme: Scheme,
     explicit: LimitSystem,
     operator: Operator,
 }
@@ -67,6 +76,7 @@ fn both(name: &str, mesh: Mesh, scheme: Scheme) -> Both {
     let topology = Topology::new(&mesh.faces, mesh.len());
     Both {
         name: format!("{name}, {scheme}"),
+        scheme,
         explicit: LimitSystem::new(&mesh, &topology, scheme).expect("an explicit system"),
         operator: Operator::new(&mesh.faces, &topology, scheme).expect("an operator"),
         mesh,
@@ -152,7 +162,8 @@ fn single_precision_rows_agree_to_single_rounding() {
         let mut moments = Vec::new();
         case.operator.moments(&single, &mut moments);
         let n = x.len();
-        case.operator.rows(0..n, (&single, 0), &moments, |i, ax| {
+        let rows = |count| (0..n).take(count);
+        case.operator.rows(0..n, (&single, 0), &moments, rows, |i, _, ax| {
             let difference = (ax.as_dvec3() - expected[i]).length();
             assert!(difference <= 4e-6, "{}: {difference}", case.name);
         });
@@ -165,19 +176,28 @@ fn renumbering_permutes_rows_and_the_front_order_is_a_permutation() {
         let n = case.operator.len();
         let x = rough(n);
         let expected = product(&case.explicit, &x);
-        let front = case.operator.front_order();
-        let shuffled =
-            Order::Random(5).order(&case.mesh, &Topology::new(&case.mesh.faces, n).incidence);
-        for order in [front, shuffled] {
-            let place = inverse(&order);
-            let moved = case.operator.renumbered(&order);
-            let moved_x: Vec<DVec3> = order.iter().map(|&v| x[v as usize]).collect();
-            let product = product(&moved, &moved_x);
-            let back: Vec<DVec3> = place.iter().map(|&k| product[k as usize]).collect();
-            assert_close(&case.name, &back, &expected, ROUNDING);
-            let again = moved.renumbered(&place);
-            assert_eq!(again.reach(), case.operator.reach());
-            assert_eq!(again.diagonal(), case.operator.diagonal());
+        let faces = &case.mesh.faces;
+        let topology = Topology::new(faces, n);
+        let front = in_fronts(faces, &topology.incidence);
+        let shuffled = Order::Random(5).order(&case.mesh, &topology.incidence);
+        let file = Numbering::new((0..n as u32).collect());
+        for numbering in [front, Numbering::new(shuffled), file] {
+            let moved = Operator::in_order(faces, &topology, case.scheme, Some(&numbering))
+                .expect("an operator");
+            let product = product(&moved, &numbering.there(&x));
+            assert_close(&case.name, &numbering.back(&product), &expected, ROUNDING);
+            assert_eq!(numbering.back(moved.diagonal()), case.operator.diagonal());
+            assert_eq!(numbering.back(moved.weights()), case.operator.weights());
+            assert_eq!(moved.bounds(), case.operator.bounds());
+            let closed = Operator::closed_in_order(
+                faces,
+                &topology.incidence,
+                case.scheme,
+                Some(&numbering),
+            )
+            .expect("an operator");
+            let again = crate::product(&closed, &numbering.there(&x));
+            assert!(again == product, "{}", case.name);
         }
     }
 }
@@ -199,7 +219,7 @@ fn distances_beyond_16_bits_are_stored_in_full() {
             &product(&case.explicit, &x),
             ROUNDING,
         );
-        let near = case.operator.renumbered(&case.operator.front_order());
+        let near = in_front_order(&case).0;
         assert!(near.reach() < Some(1 << 11));
         assert!(near.sweep_bytes() < case.operator.sweep_bytes());
     }
@@ -292,8 +312,9 @@ fn bands_change_no_bit() {
             if scheme.first_unsuitable_face(&mesh.faces).is_some() {
                 continue;
             }
-            let operator = Operator::new(&mesh.faces, &topology, scheme).expect("an operator");
-            let operator = operator.renumbered(&operator.front_order());
+            let front = in_fronts(&mesh.faces, &topology.incidence);
+            let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&front))
+                .expect("an operator");
             let r = rough(mesh.len());
             let recurrence = Recurrence::new((0.1, 1.0));
             let first = recurrence.coefficients().1;
@@ -348,7 +369,7 @@ fn mixed_precision_meets_the_tolerance_with_any_number_of_threads() {
             max_iterations: 10_000,
         };
         let bound = case.explicit.bounds.lambda_min;
-        let solve = || mixed::solve(&case.operator, points, bound, &stop);
+        let solve = || mixed::solve(&case.operator, points, &stop);
         let (control, report) = in_threads(1, solve);
         // Where the bound is 0, λ_min may be too small, or 0 (the cube).
         if bound > 0.0 {
@@ -366,15 +387,14 @@ fn mixed_precision_meets_the_tolerance_with_any_number_of_threads() {
 fn large_meshes_take_the_banded_way_with_the_same_result_as_the_explicit_method() {
     // 163 842 vertices: above the size from which iterations are grouped.
     let case = both("icosphere:7", mesh("icosphere:7"), Scheme::Loop);
-    let order = case.operator.front_order();
-    let operator = case.operator.renumbered(&order);
-    let points = limitlab::assemble::operator::gather(&case.mesh.positions, &order);
+    let (operator, numbering) = in_front_order(&case);
+    let points = numbering.there(&case.mesh.positions);
     let stop = Stop {
         tolerance: 1e-10 * case.mesh.diagonal(),
         max_iterations: 1000,
     };
     let bound = operator.bounds().lambda_min;
-    let solve = || mixed::solve(&operator, &points, bound, &stop);
+    let solve = || mixed::solve(&operator, &points, &stop);
     let one = in_threads(1, solve);
     assert!(one == in_threads(2, solve));
     assert_eq!(one.1.outcome, Outcome::Converged);
@@ -382,7 +402,7 @@ fn large_meshes_take_the_banded_way_with_the_same_result_as_the_explicit_method(
         spectrum: (bound, 1.0),
     };
     let reference = run(&case.explicit, &case.mesh.positions, setup, &stop);
-    let expected = limitlab::assemble::operator::gather(&reference.points, &order);
+    let expected = numbering.there(&reference.points);
     // Both are within tolerance/λ_min of the solution, in a norm close to the greatest difference.
     assert_close(
         "icosphere:7",
@@ -400,7 +420,7 @@ fn mixed_precision_stalls_on_inconsistent_data_of_a_singular_matrix() {
         tolerance: 1e-10,
         max_iterations: 10_000,
     };
-    let (_, report) = mixed::solve(&case.operator, &case.mesh.positions, 0.0, &stop);
+    let (_, report) = mixed::solve(&case.operator, &case.mesh.positions, &stop);
     assert_eq!(report.outcome, Outcome::Stagnated);
     // The cube's own points have no part in the kernel.
     let exact = both(
@@ -408,7 +428,7 @@ fn mixed_precision_stalls_on_inconsistent_data_of_a_singular_matrix() {
         builtin("cube").expect("a mesh"),
         Scheme::CatmullClark,
     );
-    let (_, report) = mixed::solve(&exact.operator, &exact.mesh.positions, 0.0, &stop);
+    let (_, report) = mixed::solve(&exact.operator, &exact.mesh.positions, &stop);
     assert_eq!(report.outcome, Outcome::Converged);
 }
 
@@ -422,7 +442,7 @@ fn an_interval_that_is_too_short_is_corrected() {
         tolerance: 1e-10,
         max_iterations: 10_000,
     };
-    let (control, report) = mixed::solve(&case.operator, &case.mesh.positions, 0.0, &stop);
+    let (control, report) = mixed::solve(&case.operator, &case.mesh.positions, &stop);
     assert_eq!(report.outcome, Outcome::Converged, "{report:?}");
     let lu = run(&case.explicit, &case.mesh.positions, Setup::Lu, &stop);
     assert_close("prism:7", &control, &lu.points, 1e-8);
@@ -447,7 +467,7 @@ fn scatter_is_recognised_and_mended() {
             assert!(is_scattered(&scattered.faces), "{name}");
             let (mended, order) = along_curve(&scattered).expect("good indices");
             assert!(!is_scattered(&mended.faces), "{name}");
-            for (k, &v) in order.iter().enumerate() {
+            for (k, &v) in order.order().iter().enumerate() {
                 assert_eq!(mended.positions[k], scattered.positions[v as usize]);
             }
             // The same faces, in another order.
@@ -459,7 +479,7 @@ fn scatter_is_recognised_and_mended() {
                 list.sort_unstable();
                 list
             };
-            let theirs = sorted(&mended.faces, &|v| order[v as usize]);
+            let theirs = sorted(&mended.faces, &|v| order.order()[v as usize]);
             assert!(theirs == sorted(&scattered.faces, &|v| v), "{name}");
         }
     }
@@ -494,7 +514,7 @@ fn local_edits_give_what_solving_anew_gives() {
             max_iterations: 1000,
         };
         let bound = case.explicit.bounds.lambda_min;
-        let (control, _) = mixed::solve(&case.operator, points, bound, &stop);
+        let (control, _) = mixed::solve(&case.operator, points, &stop);
         let mut editor = Editor::new(&case.operator, points.clone(), control);
         let moves: Vec<(u32, DVec3)> = [0, n / 3, n - 1]
             .map(|v| (v as u32, points[v] + DVec3::new(0.1, -0.2, 0.05)))
@@ -535,7 +555,7 @@ fn the_work_of_an_edit_does_not_grow_with_the_mesh() {
             tolerance: 1e-10,
             max_iterations: 1000,
         };
-        let (control, _) = mixed::solve(&case.operator, &points, 0.1, &stop);
+        let (control, _) = mixed::solve(&case.operator, &points, &stop);
         let mut editor = Editor::new(&case.operator, points.clone(), control);
         let edit = editor.edit(&[(20, points[20] + DVec3::X)], 1e-8, usize::MAX);
         (edit.touched, case.mesh.len())

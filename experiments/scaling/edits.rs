@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use glam::DVec3;
 use limitlab::Result;
-use limitlab::assemble::operator::gather;
 use limitlab::assemble::{Operator, Scheme};
+use limitlab::mesh::order::in_fronts;
 use limitlab::mesh::{Mesh, Topology};
 use limitlab::report::{Column, Table};
 use limitlab::solvers::local::{Editor, decay};
@@ -49,17 +49,15 @@ pub fn edits(
 ) -> Result<Operator> {
     let n = mesh.len();
     let topology = Topology::new(&mesh.faces, n);
-    let operator = Operator::new(&mesh.faces, &topology, scheme)?;
-    let order = operator.front_order();
-    let operator = operator.renumbered(&order);
-    let points = gather(&mesh.positions, &order);
+    let fronts = in_fronts(&mesh.faces, &topology.incidence);
+    let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&fronts))?;
+    let points = fronts.there(&mesh.positions);
     let length = mesh.diagonal();
     let stop = Stop {
         tolerance: tol * length,
         max_iterations: 10_000,
     };
-    let bound = operator.bounds().lambda_min;
-    let (control, _) = mixed::solve(&operator, &points, bound, &stop);
+    let (control, _) = mixed::solve(&operator, &points, &stop);
     let mut editor = Editor::new(&operator, points, control);
     for count in [1, 10, 100] {
         let shift = DVec3::new(0.01, 0.0, 0.0) * length;
@@ -71,7 +69,7 @@ pub fn edits(
         let edit = editor.edit(&moves, stop.tolerance, usize::MAX);
         let edit_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let (anew, _) = mixed::solve(&operator, editor.points(), bound, &stop);
+        let (anew, _) = mixed::solve(&operator, editor.points(), &stop);
         let anew_seconds = start.elapsed().as_secs_f64();
         let pairs = editor.control().iter().zip(&anew);
         let difference = pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);

@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use glam::{DVec3, Vec3A};
 use limitlab::Result;
-use limitlab::assemble::operator::gather;
 use limitlab::assemble::{LimitSystem, Operator, Scheme};
+use limitlab::mesh::order::in_fronts;
 use limitlab::mesh::{Mesh, Topology};
 use limitlab::report::{Column, Table};
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
@@ -27,9 +27,9 @@ pub fn profile(name: &str, mesh: &Mesh, scheme: Scheme, threads: usize) -> Resul
     let topology = Topology::new(&mesh.faces, mesh.len());
     let explicit = LimitSystem::new(mesh, &topology, scheme)?;
     let free = Operator::new(&mesh.faces, &topology, scheme)?;
-    let order = free.front_order();
-    let front = free.renumbered(&order);
-    let moved = gather(points, &order);
+    let fronts = in_fronts(&mesh.faces, &topology.incidence);
+    let front = Operator::in_order(&mesh.faces, &topology, scheme, Some(&fronts))?;
+    let moved = fronts.there(points);
     let bandwidth = triad();
     let entries = explicit.m.values().len() as f64 / n;
     // A multiplication and an addition for each of three coordinates; without stored weights one addition a

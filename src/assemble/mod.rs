@@ -3,6 +3,7 @@
 //! This room knows no solvers.
 
 pub mod bounds;
+mod codes;
 pub mod csr;
 pub mod matrix_market;
 pub mod operator;

@@ -3,20 +3,19 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::bounds::SpectralBounds;
+use super::bounds::{SpectralBounds, usual_lambda_min};
 use super::scheme::{Masks, Scheme};
-use super::source::{Encode, Source, fill_rows};
-use super::stencil::{Code, Kind, LargeFaces, Listed, Neighbours, Point, Stencil, runs};
-use super::system::check_mesh;
+use super::source::Source;
+use super::codes::{Codes, Neighbours};
+use super::stencil::{Kind, LargeFaces, Listed, Point, Stencil, runs};
+use super::system::{check_boundary, check_faces};
 use crate::error::Result;
 use crate::mesh::topology::NONE;
-use crate::mesh::{Faces, Topology};
+use crate::mesh::order::Numbering;
+use crate::mesh::{Faces, Incidence, Topology};
 
 /// Rows of one task.
 const CHUNK: usize = 4096;
-/// Consecutive vertices among which equal valences are brought together: few enough to leave the order's locality
-/// alone, enough for runs that a branch predictor follows. Tuned on an irregular quad sphere.
-const GROUP: usize = 256;
 
 /// A = H·M without stored entries: a row knows its neighbours, and its weights follow from valence and face size.
 ///
@@ -31,6 +30,7 @@ pub struct Operator {
     h: Vec<f64>,
     diagonal: Vec<f64>,
     bounds: SpectralBounds,
+    usual_lambda_min: f64,
 }
 
 impl Operator {
@@ -39,15 +39,68 @@ impl Operator {
     /// # Errors
     /// As [`LimitSystem::new`](super::LimitSystem::new); more than 2³² − 1 neighbours.
     pub fn new(faces: &Faces, topology: &Topology, scheme: Scheme) -> Result<Self> {
-        check_mesh(faces, topology, scheme)?;
-        let source = Source::new(faces, topology, scheme);
+        Self::in_order(faces, topology, scheme, None)
+    }
+
+    /// As [`new`](Self::new), with the rows in another order: the k-th is that of the vertex at place k, and its
+    /// neighbours are rows too.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    ///
+    /// # Panics
+    /// If the numbering is of another number of vertices.
+    pub fn in_order(
+        faces: &Faces,
+        topology: &Topology,
+        scheme: Scheme,
+        numbering: Option<&Numbering>,
+    ) -> Result<Self> {
+        check_boundary(topology, scheme)?;
+        let open = (topology.boundary_edges() > 0).then_some(topology);
+        let mut operator = Self::build(faces, (&topology.incidence, open), scheme, numbering)?;
+        if !topology.is_closed() {
+            operator.bounds = SpectralBounds::gershgorin(&operator.diagonal);
+        }
+        Ok(operator)
+    }
+
+    /// As [`in_order`](Self::in_order), on a mesh that is [closed](Incidence::is_closed): a topology is not needed.
+    ///
+    /// # Errors
+    /// A face that is no triangle under Loop or √3; more than 2³² − 1 neighbours.
+    ///
+    /// # Panics
+    /// If the numbering is of another number of vertices.
+    pub fn closed_in_order(
+        faces: &Faces,
+        incidence: &Incidence,
+        scheme: Scheme,
+        numbering: Option<&Numbering>,
+    ) -> Result<Self> {
+        Self::build(faces, (incidence, None), scheme, numbering)
+    }
+
+    fn build(
+        faces: &Faces,
+        sides: (&Incidence, Option<&Topology>),
+        scheme: Scheme,
+        numbering: Option<&Numbering>,
+    ) -> Result<Self> {
+        check_faces(faces, scheme)?;
+        let source = Source::new(faces, sides, scheme, numbering);
         let n = source.valences.len();
         let kinds = source.kinds();
         let greatest = source.valences.iter().copied().max().unwrap_or(0);
         let by_valence: Vec<f64> = (0..=greatest)
             .map(|n| scheme.h(n.max(1) as usize))
             .collect();
-        let h = gather(&by_valence, &source.valences);
+        let h: Vec<f64> = source
+            .valences
+            .par_iter()
+            .with_min_len(CHUNK)
+            .map(|&n| by_valence[n as usize])
+            .collect();
         let (mut listed, large) = source.listed(&kinds, &h);
         let offsets = source.offsets(&kinds, &listed)?;
         let neighbours = match source.fill::<i16>(&kinds, &offsets, &listed) {
@@ -64,18 +117,13 @@ impl Operator {
                 kind => double.own(kind, source.valences[i] as usize),
             })
             .collect();
-        let bounds = if topology.is_closed() {
-            let triangles = faces.uniform_size() == Some(3);
-            SpectralBounds::closed(scheme, &source.valences, triangles, &diagonal)
-        } else {
-            SpectralBounds::gershgorin(&diagonal)
-        };
+        let triangles = faces.uniform_size() == Some(3);
+        let bounds = SpectralBounds::closed(scheme, &source.valences, triangles, &diagonal);
         Ok(Operator {
             stencil: Stencil {
                 runs: runs(&kinds, &offsets),
-                offsets,
+                codes: Codes::new(offsets, neighbours),
                 kinds,
-                neighbours,
                 single: double.single(),
                 double,
                 listed,
@@ -84,6 +132,7 @@ impl Operator {
             h,
             diagonal,
             bounds,
+            usual_lambda_min: usual_lambda_min(scheme),
         })
     }
 
@@ -109,6 +158,11 @@ impl Operator {
     /// What valences and face sizes prove about the spectrum of A.
     pub fn bounds(&self) -> SpectralBounds {
         self.bounds
+    }
+
+    /// What the scheme's [λ_min usually is](super::bounds::usual_lambda_min).
+    pub fn usual_lambda_min(&self) -> f64 {
+        self.usual_lambda_min
     }
 
     /// (A x)_i.
@@ -138,54 +192,35 @@ impl Operator {
         self.stencil.moments(x, moments);
     }
 
-    /// Calls `visit(k, (A x)_i)` for the k-th row i of `rows`. `window` holds x from vertex `start` on, as far as
-    /// the rows [reach](Self::reach), and `moments` comes from [`moments`](Self::moments) of the whole x.
+    /// Calls `visit(slot, x_i, (A x)_i)` for every row i of `rows`, in ascending order. `slots(m)` gives what the next
+    /// m rows are visited with. `window` holds x from vertex `start` on, as far as the rows [reach](Self::reach),
+    /// and `moments` comes from [`moments`](Self::moments) of the whole x.
     ///
     /// # Panics
     /// If a row reaches beyond the window.
     #[inline(always)]
-    pub fn rows<P: Point>(
+    pub fn rows<P: Point, I: Iterator>(
         &self,
         rows: std::ops::Range<usize>,
-        (window, start): (&[P], usize),
+        window: (&[P], usize),
         moments: &[[P; 3]],
-        visit: impl FnMut(usize, P),
+        slots: impl FnMut(usize) -> I,
+        visit: impl FnMut(I::Item, P, P),
     ) {
-        self.stencil.rows(rows, window, start, moments, visit);
+        self.stencil.rows(rows, window, moments, slots, visit);
     }
 
     /// The greatest distance in the vertex order between a row and its neighbours; `None` with large faces, whose
     /// corners may be anywhere.
     pub fn reach(&self) -> Option<usize> {
-        if !self.stencil.large.constant.is_empty() {
-            return None;
-        }
-        let rows = (0..self.len()).into_par_iter().with_min_len(CHUNK);
-        match &self.stencil.neighbours {
-            Neighbours::Near(near) => near
-                .par_iter()
-                .with_min_len(CHUNK)
-                .map(|d| usize::from(d.unsigned_abs()))
-                .max(),
-            Neighbours::Far(far) => rows
-                .map(|i| {
-                    let range =
-                        self.stencil.offsets[i] as usize..self.stencil.offsets[i + 1] as usize;
-                    far[range]
-                        .iter()
-                        .map(|&j| i.abs_diff(j as usize))
-                        .max()
-                        .unwrap_or(0)
-                })
-                .max(),
-        }
-        .or(Some(0))
+        let large = !self.stencil.large.constant.is_empty();
+        (!large).then_some(self.stencil.codes.reach())
     }
 
     /// Bytes of the operator itself that one sweep over A reads.
     pub fn sweep_bytes(&self) -> usize {
         let s = &self.stencil;
-        let code = match s.neighbours {
+        let code = match s.codes.neighbours() {
             Neighbours::Near(_) => 2,
             Neighbours::Far(_) => 4,
         };
@@ -196,144 +231,7 @@ impl Operator {
 
     /// Neighbours of all rows together.
     pub fn entries(&self) -> usize {
-        self.stencil.offsets.last().map_or(0, |&end| end as usize)
-    }
-
-    /// An order for fast sweeps: breadth first, so that every row's neighbours lie in a narrow band; and among
-    /// `GROUP` consecutive vertices by kind of row, so that equal rows follow each other. O(entries).
-    pub fn front_order(&self) -> Vec<u32> {
-        let mut order = match &self.stencil.neighbours {
-            Neighbours::Near(near) => self.breadth_first(near),
-            Neighbours::Far(far) => self.breadth_first(far),
-        };
-        let stencil = &self.stencil;
-        order.par_chunks_mut(GROUP).for_each(|group| {
-            group.sort_by_key(|&v| {
-                let v = v as usize;
-                let length = stencil.offsets[v + 1] - stencil.offsets[v];
-                (length, stencil.kinds[v] as u8)
-            });
-        });
-        order
-    }
-
-    fn breadth_first<C: Code>(&self, codes: &[C]) -> Vec<u32> {
-        let n = self.len();
-        let stencil = &self.stencil;
-        let mut seen = vec![0u64; n.div_ceil(64)];
-        let mut face_seen = vec![false; stencil.large.constant.len()];
-        let mut order: Vec<u32> = Vec::with_capacity(n);
-        let meet = |v: usize, seen: &mut [u64], order: &mut Vec<u32>| {
-            let bit = 1u64 << (v % 64);
-            if seen[v / 64] & bit == 0 {
-                seen[v / 64] |= bit;
-                order.push(v as u32);
-            }
-        };
-        let mut next = 0;
-        for seed in 0..n {
-            meet(seed, &mut seen, &mut order);
-            while let Some(&v) = order.get(next) {
-                next += 1;
-                let v = v as usize;
-                let range = stencil.offsets[v] as usize..stencil.offsets[v + 1] as usize;
-                for &c in &codes[range] {
-                    meet(c.place(v, 0), &mut seen, &mut order);
-                }
-                for &(f, _) in stencil.listed.large_at(v) {
-                    let f = f as usize;
-                    if !std::mem::replace(&mut face_seen[f], true) {
-                        for &w in stencil.large.corners_of(f) {
-                            meet(w as usize, &mut seen, &mut order);
-                        }
-                    }
-                }
-            }
-        }
-        order
-    }
-
-    /// The same operator on the vertices in another order: row k is that of vertex `order[k]`.
-    ///
-    /// # Panics
-    /// If `order` is not a permutation of the vertices.
-    pub fn renumbered(&self, order: &[u32]) -> Operator {
-        assert_eq!(order.len(), self.len(), "one entry a vertex");
-        let old = &self.stencil;
-        let place = crate::mesh::order::inverse(order);
-        let mut offsets = Vec::with_capacity(order.len() + 1);
-        let mut end = 0u32;
-        offsets.push(0);
-        for &v in order {
-            end += old.offsets[v as usize + 1] - old.offsets[v as usize];
-            offsets.push(end);
-        }
-        let neighbours = match &old.neighbours {
-            Neighbours::Near(codes) => renumber(codes, &old.offsets, order, &place, &offsets),
-            Neighbours::Far(codes) => renumber(codes, &old.offsets, order, &place, &offsets),
-        };
-        let kinds = gather(&old.kinds, order);
-        let listed = old.listed.renumbered(order, &kinds);
-        let mut large = old.large.clone();
-        for v in &mut large.corners {
-            *v = place[*v as usize];
-        }
-        Operator {
-            stencil: Stencil {
-                runs: runs(&kinds, &offsets),
-                offsets,
-                kinds,
-                neighbours,
-                double: old.double.clone(),
-                single: old.single.clone(),
-                listed,
-                large,
-            },
-            h: gather(&self.h, order),
-            diagonal: gather(&self.diagonal, order),
-            bounds: self.bounds,
-        }
-    }
-}
-
-/// `values` in another order: the k-th is that of vertex `order[k]`.
-pub fn gather<T: Copy + Send + Sync>(values: &[T], order: &[u32]) -> Vec<T> {
-    order
-        .par_iter()
-        .with_min_len(CHUNK)
-        .map(|&v| values[v as usize])
-        .collect()
-}
-
-fn renumber<C: Code>(
-    codes: &[C],
-    old_offsets: &[u32],
-    order: &[u32],
-    place: &[u32],
-    offsets: &[u32],
-) -> Neighbours {
-    fn rows<C: Code, D: Encode>(
-        codes: &[C],
-        old_offsets: &[u32],
-        order: &[u32],
-        place: &[u32],
-        offsets: &[u32],
-    ) -> Option<Vec<D>> {
-        fill_rows(offsets, |k, row| {
-            let v = order[k] as usize;
-            let old = &codes[old_offsets[v] as usize..old_offsets[v + 1] as usize];
-            for (new, c) in row.iter_mut().zip(old) {
-                *new = D::encode(k, place[c.place(v, 0)])?;
-            }
-            Some(())
-        })
-    }
-    match rows::<C, i16>(codes, old_offsets, order, place, offsets) {
-        Some(near) => Neighbours::Near(near),
-        // Every vertex has a code of 32 bits.
-        None => {
-            Neighbours::Far(rows(codes, old_offsets, order, place, offsets).unwrap_or_default())
-        }
+        self.stencil.codes.offsets().last().map_or(0, |&end| end as usize)
     }
 }
 
@@ -386,19 +284,6 @@ impl Listed {
     pub(super) fn entries(&self, i: usize) -> std::ops::Range<usize> {
         let slot = self.slots[i] as usize;
         self.starts[slot] as usize..self.starts[slot + 1] as usize
-    }
-
-    /// The rows in another order, one after the other in memory again: row k is that of vertex `order[k]`.
-    fn renumbered(&self, order: &[u32], kinds: &[Kind]) -> Listed {
-        Listed::collect(kinds, |k, listed, _| {
-            let v = order[k] as usize;
-            let slot = self.slots[v] as usize;
-            let weights = self.entries(v);
-            listed.own.push(self.own[slot]);
-            listed.h.push(self.h[slot]);
-            listed.weights.extend_from_slice(&self.weights[weights]);
-            listed.corners.extend_from_slice(self.large_at(v));
-        })
     }
 
     /// The large faces at vertex `i`, each with the place of `i` in it.

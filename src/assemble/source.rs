@@ -3,11 +3,13 @@
 use rayon::prelude::*;
 
 use super::scheme::{Masks, Scheme};
-use super::stencil::{Code, Kind, LargeFaces, Listed, Ring, Rings};
+use super::codes::Code;
+use super::stencil::{Kind, LargeFaces, Listed, Ring, Rings};
 use super::system::FaceBlocks;
 use crate::error::{Error, Result};
 use crate::mesh::topology::{NONE, next_in, prev_in};
-use crate::mesh::{Faces, Topology};
+use crate::mesh::order::Numbering;
+use crate::mesh::{Faces, Incidence, Topology};
 
 /// Rows of one task.
 const CHUNK: usize = 4096;
@@ -45,8 +47,13 @@ impl Modes {
 /// What the rows are built from.
 pub(super) struct Source<'a> {
     faces: &'a Faces,
-    topology: &'a Topology,
+    incidence: &'a Incidence,
+    /// The sides without an opposite, where there are such.
+    open: Option<&'a Topology>,
+    /// Which row is that of which vertex; the k-th of the k-th unless told.
+    numbering: Option<&'a Numbering>,
     scheme: Scheme,
+    /// By row, as all that is made here.
     pub(super) valences: Vec<u32>,
     /// By face size; `None` for faces whose corners are coupled one by one.
     modes: Vec<Option<Modes>>,
@@ -104,12 +111,33 @@ pub(super) fn fill_rows<C: Encode>(
 }
 
 impl<'a> Source<'a> {
-    pub(super) fn new(faces: &'a Faces, topology: &'a Topology, scheme: Scheme) -> Self {
+    /// # Panics
+    /// If the numbering is not of these vertices.
+    pub(super) fn new(
+        faces: &'a Faces,
+        (incidence, open): (&'a Incidence, Option<&'a Topology>),
+        scheme: Scheme,
+        numbering: Option<&'a Numbering>,
+    ) -> Self {
+        let n = incidence.vertices();
+        let order = numbering.map(Numbering::order);
+        assert!(order.is_none_or(|order| order.len() == n), "one entry a vertex");
+        let vertex = |k: usize| order.map_or(k, |order| order[k] as usize);
+        let valences = (0..n)
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map(|k| match open {
+                None => incidence.face_count(vertex(k)) as u32,
+                Some(topology) => topology.edge_valence(faces, vertex(k)) as u32,
+            })
+            .collect();
         let mut source = Source {
             faces,
-            topology,
+            incidence,
+            open,
+            numbering,
             scheme,
-            valences: super::system::valences(faces, topology),
+            valences,
             modes: Vec::new(),
             large: Vec::new(),
             blocks: FaceBlocks::new(faces, &scheme),
@@ -148,6 +176,18 @@ impl<'a> Source<'a> {
         source
     }
 
+    /// The vertex of a row.
+    fn vertex(&self, k: usize) -> usize {
+        self.numbering
+            .map_or(k, |numbering| numbering.order()[k] as usize)
+    }
+
+    /// The row of a vertex.
+    fn row(&self, v: u32) -> u32 {
+        self.numbering
+            .map_or(v, |numbering| numbering.place()[v as usize])
+    }
+
     fn modes(&self, size: usize) -> Option<Modes> {
         self.modes.get(size).copied().flatten()
     }
@@ -164,13 +204,13 @@ impl<'a> Source<'a> {
         if let Some(size) = self.faces.uniform_size() {
             return vec![of_size(size); n];
         }
-        let incidence = &self.topology.incidence;
+        let incidence = self.incidence;
         (0..n)
             .into_par_iter()
             .with_min_len(CHUNK)
-            .map(|v| {
+            .map(|k| {
                 let mut kinds = incidence
-                    .corners_at(v)
+                    .corners_at(self.vertex(k))
                     .iter()
                     .map(|&c| of_size(self.faces.range(incidence.face_of(c)).len()));
                 let first = kinds.next().unwrap_or(Kind::Edges);
@@ -210,12 +250,12 @@ impl<'a> Source<'a> {
         offsets: &[u32],
         listed: &Listed,
     ) -> Option<Vec<C>> {
-        let incidence = &self.topology.incidence;
+        let incidence = self.incidence;
         let corners = self.faces.corners();
-        let open = self.topology.boundary_edges() > 0;
-        fill_rows(offsets, |v, row: &mut [C]| {
-            let encode = |neighbour: u32| C::encode(v, neighbour);
-            match kinds[v] {
+        fill_rows(offsets, |k, row: &mut [C]| {
+            let v = self.vertex(k);
+            let encode = |neighbour: u32| C::encode(k, self.row(neighbour));
+            match kinds[k] {
                 Kind::Quads => {
                     let (edge, opposite) = row.split_at_mut(row.len() / 2);
                     let at = incidence.corners_at(v).iter();
@@ -236,8 +276,8 @@ impl<'a> Source<'a> {
                         if let Some(slot) = slots.next() {
                             *slot = encode(corners[next_in(&range, c) as usize])?;
                         }
-                        if open
-                            && self.topology.twin(into).is_none()
+                        if let Some(topology) = self.open
+                            && topology.twin(into).is_none()
                             && let Some(slot) = slots.next()
                         {
                             *slot = encode(corners[into as usize])?;
@@ -245,7 +285,7 @@ impl<'a> Source<'a> {
                     }
                 }
                 Kind::Listed => {
-                    for (slot, &w) in row.iter_mut().zip(&listed.neighbours[listed.entries(v)]) {
+                    for (slot, &w) in row.iter_mut().zip(&listed.neighbours[listed.entries(k)]) {
                         *slot = encode(w)?;
                     }
                 }
@@ -254,12 +294,12 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// The entries of row `v` of M off the diagonal, large faces aside, ascending; returns the part of the diagonal
-    /// that is no part of a large face's sum.
-    fn list(&self, v: usize, entries: &mut Vec<(u32, f64)>) -> f64 {
+    /// The entries of the row of vertex `v`, of valence `n`, of M off the diagonal, large faces aside, by ascending
+    /// vertices; returns the part of the diagonal that is no part of a large face's sum.
+    fn list(&self, v: usize, n: u32, entries: &mut Vec<(u32, f64)>) -> f64 {
         entries.clear();
-        let incidence = &self.topology.incidence;
-        let mut own = self.scheme.vertex_weight(self.valences[v] as usize);
+        let incidence = self.incidence;
+        let mut own = self.scheme.vertex_weight(n as usize);
         for &c in incidence.corners_at(v) {
             let f = incidence.face_of(c);
             let face = self.faces.face(f);
@@ -323,18 +363,19 @@ impl<'a> Source<'a> {
         };
         for face in self.faces.iter().filter(|_| !self.large.is_empty()) {
             if let Some(modes) = self.modes(face.len()) {
-                large.corners.extend_from_slice(face);
+                large.corners.extend(face.iter().map(|&v| self.row(v)));
                 large.offsets.push(large.corners.len() as u32);
                 large.constant.push(modes.constant);
                 large.cosine.push(modes.cosine);
             }
         }
-        let incidence = &self.topology.incidence;
-        let listed = Listed::collect(kinds, |v, listed, scratch| {
-            let own = self.list(v, scratch);
-            listed.own.push(h[v] * own);
-            listed.h.push(h[v]);
-            listed.weights.extend(scratch.iter().map(|e| h[v] * e.1));
+        let incidence = self.incidence;
+        let listed = Listed::collect(kinds, |k, listed, scratch| {
+            let v = self.vertex(k);
+            let own = self.list(v, self.valences[k], scratch);
+            listed.own.push(h[k] * own);
+            listed.h.push(h[k]);
+            listed.weights.extend(scratch.iter().map(|e| h[k] * e.1));
             listed.neighbours.extend(scratch.iter().map(|e| e.0));
             for &c in incidence.corners_at(v) {
                 let f = incidence.face_of(c);

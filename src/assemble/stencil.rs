@@ -6,6 +6,8 @@ use std::ops::{Add, AddAssign, Range, Sub};
 
 use glam::{DVec3, Vec3A};
 
+use super::codes::{Code, Codes, Row, Window, Windows};
+
 /// What an operator acts on: three right-hand sides of one vertex, interleaved, in doubles (24 bytes) or singles
 /// (16 bytes, one vector register); or a single one, for eigenvectors.
 pub trait Point: Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + AddAssign {
@@ -57,18 +59,19 @@ impl Point for f64 {
 
 impl Point for Vec3A {
     const ZERO: Self = Vec3A::ZERO;
-    type Weight = f32;
+    // In every lane, so that a loop need not spread it.
+    type Weight = Vec3A;
 
     #[inline(always)]
-    fn weight(w: f64) -> f32 {
-        w as f32
+    fn weight(w: f64) -> Vec3A {
+        Vec3A::splat(w as f32)
     }
     #[inline(always)]
-    fn times(self, w: f32) -> Self {
+    fn times(self, w: Vec3A) -> Self {
         w * self
     }
     #[inline(always)]
-    fn rings(stencil: &Stencil) -> &Rings<f32> {
+    fn rings(stencil: &Stencil) -> &Rings<Vec3A> {
         &stencil.single
     }
 }
@@ -114,11 +117,11 @@ impl<W: Copy> Ring<W> {
 }
 
 impl Rings<f64> {
-    pub(super) fn single(&self) -> Rings<f32> {
+    pub(super) fn single(&self) -> Rings<Vec3A> {
         let single = |rings: &[Ring<f64>]| {
             rings
                 .iter()
-                .map(|r| Ring::new(r.own as f32, r.edge as f32, r.opposite as f32))
+                .map(|r| Ring::new(Vec3A::weight(r.own), Vec3A::weight(r.edge), Vec3A::weight(r.opposite)))
                 .collect()
         };
         Rings {
@@ -146,36 +149,6 @@ pub enum Kind {
     Edges,
     /// Anything else: a weight stored with every neighbour.
     Listed,
-}
-
-/// A neighbour as it is stored.
-pub trait Code: Copy + Send + Sync {
-    /// The place of the neighbour of the row at `row` within a window that begins at vertex `start`.
-    fn place(self, row: usize, start: usize) -> usize;
-}
-
-impl Code for u32 {
-    #[inline(always)]
-    fn place(self, _row: usize, start: usize) -> usize {
-        (self as usize).wrapping_sub(start)
-    }
-}
-
-/// The distance from the row.
-impl Code for i16 {
-    #[inline(always)]
-    fn place(self, row: usize, _start: usize) -> usize {
-        row.wrapping_add_signed(self as isize)
-    }
-}
-
-/// The neighbours of all rows, one after the other.
-#[derive(Clone, Debug)]
-pub enum Neighbours {
-    /// As distances from the row, where the order of the vertices keeps them below 2¹⁵: 2 bytes each.
-    Near(Vec<i16>),
-    /// As vertices: 4 bytes each.
-    Far(Vec<u32>),
 }
 
 /// What rows with stored weights need besides their neighbours.
@@ -267,14 +240,12 @@ fn angle(t: usize, size: usize) -> (f64, f64) {
 /// The rows of A.
 #[derive(Clone, Debug)]
 pub struct Stencil {
-    /// Where the neighbours of each row start, and the end.
-    pub(super) offsets: Vec<u32>,
+    pub(super) codes: Codes,
     pub(super) kinds: Vec<Kind>,
     /// The first rows of the runs of equal kind and length.
     pub(super) runs: Vec<u32>,
-    pub(super) neighbours: Neighbours,
     pub(super) double: Rings<f64>,
-    pub(super) single: Rings<f32>,
+    pub(super) single: Rings<Vec3A>,
     pub(super) listed: Listed,
     pub(super) large: LargeFaces,
 }
@@ -295,37 +266,39 @@ impl Stencil {
         moments.extend((0..self.large.len()).map(|f| self.large.moments(f, x)));
     }
 
-    /// Calls `visit(k, (A x)_i)` for the k-th row i of `rows`. `window` holds x from vertex `start` on, as far as
-    /// these rows reach; `moments` is of the whole x.
+    /// Calls `visit(slot, x_i, (A x)_i)` for every row i of `rows`, the slots from `slots(number of rows)`, which is
+    /// asked for one run of rows after the other. `points` holds x from vertex `start` on, as far as these rows
+    /// reach; `moments` is of the whole x.
     ///
     /// # Panics
-    /// If a row reaches beyond the window.
+    /// If a row reaches beyond the points.
     #[inline(always)]
-    pub(super) fn rows<P: Point>(
+    pub(super) fn rows<P: Point, I: Iterator>(
         &self,
         rows: Range<usize>,
-        window: &[P],
-        start: usize,
+        (points, start): (&[P], usize),
         moments: &[[P; 3]],
-        visit: impl FnMut(usize, P),
+        slots: impl FnMut(usize) -> I,
+        visit: impl FnMut(I::Item, P, P),
     ) {
-        match &self.neighbours {
-            Neighbours::Near(near) => self.coded(near, rows, window, start, moments, visit),
-            Neighbours::Far(far) => self.coded(far, rows, window, start, moments, visit),
+        match self.codes.window(rows, points, start) {
+            Windows::Near(window) => self.coded(&window, (points, start), moments, slots, visit),
+            Windows::Far(window) => self.coded(&window, (points, start), moments, slots, visit),
         }
     }
 
     #[inline(always)]
-    fn coded<P: Point, C: Code>(
+    fn coded<P: Point, C: Code, I: Iterator>(
         &self,
-        codes: &[C],
-        rows: Range<usize>,
-        window: &[P],
-        start: usize,
+        window: &Window<P, C>,
+        (points, start): (&[P], usize),
         moments: &[[P; 3]],
-        mut visit: impl FnMut(usize, P),
+        mut slots: impl FnMut(usize) -> I,
+        mut visit: impl FnMut(I::Item, P, P),
     ) {
         let rings = P::rings(self);
+        let rows = window.rows();
+        let offsets = self.codes.offsets();
         let mut next = self.runs.partition_point(|&r| r as usize <= rows.start);
         let mut from = rows.start;
         while from < rows.end {
@@ -335,28 +308,27 @@ impl Stencil {
                 .map_or(rows.end, |&r| rows.end.min(r as usize));
             next += 1;
             let run = Run {
-                codes: &codes[self.offsets[from] as usize..self.offsets[to] as usize],
                 window,
-                rows: from - start..to - start,
-                start,
-                first: from - rows.start,
+                rows: from..to,
+                slots: slots(to - from),
             };
-            let length = (self.offsets[from + 1] - self.offsets[from]) as usize;
+            let length = (offsets[from + 1] - offsets[from]) as usize;
             match (self.kinds[from], length) {
-                (Kind::Quads, 8) => run.quads::<4>(&rings.quads[4], &mut visit),
-                (Kind::Quads, 6) => run.quads::<3>(&rings.quads[3], &mut visit),
-                (Kind::Quads, 10) => run.quads::<5>(&rings.quads[5], &mut visit),
-                (Kind::Quads, 12) => run.quads::<6>(&rings.quads[6], &mut visit),
-                (Kind::Edges, 6) => run.edges::<6>(&rings.edges[6], &mut visit),
-                (Kind::Edges, 5) => run.edges::<5>(&rings.edges[5], &mut visit),
-                (Kind::Edges, 7) => run.edges::<7>(&rings.edges[7], &mut visit),
-                (Kind::Edges, 4) => run.edges::<4>(&rings.edges[4], &mut visit),
-                (Kind::Edges, 3) => run.edges::<3>(&rings.edges[3], &mut visit),
-                (Kind::Edges, 8) => run.edges::<8>(&rings.edges[8], &mut visit),
+                (Kind::Quads, 8) => run.quads::<4>(rings, &mut visit),
+                (Kind::Quads, 6) => run.quads::<3>(rings, &mut visit),
+                (Kind::Quads, 10) => run.quads::<5>(rings, &mut visit),
+                (Kind::Quads, 12) => run.quads::<6>(rings, &mut visit),
+                (Kind::Edges, 6) => run.edges::<6>(rings, &mut visit),
+                (Kind::Edges, 5) => run.edges::<5>(rings, &mut visit),
+                (Kind::Edges, 7) => run.edges::<7>(rings, &mut visit),
+                (Kind::Edges, 4) => run.edges::<4>(rings, &mut visit),
+                (Kind::Edges, 3) => run.edges::<3>(rings, &mut visit),
+                (Kind::Edges, 8) => run.edges::<8>(rings, &mut visit),
                 _ => {
-                    for i in from..to {
-                        let value = self.coded_row(codes, i, window, start, |f, _| moments[f]);
-                        visit(i - rows.start, value);
+                    for (i, slot) in (from..to).zip(run.slots) {
+                        let codes = window.codes(i);
+                        let value = self.coded_row(codes, i, points, start, |f, _| moments[f]);
+                        visit(slot, points[i - start], value);
                     }
                 }
             }
@@ -368,9 +340,9 @@ impl Stencil {
     #[inline]
     pub(super) fn row<P: Point>(&self, i: usize, x: &[P]) -> P {
         let moments = |f, x: &[P]| self.large.moments(f, x);
-        match &self.neighbours {
-            Neighbours::Near(near) => self.coded_row(near, i, x, 0, moments),
-            Neighbours::Far(far) => self.coded_row(far, i, x, 0, moments),
+        match self.codes.of_row(i) {
+            Row::Near(near) => self.coded_row(near, i, x, 0, moments),
+            Row::Far(far) => self.coded_row(far, i, x, 0, moments),
         }
     }
 
@@ -383,7 +355,6 @@ impl Stencil {
         start: usize,
         moments: impl Fn(usize, &[P]) -> [P; 3],
     ) -> P {
-        let codes = &codes[self.offsets[i] as usize..self.offsets[i + 1] as usize];
         let rings = P::rings(self);
         let row = i - start;
         match self.kinds[i] {
@@ -406,14 +377,13 @@ impl Stencil {
 
     /// Calls `visit(j, part of a_ij)` for every neighbour.
     pub(super) fn entries(&self, i: usize, visit: impl FnMut(usize, f64)) {
-        match &self.neighbours {
-            Neighbours::Near(near) => self.coded_entries(near, i, visit),
-            Neighbours::Far(far) => self.coded_entries(far, i, visit),
+        match self.codes.of_row(i) {
+            Row::Near(near) => self.coded_entries(near, i, visit),
+            Row::Far(far) => self.coded_entries(far, i, visit),
         }
     }
 
     fn coded_entries<C: Code>(&self, codes: &[C], i: usize, mut visit: impl FnMut(usize, f64)) {
-        let codes = &codes[self.offsets[i] as usize..self.offsets[i + 1] as usize];
         match self.kinds[i] {
             Kind::Quads => {
                 let n = codes.len() / 2;
@@ -475,47 +445,50 @@ impl Stencil {
 
 #[inline(always)]
 fn sum<P: Point, C: Code>(codes: &[C], window: &[P], row: usize, start: usize) -> P {
-    let mut sum = P::ZERO;
-    for &c in codes {
-        sum += window[c.place(row, start)];
+    let mut places = codes.iter().map(|c| c.place(row, start));
+    let Some(first) = places.next() else {
+        return P::ZERO;
+    };
+    let mut sum = window[first];
+    for place in places {
+        sum += window[place];
     }
     sum
 }
 
 /// Consecutive rows of one kind and length.
-struct Run<'a, P, C> {
-    codes: &'a [C],
-    window: &'a [P],
-    /// The rows' places in the window.
+struct Run<'w, 'a, P, C, I> {
+    window: &'w Window<'a, P, C>,
     rows: Range<usize>,
-    start: usize,
-    /// The number of the first row among those asked for.
-    first: usize,
+    slots: I,
 }
 
-impl<P: Point, C: Code> Run<'_, P, C> {
+impl<P: Point, C: Code, I: Iterator> Run<'_, '_, P, C, I> {
     /// Rows of valence N among quads.
     #[inline(always)]
-    fn quads<const N: usize>(self, ring: &Ring<P::Weight>, visit: &mut impl FnMut(usize, P)) {
-        let own = &self.window[self.rows.clone()];
-        let lists = self.codes.chunks_exact(2 * N);
-        for (k, (&own, codes)) in own.iter().zip(lists).enumerate() {
-            let row = self.rows.start + k;
-            let edge = sum(&codes[..N], self.window, row, self.start);
-            let opposite = sum(&codes[N..2 * N], self.window, row, self.start);
-            visit(self.first + k, ring.value(own, edge, opposite));
-        }
+    fn quads<const N: usize>(
+        self,
+        rings: &Rings<P::Weight>,
+        visit: &mut impl FnMut(I::Item, P, P),
+    ) {
+        let ring = rings.quads[N];
+        self.window
+            .halves::<N, _>(self.rows, self.slots, |slot, own, edge, opposite| {
+                visit(slot, own, ring.value(own, edge, opposite));
+            });
     }
 
     /// Rows of N edge neighbours.
     #[inline(always)]
-    fn edges<const N: usize>(self, ring: &Ring<P::Weight>, visit: &mut impl FnMut(usize, P)) {
-        let own = &self.window[self.rows.clone()];
-        let lists = self.codes.chunks_exact(N);
-        for (k, (&own, codes)) in own.iter().zip(lists).enumerate() {
-            let row = self.rows.start + k;
-            let edge = sum(&codes[..N], self.window, row, self.start);
-            visit(self.first + k, ring.value_of_edges(own, edge));
-        }
+    fn edges<const N: usize>(
+        self,
+        rings: &Rings<P::Weight>,
+        visit: &mut impl FnMut(I::Item, P, P),
+    ) {
+        let ring = rings.edges[N];
+        self.window
+            .wholes::<N, _>(self.rows, self.slots, |slot, own, edge| {
+                visit(slot, own, ring.value_of_edges(own, edge));
+            });
     }
 }

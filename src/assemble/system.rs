@@ -56,7 +56,8 @@ impl LimitSystem {
     /// # Ok::<(), limitlab::Error>(())
     /// ```
     pub fn new(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Result<Self> {
-        check_mesh(&mesh.faces, topology, scheme)?;
+        check_faces(&mesh.faces, scheme)?;
+        check_boundary(topology, scheme)?;
         let mut system = Self::with_masks(mesh, topology, &scheme)?;
         if topology.is_closed() {
             system.bounds = SpectralBounds::closed(
@@ -121,8 +122,8 @@ impl LimitSystem {
     }
 }
 
-/// Refuses faces and boundaries that `scheme` is not defined on.
-pub(super) fn check_mesh(faces: &Faces, topology: &Topology, scheme: Scheme) -> Result<()> {
+/// Refuses faces that `scheme` is not defined on.
+pub(super) fn check_faces(faces: &Faces, scheme: Scheme) -> Result<()> {
     if let Some(f) = scheme.first_unsuitable_face(faces) {
         return Err(Error::Computation(format!(
             "face {f} has {} corners, and the scheme {scheme} is defined on triangles only; triangulate the \
@@ -130,6 +131,11 @@ pub(super) fn check_mesh(faces: &Faces, topology: &Topology, scheme: Scheme) -> 
             faces.face(f).len()
         )));
     }
+    Ok(())
+}
+
+/// Refuses boundaries that `scheme` is not defined on.
+pub(super) fn check_boundary(topology: &Topology, scheme: Scheme) -> Result<()> {
     if topology.boundary_edges() > 0 && !scheme.edges_only() {
         return Err(Error::Computation(format!(
             "{} boundary edges, and the masks of {scheme} need whole faces around every vertex; close the \

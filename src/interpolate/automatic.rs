@@ -5,11 +5,11 @@
 //! iterations share passes over memory, and it moves half the bytes. What varies:
 //!
 //! - *Order.* A file whose vertices lie [scattered](is_scattered) is renumbered along a space-filling curve before
-//!   anything else touches its faces; from [`ORDERED`] vertices on, the operator is then renumbered breadth first,
-//!   which gives it the narrow band that groups of iterations need. Results come back in file order. Below, all
+//!   anything else touches its faces; from [`ORDERED`] vertices on, the rows of the operator are [breadth
+//!   first](in_fronts), which gives it the narrow band that groups of iterations need. Results come back in file order. Below, all
 //!   arrays fit the second-level cache in any order.
-//! - *Bounds.* With a proven λ_min > 0 the interval is `[λ_min, 1]`. Else (vertices of valence 3 under Catmull-Clark)
-//!   it is found from the reductions seen.
+//! - *Bounds.* The interval starts at what λ_min usually is, or at the proven bound where that is higher; a correction
+//!   that gains less than promised stretches it, down to the proven bound at the most.
 //! - *Hard cases.* If that does not converge (λ_min below 10⁻⁴, a singular matrix), conjugate gradients on the same
 //!   operator start from the given points: their count grows with √κ only, and they need no interval.
 //!
@@ -19,13 +19,12 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::assemble::Scheme;
-use crate::assemble::operator::{Operator, gather};
+use crate::assemble::Operator;
 use crate::error::Result;
-use crate::mesh::order::{along_curve, is_scattered};
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::order::{Numbering, along_curve, in_fronts, is_scattered};
+use crate::mesh::{Incidence, Mesh, Topology};
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::{Iterate, Method, Outcome, Report, Stop, mixed, solve};
 
@@ -40,16 +39,16 @@ pub struct Automatic {
     /// [`Method::Chebyshev`] or [`Method::Cg`].
     pub method: Method,
     pub report: Report,
-    /// Renumbering along the curve, with the topology of the renumbered mesh; 0 where the order was good.
+    /// Renumbering along the curve; 0 where the order was good.
     pub curve_seconds: f64,
-    /// Operator and its order.
+    /// Who meets whom, the order of the rows, the operator.
     pub setup_seconds: f64,
     /// Iterations, and the way back to the order of the mesh.
     pub solve_seconds: f64,
 }
 
-/// Solves `A V = P` for the points P of a mesh that the validator has passed. `topology` is made where it is not
-/// given.
+/// Solves `A V = P` for the points P of a mesh that the validator has passed. `topology` spares a look
+/// for boundaries where it is given.
 ///
 /// # Errors
 /// As [`Operator::new`].
@@ -73,83 +72,83 @@ pub fn control_points(
     stop: &Stop,
 ) -> Result<Automatic> {
     let start = Instant::now();
-    let curve = if mesh.len() >= ORDERED && is_scattered(&mesh.faces) {
-        along_curve(mesh)
-    } else {
-        None
-    };
-    let Some((moved, order)) = curve else {
-        let own;
-        let topology = match topology {
-            Some(topology) => topology,
-            None => {
-                own = Topology::new(&mesh.faces, mesh.len());
-                &own
-            }
-        };
+    if mesh.len() >= ORDERED
+        && is_scattered(&mesh.faces)
+        && let Some((moved, numbering)) = along_curve(mesh)
+    {
         let seconds = start.elapsed().as_secs_f64();
-        return in_order(mesh, topology, scheme, stop, seconds);
-    };
-    let topology = Topology::new(&moved.faces, moved.len());
-    let seconds = start.elapsed().as_secs_f64();
-    let mut found = in_order(&moved, &topology, scheme, stop, seconds)?;
-    let start = Instant::now();
-    found.points = back(&found.points, &order);
-    found.solve_seconds += start.elapsed().as_secs_f64();
-    Ok(found)
+        let mut found = in_order(&moved, None, scheme, stop)?;
+        let start = Instant::now();
+        found.points = numbering.back(&found.points);
+        found.solve_seconds += start.elapsed().as_secs_f64();
+        found.curve_seconds = seconds;
+        return Ok(found);
+    }
+    in_order(mesh, topology, scheme, stop)
 }
 
 fn in_order(
     mesh: &Mesh,
-    topology: &Topology,
+    topology: Option<&Topology>,
     scheme: Scheme,
     stop: &Stop,
-    curve_seconds: f64,
 ) -> Result<Automatic> {
     let start = Instant::now();
-    let operator = Operator::new(&mesh.faces, topology, scheme)?;
-    let (operator, order) = if mesh.len() >= ORDERED {
-        let order = operator.front_order();
-        (operator.renumbered(&order), Some(order))
-    } else {
-        (operator, None)
-    };
+    let (operator, numbering) = operator(mesh, topology, scheme)?;
     let setup_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let moved = order.as_ref().map(|order| gather(&mesh.positions, order));
+    let moved = numbering.as_ref().map(|n| n.there(&mesh.positions));
     let points = moved.as_ref().unwrap_or(&mesh.positions);
     let (method, control, report) = iterate(&operator, points, stop);
-    let points = match &order {
-        Some(order) => back(&control, order),
+    let points = match &numbering {
+        Some(numbering) => numbering.back(&control),
         None => control,
     };
     Ok(Automatic {
         points,
         method,
         report,
-        curve_seconds,
+        curve_seconds: 0.0,
         setup_seconds,
         solve_seconds: start.elapsed().as_secs_f64(),
     })
 }
 
+/// The operator, and the order of its rows where that is not the mesh's.
+fn operator(
+    mesh: &Mesh,
+    topology: Option<&Topology>,
+    scheme: Scheme,
+) -> Result<(Operator, Option<Numbering>)> {
+    let own;
+    let incidence = match topology {
+        Some(topology) => &topology.incidence,
+        None => {
+            own = Incidence::new(&mesh.faces, mesh.len());
+            &own
+        }
+    };
+    let numbering = (mesh.len() >= ORDERED).then(|| in_fronts(&mesh.faces, incidence));
+    let rows = numbering.as_ref();
+    let operator = match topology {
+        Some(topology) => Operator::in_order(&mesh.faces, topology, scheme, rows)?,
+        None if incidence.is_closed(&mesh.faces) => {
+            Operator::closed_in_order(&mesh.faces, incidence, scheme, rows)?
+        }
+        None => {
+            let topology = Topology::new(&mesh.faces, mesh.len());
+            Operator::in_order(&mesh.faces, &topology, scheme, rows)?
+        }
+    };
+    Ok((operator, numbering))
+}
+
 fn iterate(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Method, Vec<DVec3>, Report) {
-    let bound = operator.bounds().lambda_min;
-    let (control, report) = mixed::solve(operator, points, bound, stop);
+    let (control, report) = mixed::solve(operator, points, stop);
     if !matches!(report.outcome, Outcome::Stagnated | Outcome::Diverged) {
         return (Method::Chebyshev, control, report);
     }
     let mut cg = ConjugateGradient::new(operator, points, Preconditioner::weights(operator));
     let report = solve(&mut cg, stop, &mut |_| ControlFlow::Continue(()));
     (Method::Cg, cg.points().to_vec(), report)
-}
-
-/// From an order back to the numbers: entry `order[k]` is the k-th of `values`.
-fn back(values: &[DVec3], order: &[u32]) -> Vec<DVec3> {
-    let place = crate::mesh::order::inverse(order);
-    place
-        .par_iter()
-        .with_min_len(4096)
-        .map(|&k| values[k as usize])
-        .collect()
 }

@@ -70,6 +70,51 @@ impl Incidence {
 }
 
 impl Incidence {
+    /// Whether every side of a face has exactly one opposite: one other side between its vertices, in the other
+    /// direction. In parallel, O(Σ n²) over the valences n up to [`MANY`], with sorts beyond.
+    ///
+    /// ```
+    /// use limitlab::mesh::{Faces, Incidence};
+    /// let closed = |faces: &Faces| Incidence::new(faces, 4).is_closed(faces);
+    /// let tetrahedron = [[0u32, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]];
+    /// assert!(closed(&Faces::from_lists(tetrahedron)));
+    /// assert!(!closed(&Faces::from_lists(&tetrahedron[1..])));
+    /// ```
+    pub fn is_closed(&self, faces: &Faces) -> bool {
+        let corners = faces.corners();
+        (0..self.vertices())
+            .into_par_iter()
+            .with_min_len(4096)
+            .all(|v| {
+                let at = self.corners_at(v);
+                let sides = |c: u32| {
+                    let range = faces.range(self.face_of(c));
+                    let before = corners[prev_in(&range, c) as usize];
+                    (corners[next_in(&range, c) as usize], before)
+                };
+                if at.len() > MANY {
+                    let (mut out, mut into): (Vec<u32>, Vec<u32>) =
+                        at.iter().map(|&c| sides(c)).unzip();
+                    out.sort_unstable();
+                    into.sort_unstable();
+                    return out == into
+                        && out.windows(2).all(|w| w[0] != w[1])
+                        && out.binary_search(&(v as u32)).is_err();
+                }
+                let mut ends = [(0, 0); MANY];
+                let ends = &mut ends[..at.len()];
+                for (end, &c) in ends.iter_mut().zip(at) {
+                    *end = sides(c);
+                }
+                ends.iter().all(|&(out, _)| {
+                    let count = |same: fn(&(u32, u32)) -> u32| {
+                        ends.iter().filter(|e| same(e) == out).count()
+                    };
+                    out as usize != v && count(|e| e.0) == 1 && count(|e| e.1) == 1
+                })
+            })
+    }
+
     /// The opposite of every half-edge, if each has exactly one: the usual case, in parallel. O(Σ n²) over the
     /// valences n, so vertices of more than [`MANY`] faces are left to the sorts.
     fn pairs(&self, faces: &Faces) -> Option<Vec<u32>> {

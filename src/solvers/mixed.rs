@@ -16,9 +16,7 @@ use crate::assemble::Operator;
 
 /// A correction in single precision is not asked for more than this: half a digit above its rounding.
 const GAIN: f64 = 2e-6;
-/// λ_min is first taken for this where nothing is proven. Tuned: what irregular quad meshes have.
-const GUESS: f64 = 0.08;
-/// Iterations beyond those promised, since the promise is in another norm than the test.
+/// Iterations of the last correction beyond those promised, since the promise is in another norm than the test.
 const SPARE: usize = 1;
 /// A correction that reduces the error less than this has reached rounding, or met a singular matrix.
 const PROGRESS: f64 = 0.5;
@@ -33,9 +31,10 @@ const STEP: f64 = 1.0 / 16.0;
 /// Residuals of this many times ε·max‖p‖ are rounding.
 const FLOOR: f64 = 16.0;
 
-/// Solves `A V = P` from V = P. Eigenvalues are within `[lambda_min, 1]`; 0 stands for an unknown λ_min: then the
-/// interval is corrected by what each correction was seen to gain. (Eigenvalues below the interval are no danger:
-/// there |T_k| grows towards its value at 0, so their modes shrink, only slower.)
+/// Solves `A V = P` from V = P, for eigenvalues up to 1. The interval of the iterations starts at the [usual
+/// λ_min](Operator::usual_lambda_min), and is stretched by what each correction was seen to gain, to the proven bound at
+/// the most. (Eigenvalues below the
+/// interval are no danger: there |T_k| grows towards its value at 0, so their modes shrink, only slower.)
 ///
 /// Errors are known after every correction only: the report's history has an entry for each, and its count of
 /// iterations is that of all inner ones.
@@ -45,34 +44,34 @@ const FLOOR: f64 = 16.0;
 pub fn solve(
     operator: &Operator,
     points: &[DVec3],
-    lambda_min: f64,
     stop: &Stop,
 ) -> (Vec<DVec3>, Report) {
     assert_eq!(points.len(), operator.len(), "one point a vertex");
     // Within the thread pool, so that the many short parallel loops need not be handed over to it.
-    rayon::scope(|_| in_pool(operator, points, lambda_min, stop))
+    rayon::scope(|_| in_pool(operator, points, stop))
 }
 
 fn in_pool(
     operator: &Operator,
     points: &[DVec3],
-    lambda_min: f64,
     stop: &Stop,
 ) -> (Vec<DVec3>, Report) {
     let n = points.len();
     let wavefront = Wavefront::new(operator);
     let mut rows = Rows::new(n);
-    let mut control = points.to_vec();
-    let mut residual = vec![Vec3A::ZERO; n];
-    let mut correction = vec![Vec3A::ZERO; n];
-    let mut other = vec![Vec3A::ZERO; n];
+    // Empty stands for V = P.
+    let mut control: Vec<DVec3> = Vec::new();
+    // By all threads, so that they share the work of the pages' first touch.
+    let zeros = || -> Vec<Vec3A> { (0..n).into_par_iter().map(|_| Vec3A::ZERO).collect() };
+    let (mut residual, mut correction, mut other) = (zeros(), zeros(), zeros());
     // Residuals in units of the tolerance are far from the ends of single precision's range.
     let unit = if stop.tolerance > 0.0 {
         stop.tolerance
     } else {
         1.0
     };
-    let mut interval = (if lambda_min > 0.0 { lambda_min } else { GUESS }, 1.0);
+    let least = operator.bounds().lambda_min.clamp(LOWEST, 1.0);
+    let mut interval = (operator.usual_lambda_min().max(least), 1.0);
     let largest = points
         .iter()
         .map(|p| p.length_squared())
@@ -85,10 +84,15 @@ fn in_pool(
     let outcome = loop {
         let recurrence = Recurrence::new(interval);
         let first = recurrence.coefficients().1 as f32;
+        let current = if control.is_empty() {
+            points
+        } else {
+            &control
+        };
         let errors = rows
             .product(
                 operator,
-                &control,
+                current,
                 &mut residual,
                 &mut correction,
                 |i, ax, r, d, tally| {
@@ -112,14 +116,13 @@ fn in_pool(
         }
         if let Some(before) = before {
             let gain = errors.max / before;
-            let doubtful = lambda_min <= 0.0
+            let doubtful = interval.0 > least
                 && gain > DOUBT * reduction(interval, count)
-                && interval.0 > LOWEST
                 && errors.max > floor;
             if doubtful {
                 let a = (STRETCH * lowest_mode(interval, count, gain))
                     .max(STEP * interval.0)
-                    .max(LOWEST);
+                    .max(least);
                 // The correction prepared above begins with the old interval's step.
                 let rescale = {
                     interval = (a.min(interval.0), 1.0);
@@ -143,12 +146,24 @@ fn in_pool(
             &mut other,
         );
         iterations += count;
-        control
-            .par_iter_mut()
-            .zip(&correction)
-            .with_min_len(4096)
-            .for_each(|(v, d)| *v += unit * d.as_dvec3());
+        if control.is_empty() {
+            control = points
+                .par_iter()
+                .zip(&correction)
+                .with_min_len(4096)
+                .map(|(p, d)| *p + unit * d.as_dvec3())
+                .collect();
+        } else {
+            control
+                .par_iter_mut()
+                .zip(&correction)
+                .with_min_len(4096)
+                .for_each(|(v, d)| *v += unit * d.as_dvec3());
+        }
     };
+    if control.is_empty() {
+        control = points.to_vec();
+    }
     let report = Report {
         outcome,
         iterations,

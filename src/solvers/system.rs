@@ -32,17 +32,19 @@ pub trait System: Sync {
         shared.clear();
     }
 
-    /// Calls `visit(k, (A x)_i)` for the k-th row i of `rows`; `shared` comes from [`prepare`](Self::prepare).
+    /// Calls `visit(slot, (A x)_i)` for every row i of `rows`, in ascending order; `slots(m)` gives what the next m
+    /// rows are visited with, and `shared` comes from [`prepare`](Self::prepare).
     #[inline(always)]
-    fn rows(
+    fn rows<I: Iterator>(
         &self,
         rows: Range<usize>,
         x: &[DVec3],
         _shared: &[Shared],
-        mut visit: impl FnMut(usize, DVec3),
+        mut slots: impl FnMut(usize) -> I,
+        mut visit: impl FnMut(I::Item, DVec3),
     ) {
-        for (k, i) in rows.enumerate() {
-            visit(k, self.row(i, x));
+        for (slot, i) in slots(rows.len()).zip(rows) {
+            visit(slot, self.row(i, x));
         }
     }
 }
@@ -92,14 +94,17 @@ impl System for Operator {
     }
 
     #[inline(always)]
-    fn rows(
+    fn rows<I: Iterator>(
         &self,
         rows: Range<usize>,
         x: &[DVec3],
         shared: &[Shared],
-        visit: impl FnMut(usize, DVec3),
+        slots: impl FnMut(usize) -> I,
+        mut visit: impl FnMut(I::Item, DVec3),
     ) {
-        Operator::rows(self, rows, (x, 0), shared, visit);
+        Operator::rows(self, rows, (x, 0), shared, slots, |slot, _, ax| {
+            visit(slot, ax);
+        });
     }
 }
 
@@ -191,12 +196,18 @@ impl Rows {
     ) -> Totals {
         let mut shared = std::mem::take(&mut self.shared);
         system.prepare(x, &mut shared);
-        let totals = self.chunks(a, b, |first, a, b, tally| {
-            let mut slots = a.iter_mut().zip(b);
-            system.rows(first..first + slots.len(), x, &shared, |k, ax| {
-                if let Some((a, b)) = slots.next() {
-                    visit(first + k, ax, a, b, tally);
-                }
+        let totals = self.chunks(a, b, |first, mut a, mut b, tally| {
+            let mut next = first;
+            let end = first + a.len();
+            let slots = |count| {
+                let from = next;
+                next += count;
+                let a = a.split_off_mut(..count).unwrap_or_default();
+                let b = b.split_off_mut(..count).unwrap_or_default();
+                (from..).zip(a.iter_mut().zip(b))
+            };
+            system.rows(first..end, x, &shared, slots, |(i, (a, b)), ax| {
+                visit(i, ax, a, b, tally);
             });
         });
         self.shared = shared;

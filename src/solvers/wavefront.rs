@@ -21,6 +21,9 @@ use crate::assemble::stencil::Point;
 const GROUP: usize = 8;
 /// Rows of one task where iterations go one after the other, and of a band at the least.
 const CHUNK: usize = 4096;
+/// Rows of one task in a group: short tasks end together, so that no thread waits long enough to fall asleep, which
+/// costs more than a task. Tuned.
+const PIECE: usize = 2048;
 /// Below, all arrays stay in cache anyhow, and iterations go one after the other.
 const SMALL: usize = 100_000;
 
@@ -150,18 +153,17 @@ impl<'a> Wavefront<'a> {
                 let start = seen.start;
                 let window = cut(&mut rest[k % 2], seen);
                 let out = cut(&mut rest[(k + 1) % 2], rows.clone());
-                tasks.push(Task {
-                    rows,
-                    window,
-                    start,
-                    out,
-                    coefficients,
-                });
+                for (from, out) in rows.step_by(PIECE).zip(out.chunks_mut(PIECE)) {
+                    tasks.push(Task {
+                        rows: from..from + out.len(),
+                        window,
+                        start,
+                        out,
+                        coefficients,
+                    });
+                }
             }
-            tasks
-                .into_par_iter()
-                .with_max_len(1)
-                .for_each(|task| self.run(task, r, &[]));
+            tasks.into_par_iter().for_each(|task| self.run(task, r, &[]));
         }
     }
 
@@ -169,18 +171,17 @@ impl<'a> Wavefront<'a> {
     fn run<P: Point>(&self, task: Task<P>, r: &[P], moments: &[[P; 3]]) {
         let (gamma, tau) = task.coefficients;
         let (gamma, tau) = (P::weight(gamma), P::weight(tau));
-        let r = &r[task.rows.clone()];
-        let own = &task.window[task.rows.start - task.start..][..r.len()];
-        let mut slots = task.out.iter_mut().zip(r).zip(own);
+        let mut r = &r[task.rows.clone()];
+        let mut out = task.out;
         self.operator.rows(
-            task.rows.clone(),
+            task.rows,
             (task.window, task.start),
             moments,
-            |_, ax| {
-                if let Some(((out, &r), &v)) = slots.next() {
-                    *out = v + (v - *out).times(gamma) + (r - ax).times(tau);
-                }
+            |count| {
+                let out = out.split_off_mut(..count).unwrap_or_default();
+                out.iter_mut().zip(r.split_off(..count).unwrap_or_default())
             },
+            |(out, &r), v, ax| *out = v + (v - *out).times(gamma) + (r - ax).times(tau),
         );
     }
 }
