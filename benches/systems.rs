@@ -14,10 +14,10 @@ use faer::sparse::SparseColMat;
 use faer::sparse::linalg::matmul::sparse_dense_matmul;
 use faer::{Accum, Par};
 use glam::DVec3;
-use limitlab::mesh::order::in_fronts;
 use limitlab::assemble::{Csr, LimitSystem, Operator, Scheme};
 use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::noise::add_noise;
+use limitlab::mesh::order::in_fronts;
 use limitlab::mesh::{Incidence, Mesh, Topology, builtin::builtin};
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
 use limitlab::solvers::system::{Rows, System};
@@ -65,7 +65,9 @@ fn assembly(c: &mut Criterion) {
     });
     let operator = Operator::new(&mesh.faces, &topology, SCHEME).expect("an operator");
     let incidence = &topology.incidence;
-    group.bench_function("front order", |b| b.iter(|| in_fronts(&mesh.faces, incidence)));
+    group.bench_function("front order", |b| {
+        b.iter(|| in_fronts(&mesh.faces, incidence))
+    });
     let fronts = in_fronts(&mesh.faces, incidence);
     group.bench_function("operator in front order", |b| {
         b.iter(|| Operator::closed_in_order(&mesh.faces, incidence, SCHEME, Some(&fronts)));

@@ -170,9 +170,14 @@ impl Scalar for Operator {
         rows: Range<usize>,
         x: &[f64],
         shared: &[[f64; 3]],
-        visit: impl FnMut(usize, f64),
+        mut visit: impl FnMut(usize, f64),
     ) {
-        Operator::rows(self, rows, (x, 0), shared, visit);
+        let mut end = 0;
+        let next = |count| {
+            end += count;
+            end - count..end
+        };
+        Operator::rows(self, rows, (x, 0), shared, next, |k, _, ax| visit(k, ax));
     }
 }
 

@@ -12,9 +12,9 @@ use super::lanczos::{Matrix, Scalar, SelfAdjoint, rayleigh};
 use super::singularity::{ZERO, colour};
 use super::{dense, lanczos};
 use crate::assemble::bounds::SpectralBounds;
-use crate::assemble::operator::gather;
 use crate::assemble::{Csr, LimitSystem, Scheme};
 use crate::error::Result;
+use crate::mesh::order::in_fronts;
 use crate::mesh::{Mesh, Topology};
 use crate::solvers::System;
 use crate::solvers::system::Rows;
@@ -248,13 +248,13 @@ pub fn mesh_ends(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Result<End
     if mesh.len() <= dense::LARGEST {
         return ends(&LimitSystem::new(mesh, topology, scheme)?);
     }
-    let operator = crate::assemble::Operator::new(&mesh.faces, topology, scheme)?;
-    let order = operator.front_order();
-    let operator = operator.renumbered(&order);
+    let fronts = in_fronts(&mesh.faces, &topology.incidence);
+    let operator =
+        crate::assemble::Operator::in_order(&mesh.faces, topology, scheme, Some(&fronts))?;
     let signs: Vec<f64> = colour(mesh, topology).into_iter().map(f64::from).collect();
     let known = Known {
         bounds: operator.bounds(),
-        signs: gather(&signs, &order),
+        signs: fronts.there(&signs),
         alternation_is_all: alternation_is_all(&mesh.faces, scheme),
         components: topology.components(&mesh.faces).1,
     };

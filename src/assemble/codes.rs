@@ -241,7 +241,11 @@ impl<'a, P: Point, C: Code> Window<'a, P, C> {
             "rows of the window"
         );
         let codes = &self.codes[self.offsets[rows.start] as usize..self.offsets[rows.end] as usize];
-        assert_eq!(codes.len(), rows.len() * length, "rows of {length} neighbours");
+        assert_eq!(
+            codes.len(),
+            rows.len() * length,
+            "rows of {length} neighbours"
+        );
         let first = rows.start - self.start;
         let own = &self.points[first..][..rows.len()];
         let lists = codes.chunks_exact(length);
@@ -266,5 +270,67 @@ impl<'a, P: Point, C: Code> Window<'a, P, C> {
             sum += point(c);
         }
         sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cycle of 10 vertices: the distances of the ends of the file do not fit a narrow band.
+    fn cycle() -> Codes {
+        let near = (0..10i16).flat_map(|i| [(i + 1) % 10 - i, (i + 9) % 10 - i]);
+        Codes::new(
+            (0..=10).map(|i| 2 * i).collect(),
+            Neighbours::Near(near.collect()),
+        )
+    }
+
+    #[test]
+    fn reach_is_the_greatest_distance_whatever_the_code() {
+        assert_eq!(cycle().reach(), 9);
+        let far = Codes::new(vec![0, 1, 2, 3], Neighbours::Far(vec![1, 2, 0]));
+        assert_eq!(far.reach(), 2);
+    }
+
+    #[test]
+    #[should_panic(expected = "no vertex")]
+    fn a_neighbour_beyond_the_last_vertex_is_refused() {
+        Codes::new(vec![0, 1, 2], Neighbours::Near(vec![1, 1]));
+    }
+
+    #[test]
+    #[should_panic(expected = "no vertex")]
+    fn a_neighbour_before_the_first_vertex_is_refused() {
+        Codes::new(vec![0, 1, 2], Neighbours::Near(vec![-1, -1]));
+    }
+
+    #[test]
+    #[should_panic(expected = "reach beyond")]
+    fn a_window_that_rows_may_leave_is_refused() {
+        let points = [0.0f64; 9];
+        cycle().window(0..2, &points, 0);
+    }
+
+    #[test]
+    #[should_panic(expected = "rows of 1 neighbours")]
+    fn rows_of_another_length_are_refused() {
+        let (codes, points) = (cycle(), [0.0f64; 10]);
+        if let Windows::Near(window) = codes.window(0..10, &points, 0) {
+            window.wholes::<1, _>(0..10, 0..10, |_, _, _| {});
+        }
+    }
+
+    #[test]
+    fn sums_are_those_of_the_neighbours() {
+        let codes = cycle();
+        let points: Vec<f64> = (0..10).map(|i| f64::from(1 << i)).collect();
+        let mut sums = vec![0.0; 10];
+        if let Windows::Near(window) = codes.window(0..10, &points, 0) {
+            window.wholes::<2, _>(0..10, sums.iter_mut(), |slot, _, sum| *slot = sum);
+        }
+        for (i, &sum) in sums.iter().enumerate() {
+            assert_eq!(sum, points[(i + 1) % 10] + points[(i + 9) % 10]);
+        }
     }
 }

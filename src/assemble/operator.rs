@@ -4,14 +4,14 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::bounds::{SpectralBounds, usual_lambda_min};
+use super::codes::{Codes, Neighbours};
 use super::scheme::{Masks, Scheme};
 use super::source::Source;
-use super::codes::{Codes, Neighbours};
 use super::stencil::{Kind, LargeFaces, Listed, Point, Stencil, runs};
 use super::system::{check_boundary, check_faces};
 use crate::error::Result;
-use crate::mesh::topology::NONE;
 use crate::mesh::order::Numbering;
+use crate::mesh::topology::NONE;
 use crate::mesh::{Faces, Incidence, Topology};
 
 /// Rows of one task.
@@ -231,7 +231,11 @@ impl Operator {
 
     /// Neighbours of all rows together.
     pub fn entries(&self) -> usize {
-        self.stencil.codes.offsets().last().map_or(0, |&end| end as usize)
+        self.stencil
+            .codes
+            .offsets()
+            .last()
+            .map_or(0, |&end| end as usize)
     }
 }
 

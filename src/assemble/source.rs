@@ -2,13 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::scheme::{Masks, Scheme};
 use super::codes::Code;
+use super::scheme::{Masks, Scheme};
 use super::stencil::{Kind, LargeFaces, Listed, Ring, Rings};
 use super::system::FaceBlocks;
 use crate::error::{Error, Result};
-use crate::mesh::topology::{NONE, next_in, prev_in};
 use crate::mesh::order::Numbering;
+use crate::mesh::topology::{NONE, next_in, prev_in};
 use crate::mesh::{Faces, Incidence, Topology};
 
 /// Rows of one task.
@@ -121,7 +121,10 @@ impl<'a> Source<'a> {
     ) -> Self {
         let n = incidence.vertices();
         let order = numbering.map(Numbering::order);
-        assert!(order.is_none_or(|order| order.len() == n), "one entry a vertex");
+        assert!(
+            order.is_none_or(|order| order.len() == n),
+            "one entry a vertex"
+        );
         let vertex = |k: usize| order.map_or(k, |order| order[k] as usize);
         let valences = (0..n)
             .into_par_iter()

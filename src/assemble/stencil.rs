@@ -121,7 +121,13 @@ impl Rings<f64> {
         let single = |rings: &[Ring<f64>]| {
             rings
                 .iter()
-                .map(|r| Ring::new(Vec3A::weight(r.own), Vec3A::weight(r.edge), Vec3A::weight(r.opposite)))
+                .map(|r| {
+                    Ring::new(
+                        Vec3A::weight(r.own),
+                        Vec3A::weight(r.edge),
+                        Vec3A::weight(r.opposite),
+                    )
+                })
                 .collect()
         };
         Rings {

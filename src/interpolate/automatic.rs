@@ -20,8 +20,8 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use crate::assemble::Scheme;
 use crate::assemble::Operator;
+use crate::assemble::Scheme;
 use crate::error::Result;
 use crate::mesh::order::{Numbering, along_curve, in_fronts, is_scattered};
 use crate::mesh::{Incidence, Mesh, Topology};

@@ -41,21 +41,13 @@ const FLOOR: f64 = 16.0;
 ///
 /// # Panics
 /// If there is not one point a vertex.
-pub fn solve(
-    operator: &Operator,
-    points: &[DVec3],
-    stop: &Stop,
-) -> (Vec<DVec3>, Report) {
+pub fn solve(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, Report) {
     assert_eq!(points.len(), operator.len(), "one point a vertex");
     // Within the thread pool, so that the many short parallel loops need not be handed over to it.
     rayon::scope(|_| in_pool(operator, points, stop))
 }
 
-fn in_pool(
-    operator: &Operator,
-    points: &[DVec3],
-    stop: &Stop,
-) -> (Vec<DVec3>, Report) {
+fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, Report) {
     let n = points.len();
     let wavefront = Wavefront::new(operator);
     let mut rows = Rows::new(n);
@@ -84,11 +76,7 @@ fn in_pool(
     let outcome = loop {
         let recurrence = Recurrence::new(interval);
         let first = recurrence.coefficients().1 as f32;
-        let current = if control.is_empty() {
-            points
-        } else {
-            &control
-        };
+        let current = if control.is_empty() { points } else { &control };
         let errors = rows
             .product(
                 operator,

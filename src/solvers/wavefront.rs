@@ -163,7 +163,9 @@ impl<'a> Wavefront<'a> {
                     });
                 }
             }
-            tasks.into_par_iter().for_each(|task| self.run(task, r, &[]));
+            tasks
+                .into_par_iter()
+                .for_each(|task| self.run(task, r, &[]));
         }
     }
 
