@@ -325,7 +325,7 @@ mod tests {
     fn sums_are_those_of_the_neighbours() {
         let codes = cycle();
         let points: Vec<f64> = (0..10).map(|i| f64::from(1 << i)).collect();
-        let mut sums = vec![0.0; 10];
+        let mut sums = [0.0; 10];
         if let Windows::Near(window) = codes.window(0..10, &points, 0) {
             window.wholes::<2, _>(0..10, sums.iter_mut(), |slot, _, sum| *slot = sum);
         }
