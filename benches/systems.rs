@@ -63,7 +63,6 @@ fn assembly(c: &mut Criterion) {
     group.bench_function("operator", |b| {
         b.iter(|| Operator::new(&mesh.faces, &topology, SCHEME));
     });
-    let operator = Operator::new(&mesh.faces, &topology, SCHEME).expect("an operator");
     let incidence = &topology.incidence;
     group.bench_function("front order", |b| {
         b.iter(|| in_fronts(&mesh.faces, incidence))
@@ -189,7 +188,6 @@ fn methods(c: &mut Criterion) {
     let points = &mesh.positions;
     let topology = Topology::new(&mesh.faces, n);
     let system = LimitSystem::new(&mesh, &topology, SCHEME).expect("a system");
-    let file = Operator::new(&mesh.faces, &topology, SCHEME).expect("an operator");
     let fronts = in_fronts(&mesh.faces, &topology.incidence);
     let front = Operator::in_order(&mesh.faces, &topology, SCHEME, Some(&fronts));
     let front = front.expect("an operator");
