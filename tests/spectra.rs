@@ -7,6 +7,7 @@ use glam::DVec3;
 use limitlab::analysis::bracket::{bracket, element_bound};
 use limitlab::analysis::certificate::{certify, eigenvalues_below};
 use limitlab::analysis::eigen::{End, Request, extreme};
+use limitlab::analysis::interval::interval;
 use limitlab::analysis::order_study::{gauss_southwell, order_study, random_spread};
 use limitlab::analysis::promise::Promise;
 use limitlab::analysis::radius::spectral_radius;
@@ -14,7 +15,7 @@ use limitlab::analysis::singularity::{Prediction, Singularity, modes, numerical_
 use limitlab::analysis::spectrum::{Operator, Source, ends, mesh_ends, symmetric};
 use limitlab::analysis::valence_study::{regular_band, valence_study};
 use limitlab::analysis::{comparison, dense};
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::{LimitSystem, Operator as MatrixFree, Scheme};
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::{Faces, Mesh, Topology, builtin, generate};
 use limitlab::solvers::gauss_seidel::sweep;
@@ -343,6 +344,65 @@ fn a_cluster_of_eight_on_a_sphere_of_quads() {
         );
     }
     assert!(pairs.values[8].value >= found.next);
+}
+
+/// The interval, the spectrum of A or D⁻¹A, and what valences prove of its lower end.
+fn intervals(
+    mesh: &Mesh,
+    scheme: Scheme,
+) -> [(limitlab::analysis::interval::Interval, f64, f64, f64); 2] {
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    let operator = MatrixFree::new(&mesh.faces, &topology, scheme).expect("a closed mesh");
+    let exact = mesh_ends(mesh, &topology, scheme)
+        .expect("values")
+        .spectrum();
+    let b = operator.bounds();
+    [
+        (Operator::A, exact.a, b.lambda_min),
+        (Operator::Jacobi, exact.jacobi, b.jacobi_lambda_min),
+    ]
+    .map(|(which, exact, bound)| {
+        let found = interval(&operator, which).expect("finite numbers");
+        (found, exact.min, exact.max, bound)
+    })
+}
+
+#[test]
+fn cheap_intervals_are_proven_above_and_sharp_below() {
+    for (name, mesh, scheme, _) in random_systems(120) {
+        for (found, min, max, bound) in intervals(&mesh, scheme) {
+            assert!(max <= found.high + 1e-12, "{name}: {found:?} {max}");
+            // Small meshes are their own sample.
+            assert!(found.least >= min - 1e-12, "{name}: {found:?} {min}");
+            assert!(
+                (found.least - min).abs() <= 5e-3 * max,
+                "{name}: {found:?} {min}"
+            );
+            assert!(found.low >= bound, "{name}: {found:?} {bound}");
+        }
+    }
+    for (name, scheme) in [
+        ("irregular-quad:40000", Scheme::CatmullClark),
+        ("irregular-quad:40000", Scheme::Nasri),
+        ("irregular-poly:40000", Scheme::CatmullClark),
+        ("irregular-tri:40000", Scheme::Loop),
+        ("irregular-tri:40000", Scheme::Sqrt3),
+        ("irregular-tri:40000", Scheme::CatmullClark),
+        ("quad-sphere:6", Scheme::CatmullClark),
+        ("torus:200x200", Scheme::CatmullClark),
+    ] {
+        for (found, min, max, _) in intervals(&named(name), scheme) {
+            assert!(
+                max <= found.high * (1.0 + 1e-12) && found.high < 1.06 * max,
+                "{name}: {found:?} {max}"
+            );
+            assert!(
+                min <= found.least * (1.0 + 1e-9) && found.least < 1.03 * min,
+                "{name}: {found:?} {min}"
+            );
+            assert!(found.low <= min * (1.0 + 1e-12), "{name}: {found:?} {min}");
+        }
+    }
 }
 
 #[test]

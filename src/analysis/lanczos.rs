@@ -31,8 +31,8 @@ pub struct Ritz {
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Relative accuracy T of the values looked at: error ≤ T|θ|, residual ≤ 10 T|θ|, and θ moved by no more than
-    /// T|θ| while the steps grew by an eighth. (The residual keeps a group of nearly equal values, which the error
-    /// estimate takes for one, from passing as its mean.)
+    /// T|θ| while the steps grew by an eighth, and at least eight. (The residual keeps a group of nearly equal
+    /// values, which the error estimate takes for one, from passing as its mean.)
     pub tolerance: f64,
     pub max_steps: usize,
     /// Ritz values in which the start takes part with less weight do not count.
@@ -262,8 +262,8 @@ pub fn rayleigh(s: &impl SelfAdjoint, x: &[f64]) -> (f64, f64) {
 /// The smallest and largest Ritz value of `s` from the start `x`.
 ///
 /// Plain three-term recurrence: lost orthogonality repeats converged Ritz values but does not falsify extreme ones
-/// (Paige 1976). The projected problem is looked at each time the steps have grown by an eighth; values must have
-/// stood still since the last look.
+/// (Paige 1976). The projected problem is looked at each time the steps have grown by an eighth, and at least eight;
+/// values must have stood still since the last look.
 ///
 /// # Errors
 /// A start that is zero or not finite.
@@ -300,7 +300,7 @@ pub fn extremes(s: &impl SelfAdjoint, start: Vec<f64>, limits: Limits) -> Result
         // An invariant subspace: rounding leaves β at a few ε of the operator's norm.
         let closed = beta <= 1e-14 * scale;
         if steps >= next_check || closed || steps == limits.max_steps || steps == n {
-            next_check = steps + steps.div_ceil(8);
+            next_check = steps + steps.div_ceil(8).max(8);
             let (low, high) = projected(&alphas, &betas, limits.least_weight)?;
             let good = |r: Ritz, old: f64| {
                 let allowed = (limits.tolerance * r.value.abs()).max(8.0 * f64::EPSILON * scale);

@@ -6,6 +6,7 @@ pub mod certificate;
 pub mod comparison;
 pub mod dense;
 pub mod eigen;
+pub mod interval;
 pub mod lanczos;
 pub mod order_study;
 pub mod predict;
