@@ -8,9 +8,12 @@ use std::fs;
 use std::path::Path;
 
 use common::collection::collection;
-use limitlab::mesh::Mesh;
 use limitlab::mesh::io::{self, Loaded};
+use limitlab::mesh::topology::IrregularEdge;
 use limitlab::mesh::validate::{Boundary, DefectKind, Validation, validate};
+use limitlab::mesh::{Faces, Mesh, Topology, builtin};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// One row of the MANIFEST.
 struct Row {
@@ -266,4 +269,93 @@ fn the_papers_boy_has_six_holes() {
         .collect();
     loops.sort_unstable();
     assert_eq!(loops, [4, 4, 4, 4, 5, 5]);
+}
+
+/// The pairing as it is defined, from a map of all edges.
+fn assert_paired_as_defined(faces: &Faces, vertices: usize) {
+    let topology = Topology::new(faces, vertices);
+    let mut edges: BTreeMap<[u32; 2], Vec<(u32, bool)>> = BTreeMap::new();
+    for f in 0..faces.len() {
+        let face = faces.face(f);
+        for (i, c) in faces.range(f).enumerate() {
+            let (v, w) = (face[i], face[(i + 1) % face.len()]);
+            let sides = edges.entry([v.min(w), v.max(w)]).or_default();
+            sides.push((c as u32, v < w));
+        }
+    }
+    let mut twins = vec![None; faces.corners().len()];
+    let (mut boundary, mut irregular) = (Vec::new(), Vec::new());
+    for (&[v, w], sides) in &edges {
+        match sides[..] {
+            [(c, _)] if v != w => boundary.push(c),
+            [(a, forth), (b, back)] if v != w && forth != back => {
+                twins[a as usize] = Some(b);
+                twins[b as usize] = Some(a);
+            }
+            _ => irregular.push(IrregularEdge {
+                vertices: [v, w],
+                sides: sides.len() as u32,
+                half_edges: [sides[0].0, sides[sides.len() - 1].0],
+            }),
+        }
+    }
+    boundary.sort_unstable();
+    assert_eq!(topology.edges(), edges.len());
+    assert_eq!(topology.boundary_half_edges(), boundary);
+    assert_eq!(topology.irregular_edges(), irregular);
+    for (c, &twin) in (0..).zip(&twins) {
+        assert_eq!(topology.twin(c), twin, "half-edge {c}");
+    }
+    let incidence = &topology.incidence;
+    for v in 0..vertices {
+        let all = 0..faces.corners().len() as u32;
+        let at: Vec<u32> = all
+            .filter(|&c| faces.corners()[c as usize] as usize == v)
+            .collect();
+        assert_eq!(incidence.corners_at(v), at);
+    }
+    for f in 0..faces.len() {
+        let size = faces.face(f).len();
+        for (i, c) in faces.range(f).enumerate() {
+            let at = |k: usize| (faces.range(f).start + k % size) as u32;
+            assert_eq!(incidence.face_of(c as u32), f);
+            assert_eq!(incidence.next(faces, c as u32), at(i + 1));
+            assert_eq!(incidence.prev(faces, c as u32), at(i + size - 1));
+        }
+    }
+}
+
+#[test]
+fn any_faces_are_paired_as_defined() {
+    let mut rng = ChaCha8Rng::seed_from_u64(71);
+    for round in 0..400 {
+        let vertices = rng.random_range(2..40);
+        let sizes = match round % 3 {
+            0 => 3..=3,
+            1 => 4..=4,
+            _ => 3..=7,
+        };
+        // Loops, repeated vertices, edges with any number of sides in either direction.
+        let faces = (0..rng.random_range(0..30)).map(|_| {
+            let size = rng.random_range(sizes.clone());
+            (0..size)
+                .map(|_| rng.random_range(0..vertices))
+                .collect::<Vec<u32>>()
+        });
+        assert_paired_as_defined(
+            &Faces::from_lists(faces.collect::<Vec<_>>()),
+            vertices as usize,
+        );
+    }
+    for mesh in [
+        builtin::bipyramid(40),
+        builtin::irregular_tri(500, 2),
+        builtin::irregular_poly(500, 2),
+    ] {
+        // Closed, and with every fifth face missing.
+        assert_paired_as_defined(&mesh.faces, mesh.len());
+        let lists = mesh.faces.iter().enumerate();
+        let some = lists.filter(|(f, _)| f % 5 > 0).map(|(_, face)| face);
+        assert_paired_as_defined(&Faces::from_lists(some), mesh.len());
+    }
 }

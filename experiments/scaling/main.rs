@@ -1,10 +1,11 @@
-//! How time and memory grow with the mesh: `scaling` writes `scaling.{md,csv,png}`, `scaling-profile`, `scaling-edits`
-//! and `scaling-decay.{md,csv}`.
+//! How time and memory grow with the mesh: `scaling` writes `scaling.{md,csv,png}`, `scaling-profile`, `scaling-edits`,
+//! `scaling-steps` and `scaling-decay.{md,csv}`.
 
 mod baseline;
 mod edits;
 mod machine;
 mod profile;
+mod steps;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -65,6 +66,9 @@ struct Arguments {
     /// Vertices of the profile's mesh; 0 for no profile
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     profile: usize,
+    /// Vertices of the meshes for the steps around the solve; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    steps: usize,
     /// Folder for the CSV, Markdown and PNG files
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
@@ -130,6 +134,9 @@ fn measure(arguments: &Arguments) -> Result<()> {
         figure.render()?.save(&arguments.out.join("scaling.png"))?;
     }
     local_edits(arguments)?;
+    if arguments.steps >= LEAST {
+        steps::steps(arguments.steps, &arguments.out)?;
+    }
     if arguments.profile >= LEAST {
         let name = family(Scheme::CatmullClark, arguments.profile);
         let mesh = noisy(&name)?;

@@ -1,5 +1,8 @@
 //! Who meets whom: corners at each vertex, opposite half-edges, edges, ordered stars, components, boundary
-//! loops, Euler characteristic. Built in linear time by counting sorts; no hashing.
+//! loops, Euler characteristic. Built in linear time by a counting sort, in parallel; no hashing.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
 
@@ -7,44 +10,97 @@ use super::Faces;
 
 /// Marks an absent index in the arrays of this room.
 pub const NONE: u32 = u32::MAX;
+/// Vertices of one task.
+const CHUNK: usize = 4096;
 
 /// The corners at every vertex, in ascending order, and the face of every corner. This is all that the
 /// assembly of a limit matrix needs.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Incidence {
     offsets: Vec<u32>,
     corners: Vec<u32>,
-    face: Vec<u32>,
+    face: FaceOf,
+}
+
+/// The face of a corner: a division among triangles, and among quads.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum FaceOf {
+    Triangles,
+    Quads,
+    Table(Vec<u32>),
+}
+
+impl FaceOf {
+    fn new(faces: &Faces) -> Self {
+        match faces.uniform_size() {
+            Some(3) => return FaceOf::Triangles,
+            Some(4) => return FaceOf::Quads,
+            _ => {}
+        }
+        let mut table = vec![0; faces.corners().len()];
+        let parts = split_rows(faces.offsets(), CHUNK, &mut table);
+        parts.into_par_iter().for_each(|(rows, mut part)| {
+            for f in rows {
+                let (face, rest) = part.split_at_mut(faces.range(f).len());
+                face.fill(f as u32);
+                part = rest;
+            }
+        });
+        FaceOf::Table(table)
+    }
 }
 
 impl Incidence {
-    /// One counting sort of the corners by vertex: O(corners), stable.
+    /// A counting sort of the corners by vertex, in parallel: O(corners), stable. Each thread reads all corners and
+    /// sorts those of its own vertices.
     ///
     /// # Panics
     /// If a corner names a vertex ≥ `vertices` (the validator reports such faces before).
     pub fn new(faces: &Faces, vertices: usize) -> Self {
+        /// Beyond these many threads, reading the corners outweighs sorting them.
+        const MOST_PARTS: usize = 8;
+        let corners = faces.corners();
+        let parts = rayon::current_num_threads().min(MOST_PARTS);
+        let share = vertices.div_ceil(parts).max(CHUNK);
         let mut offsets = vec![0u32; vertices + 1];
-        for &v in faces.corners() {
-            offsets[v as usize + 1] += 1;
-        }
+        let counts = offsets[1..].par_chunks_mut(share).enumerate();
+        counts.for_each(|(k, counts)| {
+            let first = (k * share) as u32;
+            for &v in corners {
+                if let Some(count) = counts.get_mut(v.wrapping_sub(first) as usize) {
+                    *count += 1;
+                }
+            }
+        });
         for v in 0..vertices {
             offsets[v + 1] += offsets[v];
         }
-        let mut next = offsets.clone();
-        let mut corners = vec![0u32; faces.corners().len()];
-        let mut face = vec![0u32; faces.corners().len()];
-        for f in 0..faces.len() {
-            for c in faces.range(f) {
-                face[c] = f as u32;
-                let slot = &mut next[faces.corners()[c] as usize];
-                corners[*slot as usize] = c as u32;
-                *slot += 1;
+        assert!(
+            offsets[vertices] as usize == corners.len(),
+            "every corner names a vertex"
+        );
+        let mut sorted = vec![0u32; corners.len()];
+        let parts = split_rows(&offsets, share, &mut sorted);
+        parts.into_par_iter().for_each(|(rows, sorted)| {
+            let base = offsets[rows.start];
+            let mut next: Vec<u32> = offsets[rows.clone()].iter().map(|&o| o - base).collect();
+            let first = rows.start as u32;
+            for (&v, c) in corners.iter().zip(0..) {
+                if let Some(slot) = next.get_mut(v.wrapping_sub(first) as usize) {
+                    sorted[*slot as usize] = c;
+                    *slot += 1;
+                }
             }
-        }
+        });
+        Incidence::from_parts(offsets, sorted, faces)
+    }
+
+    /// From its arrays.
+    pub(crate) fn from_parts(offsets: Vec<u32>, corners: Vec<u32>, faces: &Faces) -> Self {
         Incidence {
             offsets,
             corners,
-            face,
+            face: FaceOf::new(faces),
         }
     }
 
@@ -58,20 +114,55 @@ impl Incidence {
         &self.corners[self.offsets[v] as usize..self.offsets[v + 1] as usize]
     }
 
+    /// The corners at all vertices, those of vertex `v` from [`offsets`](Self::offsets)`[v]` on.
+    pub fn corners(&self) -> &[u32] {
+        &self.corners
+    }
+
+    /// Where the corners at each vertex start in [`corners`](Self::corners), and the end.
+    pub fn offsets(&self) -> &[u32] {
+        &self.offsets
+    }
+
     /// The number of faces at vertex `v`: its valence n on a closed mesh.
     pub fn face_count(&self, v: usize) -> usize {
         (self.offsets[v + 1] - self.offsets[v]) as usize
     }
 
     /// The face of corner `c`.
+    #[inline]
     pub fn face_of(&self, c: u32) -> usize {
-        self.face[c as usize] as usize
+        match &self.face {
+            FaceOf::Triangles => (c / 3) as usize,
+            FaceOf::Quads => (c / 4) as usize,
+            FaceOf::Table(table) => table[c as usize] as usize,
+        }
     }
-}
 
-impl Incidence {
+    /// The corner after `c` in its face.
+    #[inline]
+    pub fn next(&self, faces: &Faces, c: u32) -> u32 {
+        match &self.face {
+            FaceOf::Triangles if c % 3 == 2 => c - 2,
+            FaceOf::Triangles => c + 1,
+            FaceOf::Quads => (c & !3) | ((c + 1) & 3),
+            FaceOf::Table(table) => next_in(&faces.range(table[c as usize] as usize), c),
+        }
+    }
+
+    /// The corner before `c` in its face.
+    #[inline]
+    pub fn prev(&self, faces: &Faces, c: u32) -> u32 {
+        match &self.face {
+            FaceOf::Triangles if c.is_multiple_of(3) => c + 2,
+            FaceOf::Triangles => c - 1,
+            FaceOf::Quads => (c & !3) | (c.wrapping_sub(1) & 3),
+            FaceOf::Table(table) => prev_in(&faces.range(table[c as usize] as usize), c),
+        }
+    }
+
     /// Whether every side of a face has exactly one opposite: one other side between its vertices, in the other
-    /// direction. In parallel, O(Σ n²) over the valences n up to [`MANY`], with sorts beyond.
+    /// direction. In parallel, O(Σ n²) over the valences n up to [`FEW`], with sorts beyond.
     ///
     /// ```
     /// use limitlab::mesh::{Faces, Incidence};
@@ -84,15 +175,14 @@ impl Incidence {
         let corners = faces.corners();
         (0..self.vertices())
             .into_par_iter()
-            .with_min_len(4096)
+            .with_min_len(CHUNK)
             .all(|v| {
                 let at = self.corners_at(v);
                 let sides = |c: u32| {
-                    let range = faces.range(self.face_of(c));
-                    let before = corners[prev_in(&range, c) as usize];
-                    (corners[next_in(&range, c) as usize], before)
+                    let (after, before) = (self.next(faces, c), self.prev(faces, c));
+                    (corners[after as usize], corners[before as usize])
                 };
-                if at.len() > MANY {
+                if at.len() > FEW {
                     let (mut out, mut into): (Vec<u32>, Vec<u32>) =
                         at.iter().map(|&c| sides(c)).unzip();
                     out.sort_unstable();
@@ -101,7 +191,7 @@ impl Incidence {
                         && out.windows(2).all(|w| w[0] != w[1])
                         && out.binary_search(&(v as u32)).is_err();
                 }
-                let mut ends = [(0, 0); MANY];
+                let mut ends = [(0, 0); FEW];
                 let ends = &mut ends[..at.len()];
                 for (end, &c) in ends.iter_mut().zip(at) {
                     *end = sides(c);
@@ -114,45 +204,50 @@ impl Incidence {
                 })
             })
     }
+}
 
-    /// The opposite of every half-edge, if each has exactly one: the usual case, in parallel. O(Σ n²) over the
-    /// valences n, so vertices of more than [`MANY`] faces are left to the sorts.
-    fn pairs(&self, faces: &Faces) -> Option<Vec<u32>> {
-        // Among triangles, and among quads, the next corner takes no look at the face.
-        match faces.uniform_size() {
-            Some(3) => self.pairs_by(faces, |c| if c % 3 == 2 { c - 2 } else { c + 1 }),
-            Some(4) => self.pairs_by(faces, |c| if c % 4 == 3 { c - 3 } else { c + 1 }),
-            _ => self.pairs_by(faces, |c| next_in(&faces.range(self.face_of(c)), c)),
-        }
+/// Cuts `values`, of which row i is `offsets[i]..offsets[i + 1]`, after every `chunk` rows.
+pub(crate) fn split_rows<'a, T>(
+    offsets: &[u32],
+    chunk: usize,
+    values: &'a mut [T],
+) -> Vec<(Range<usize>, &'a mut [T])> {
+    let rows = offsets.len() - 1;
+    let mut rest = values;
+    (0..rows)
+        .step_by(chunk)
+        .map(|first| {
+            let range = first..(first + chunk).min(rows);
+            let length = (offsets[range.end] - offsets[first]) as usize;
+            let (part, after) = std::mem::take(&mut rest).split_at_mut(length);
+            rest = after;
+            (range, part)
+        })
+        .collect()
+}
+
+/// An array that many threads fill, each place once, so that the result does not depend on their order.
+pub(crate) struct Scatter(Vec<AtomicU32>);
+
+impl Scatter {
+    /// All places [`NONE`].
+    pub(crate) fn new(len: usize) -> Self {
+        let none = |_| AtomicU32::new(NONE);
+        Scatter((0..len).into_par_iter().map(none).collect())
     }
 
-    fn pairs_by(&self, faces: &Faces, next: impl Fn(u32) -> u32 + Sync) -> Option<Vec<u32>> {
-        let corners = faces.corners();
-        let end = |c: u32| corners[next(c) as usize];
-        (0..corners.len() as u32)
-            .into_par_iter()
-            .with_min_len(8192)
-            .map(|c| {
-                let (from, to) = (corners[c as usize], end(c));
-                let at = self.corners_at(to as usize);
-                if from == to || at.len() > MANY {
-                    return None;
-                }
-                let mut opposite = at.iter().copied().filter(|&d| end(d) == from);
-                match (opposite.next(), opposite.next()) {
-                    (Some(d), None) => Some(d),
-                    _ => None,
-                }
-            })
-            .collect()
+    #[inline]
+    pub(crate) fn set(&self, place: u32, value: u32) {
+        self.0[place as usize].store(value, Ordering::Relaxed);
+    }
+
+    pub(crate) fn into_vec(self) -> Vec<u32> {
+        self.0.into_iter().map(AtomicU32::into_inner).collect()
     }
 }
 
-/// Beyond this many faces at a vertex, a sort of its sides is faster than comparing each with each.
-const MANY: usize = 64;
-
 /// How the faces hang together. Half-edge `c` leaves corner `c` for the next corner of its face.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topology {
     pub incidence: Incidence,
     twin: Vec<u32>,
@@ -185,7 +280,8 @@ impl IrregularEdge {
 }
 
 impl Topology {
-    /// Pairs the half-edges: a counting sort by smaller vertex, then a sort of each (short) bucket.
+    /// Pairs the half-edges, vertex by vertex in parallel: those between a vertex and its neighbours of larger
+    /// number, all of which lie in the faces at the vertex, so that one look at each face suffices.
     /// O(corners) time for bounded valences, O(n log n) within a vertex of valence n.
     ///
     /// A side whose edge has one side only, more than two, or two in the same direction has no twin, and
@@ -196,67 +292,118 @@ impl Topology {
     /// If a corner names a vertex ≥ `vertices`.
     pub fn new(faces: &Faces, vertices: usize) -> Self {
         let incidence = Incidence::new(faces, vertices);
-        let corners = faces.corners();
-        if let Some(twin) = incidence.pairs(faces) {
-            return Topology {
-                incidence,
-                edges: twin.len() / 2,
-                twin,
-                boundary: Vec::new(),
-                irregular_edges: Vec::new(),
-            };
+        let twin = Scatter::new(faces.corners().len());
+        let chunks: Vec<Pairs> = (0..vertices.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|k| {
+                let mut pairs = Pairs::default();
+                for v in k * CHUNK..vertices.min((k + 1) * CHUNK) {
+                    pairs.at(v, faces, &incidence, &twin);
+                }
+                pairs
+            })
+            .collect();
+        let mut topology = Topology {
+            incidence,
+            twin: twin.into_vec(),
+            edges: 0,
+            boundary: Vec::new(),
+            irregular_edges: Vec::new(),
+        };
+        for chunk in chunks {
+            topology.edges += chunk.edges;
+            topology.boundary.extend(chunk.boundary);
+            topology.irregular_edges.extend(chunk.irregular_edges);
         }
-        let mut twin = vec![NONE; corners.len()];
-        let mut edges = 0;
-        let mut boundary = Vec::new();
-        let mut irregular_edges = Vec::new();
-        // Sides (other vertex, half-edge) of the edges whose smaller vertex is v.
-        let mut sides: Vec<(u32, u32)> = Vec::new();
-        for v in 0..vertices {
-            sides.clear();
-            for &c in incidence.corners_at(v) {
-                let range = faces.range(incidence.face_of(c));
-                let out = corners[next_in(&range, c) as usize];
-                let back = prev_in(&range, c);
-                let into = corners[back as usize];
-                // A side from v to v (a vertex repeated in a row) is a loop: counted once, never paired.
-                if out as usize >= v {
-                    sides.push((out, c));
-                }
-                if into as usize > v {
-                    sides.push((into, back));
-                }
-            }
-            sides.sort_unstable();
-            for edge in sides.chunk_by(|a, b| a.0 == b.0) {
-                edges += 1;
-                match *edge {
-                    [(w, c)] if w as usize != v => boundary.push(c),
-                    [(w, a), (_, b)]
-                        if (corners[a as usize] as usize == v)
-                            != (corners[b as usize] as usize == v)
-                            && w as usize != v =>
-                    {
-                        twin[a as usize] = b;
-                        twin[b as usize] = a;
-                    }
-                    [(w, first), ..] => irregular_edges.push(IrregularEdge {
-                        vertices: [v as u32, w],
-                        sides: edge.len() as u32,
-                        half_edges: [first, edge[edge.len() - 1].1],
-                    }),
-                    [] => {}
-                }
-            }
-        }
-        boundary.sort_unstable();
+        topology.boundary.par_sort_unstable();
+        topology
+    }
+
+    /// The topology of a closed mesh from its arrays: every half-edge has its twin.
+    pub(crate) fn closed(incidence: Incidence, twin: Vec<u32>) -> Self {
         Topology {
             incidence,
+            edges: twin.len() / 2,
             twin,
-            edges,
-            boundary,
-            irregular_edges,
+            boundary: Vec::new(),
+            irregular_edges: Vec::new(),
         }
+    }
+
+    /// The opposite of every half-edge, [`NONE`] where it has none.
+    pub(crate) fn twins(&self) -> &[u32] {
+        &self.twin
+    }
+
+    /// [`edge_sides`](Self::edge_sides) as a list, found in parallel.
+    pub(crate) fn first_sides(&self) -> Vec<u32> {
+        let chunk = |k: usize| {
+            let first = k * CHUNK;
+            let twins = &self.twin[first..self.twin.len().min(first + CHUNK)];
+            twins.iter().zip(first as u32..)
+        };
+        let chunks = self.twin.len().div_ceil(CHUNK);
+        let mut offsets: Vec<u32> = (0..chunks + 1)
+            .into_par_iter()
+            .map(|k| match k {
+                0 => 0,
+                _ => chunk(k - 1).map(|(&t, c)| u32::from(c <= t)).sum(),
+            })
+            .collect();
+        for k in 0..chunks {
+            offsets[k + 1] += offsets[k];
+        }
+        let mut sides = vec![0; offsets[chunks] as usize];
+        let parts = split_rows(&offsets, 1, &mut sides);
+        parts.into_par_iter().for_each(|(k, part)| {
+            let mut found = 0;
+            for (&t, c) in chunk(k.start) {
+                // Written in any case, kept if it counts: no branch to foresee.
+                if let Some(side) = part.get_mut(found) {
+                    *side = c;
+                }
+                found += usize::from(c <= t);
+            }
+        });
+        sides
+    }
+
+    /// Whether the faces at vertex `v` of a closed mesh form one umbrella, which turns through all of them.
+    pub(crate) fn is_one_umbrella(&self, faces: &Faces, v: usize) -> bool {
+        /// Beyond these many faces, one step is taken after the other.
+        const AT_ONCE: usize = 8;
+        let at = self.incidence.corners_at(v);
+        let n = at.len();
+        if n > AT_ONCE {
+            let mut c = at[0];
+            let mut turns = 0;
+            loop {
+                c = self.twin[self.incidence.prev(faces, c) as usize];
+                turns += 1;
+                if c == at[0] || c == NONE || turns > n {
+                    return turns == n;
+                }
+            }
+        }
+        // All steps first, so that none waits for another's place in memory; then the turn over places in the list.
+        let mut here = [NONE; AT_ONCE];
+        here[..n].copy_from_slice(at);
+        let mut step = [0; AT_ONCE];
+        for (step, &c) in step.iter_mut().zip(at) {
+            let turned = self.twin[self.incidence.prev(faces, c) as usize];
+            *step = (0..AT_ONCE as u32)
+                .zip(here)
+                .map(|(k, c)| if c == turned { k } else { 0 })
+                .sum::<u32>();
+        }
+        let mut place = 0;
+        for turns in 1..=n {
+            place = step[place as usize];
+            if place == 0 {
+                return turns == n;
+            }
+        }
+        false
     }
 
     /// The opposite half-edge, if the edge has one more side in the other direction and no further ones.
@@ -306,10 +453,7 @@ impl Topology {
             .incidence
             .corners_at(v)
             .iter()
-            .filter(|&&c| {
-                let range = faces.range(self.incidence.face_of(c));
-                self.twin[prev_in(&range, c) as usize] == NONE
-            })
+            .filter(|&&c| self.twin[self.incidence.prev(faces, c) as usize] == NONE)
             .count();
         self.incidence.face_count(v) + incoming_boundary
     }
@@ -326,7 +470,8 @@ impl Topology {
         let limit = corners.len();
         let mut start = first;
         // Clockwise to the boundary, if there is one.
-        for _ in 0..limit {
+        let turns = if self.is_closed() { 0 } else { limit };
+        for _ in 0..turns {
             match self.clockwise(faces, start) {
                 Some(c) if c == first => {
                     start = first;
@@ -350,15 +495,13 @@ impl Topology {
 
     /// The next corner of the same vertex, counter-clockwise: across the side that enters it.
     pub fn counter_clockwise(&self, faces: &Faces, c: u32) -> Option<u32> {
-        let range = faces.range(self.incidence.face_of(c));
-        self.twin(prev_in(&range, c))
+        self.twin(self.incidence.prev(faces, c))
     }
 
     /// The next corner of the same vertex, clockwise: across the side that leaves it.
     pub fn clockwise(&self, faces: &Faces, c: u32) -> Option<u32> {
         let t = self.twin(c)?;
-        let range = faces.range(self.incidence.face_of(t));
-        Some(next_in(&range, t))
+        Some(self.incidence.next(faces, t))
     }
 
     /// A component number for every vertex, numbered from 0 by their first vertex, and how many there are.
@@ -406,8 +549,7 @@ impl Topology {
                 seen[c as usize] = true;
                 walk.push(c);
                 // Turn clockwise about the half-edge's end until a side without a twin leaves it.
-                let range = faces.range(self.incidence.face_of(c));
-                c = next_in(&range, c);
+                c = self.incidence.next(faces, c);
                 while let Some(next) = self.clockwise(faces, c) {
                     c = next;
                 }
@@ -415,6 +557,119 @@ impl Topology {
             loops.push(walk);
         }
         loops
+    }
+}
+
+/// What pairing finds at some vertices.
+#[derive(Default)]
+struct Pairs {
+    edges: usize,
+    boundary: Vec<u32>,
+    irregular_edges: Vec<IrregularEdge>,
+    /// Sides (other vertex, half-edge) of the edges whose smaller vertex is the present one.
+    sides: Vec<(u32, u32)>,
+}
+
+/// Up to this many faces at a vertex, its sides are compared each with each; beyond, sorted.
+const FEW: usize = 16;
+
+impl Pairs {
+    /// Pairs the sides of the edges whose smaller vertex is `v`.
+    fn at(&mut self, v: usize, faces: &Faces, incidence: &Incidence, twin: &Scatter) {
+        let at = incidence.corners_at(v);
+        if at.len() > FEW || !self.all_opposite(v as u32, at, faces, incidence, twin) {
+            self.sort(v, at, faces, incidence, twin);
+        }
+    }
+
+    /// The usual case: each side that leaves `v` meets exactly one that enters it, and none is left over. Otherwise
+    /// nothing is done.
+    #[inline]
+    fn all_opposite(
+        &mut self,
+        v: u32,
+        at: &[u32],
+        faces: &Faces,
+        incidence: &Incidence,
+        twin: &Scatter,
+    ) -> bool {
+        let corners = faces.corners();
+        // One more place than can be taken: what does not count is written beyond the end.
+        let mut leaving = [(0, 0); FEW + 1];
+        let mut entering = [(0, 0); FEW + 1];
+        let (mut out, mut into) = (0, 0);
+        for &c in at {
+            let (next, prev) = (incidence.next(faces, c), incidence.prev(faces, c));
+            let (w, u) = (corners[next as usize], corners[prev as usize]);
+            // A loop leaves and never enters.
+            leaving[out] = (w, c);
+            out += usize::from(w >= v);
+            entering[into] = (u, prev);
+            into += usize::from(u > v);
+        }
+        let (leaving, entering) = (&leaving[..out], &entering[..into]);
+        let mut partner = [0; FEW];
+        let mut met = 0u32;
+        for (&(w, _), partner) in leaving.iter().zip(&mut partner) {
+            let mut meeting = 0u32;
+            for (k, &(u, _)) in entering.iter().enumerate() {
+                meeting |= u32::from(u == w) << k;
+            }
+            if meeting.count_ones() != 1 {
+                return false;
+            }
+            met |= meeting;
+            *partner = meeting.trailing_zeros();
+        }
+        if out != into || met.count_ones() as usize != into {
+            return false;
+        }
+        for (&(_, c), &partner) in leaving.iter().zip(&partner) {
+            let (_, d) = entering[partner as usize];
+            twin.set(c, d);
+            twin.set(d, c);
+        }
+        self.edges += out;
+        true
+    }
+
+    /// Any case.
+    fn sort(&mut self, v: usize, at: &[u32], faces: &Faces, incidence: &Incidence, twin: &Scatter) {
+        let corners = faces.corners();
+        self.sides.clear();
+        for &c in at {
+            let out = corners[incidence.next(faces, c) as usize];
+            let back = incidence.prev(faces, c);
+            let into = corners[back as usize];
+            // A side from v to v (a vertex repeated in a row) is a loop: counted once, never paired.
+            if out as usize >= v {
+                self.sides.push((out, c));
+            }
+            if into as usize > v {
+                self.sides.push((into, back));
+            }
+        }
+        self.sides.sort_unstable();
+        for edge in self.sides.chunk_by(|a, b| a.0 == b.0) {
+            self.edges += 1;
+            match *edge {
+                [(w, c)] if w as usize != v => self.boundary.push(c),
+                [(w, a), (_, b)]
+                    if (corners[a as usize] as usize == v)
+                        != (corners[b as usize] as usize == v)
+                        && w as usize != v =>
+                {
+                    twin.set(a, b);
+                    twin.set(b, a);
+                }
+                [(w, first), ..] => self.irregular_edges.push(IrregularEdge {
+                    vertices: [v as u32, w],
+                    sides: edge.len() as u32,
+                    half_edges: [first, edge[edge.len() - 1].1],
+                }),
+                [] => {}
+            }
+        }
     }
 }
 
@@ -434,7 +689,7 @@ pub(super) fn join(parent: &mut [u32], a: u32, b: u32) -> bool {
 }
 
 /// The corner after `c` in its face, whose corners are `range`.
-pub fn next_in(range: &std::ops::Range<usize>, c: u32) -> u32 {
+pub fn next_in(range: &Range<usize>, c: u32) -> u32 {
     if c as usize + 1 == range.end {
         range.start as u32
     } else {
@@ -443,7 +698,7 @@ pub fn next_in(range: &std::ops::Range<usize>, c: u32) -> u32 {
 }
 
 /// The corner before `c` in its face, whose corners are `range`.
-pub fn prev_in(range: &std::ops::Range<usize>, c: u32) -> u32 {
+pub fn prev_in(range: &Range<usize>, c: u32) -> u32 {
     if c as usize == range.start {
         range.end as u32 - 1
     } else {

@@ -4,11 +4,12 @@
 
 use std::f64::consts::TAU;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::loop_scheme::split_in_four;
 use super::star::{
-    Circle, Harmonics, edge_numbers, next_in_triangle, prev_in_triangle, refuse, require_room,
+    CHUNK, Circle, edge_numbers, next_in_triangle, prev_in_triangle, refuse, require_room,
     require_triangles, twin,
 };
 use crate::Result;
@@ -62,49 +63,158 @@ pub fn extraordinary_mask(n: usize) -> Vec<f64> {
 pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_triangles(mesh, topology, "butterfly")?;
     require_room(mesh, 4)?;
-    let old = &mesh.positions;
-    let corners = mesh.faces.corners();
-    let edge = edge_numbers(mesh, topology);
-    let mut positions = Vec::with_capacity(mesh.len() + topology.edges());
-    positions.extend_from_slice(old);
-    positions.resize(mesh.len() + topology.edges(), DVec3::ZERO);
-    let edge_points = &mut positions[mesh.len()..];
-    let regular = |v: usize| topology.incidence.face_count(v) == 6;
+    let stencil = Stencil::new(mesh, topology);
+    if let Some((v, n)) = stencil.without_rule() {
+        return refuse(format!(
+            "vertex {v} has valence {n}, for which butterfly has no rule: remove it"
+        ));
+    }
+    let firsts = topology.first_sides();
+    let mut positions = Vec::with_capacity(mesh.len() + firsts.len());
+    positions.extend_from_slice(&mesh.positions);
+    let sides = firsts.par_iter().with_min_len(CHUNK);
+    positions.par_extend(sides.map(|&c| stencil.edge_point(c)));
+    let edge = edge_numbers(topology, &firsts);
+    Ok(Mesh::new(positions, split_in_four(mesh, &edge)))
+}
 
-    // The half of the stencil on the half-edge's side; the twin brings the other.
-    let [end, opposite, wing] = REGULAR;
-    for c in 0..corners.len() as u32 {
-        let (next, prev) = (next_in_triangle(c), prev_in_triangle(c));
-        let (v, w) = (corners[c as usize] as usize, corners[next] as usize);
-        if regular(v) && regular(w) {
-            let across = |side: usize| {
-                let opposite = prev_in_triangle(twin(topology, side as u32));
-                old[corners[opposite] as usize]
-            };
-            edge_points[edge[c as usize] as usize] += end * old[v]
-                + opposite * old[corners[prev] as usize]
-                + wing * (across(next) + across(prev));
+/// What the points of edges are computed from.
+struct Stencil<'a> {
+    mesh: &'a Mesh,
+    topology: &'a Topology,
+    /// The masks of extraordinary vertices of up to [`WALKED`] neighbours, by valence.
+    masks: Vec<Vec<f64>>,
+    /// The other extraordinary vertices, ascending, with their rings' harmonics.
+    wide: Vec<Wide>,
+}
+
+/// Up to this valence, the ring is walked once an edge: n² steps a vertex. Beyond, once a vertex.
+const WALKED: usize = 16;
+
+/// The mask of a vertex is a circulant of three harmonics, so its n products with the ring cost O(n).
+struct Wide {
+    vertex: u32,
+    /// The vertex's and the mean's part.
+    base: DVec3,
+    /// The amplitudes of the first and the second harmonic, as cosine and sine.
+    waves: [[DVec3; 2]; 2],
+    /// The half-edges of the star, ascending, with their places in it.
+    places: Vec<(u32, u32)>,
+}
+
+impl<'a> Stencil<'a> {
+    fn new(mesh: &'a Mesh, topology: &'a Topology) -> Self {
+        let masks = (0..=WALKED)
+            .map(|n| {
+                if n < 3 {
+                    Vec::new()
+                } else {
+                    extraordinary_mask(n)
+                }
+            })
+            .collect();
+        let wide = (0..mesh.len())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .filter(|&v| topology.incidence.face_count(v) > WALKED)
+            .map(|v| Wide::new(mesh, topology, v))
+            .collect();
+        Stencil {
+            mesh,
+            topology,
+            masks,
+            wide,
         }
     }
 
-    let mut star = Vec::new();
-    let mut circle = Circle::default();
-    for v in (0..mesh.len()).filter(|&v| !regular(v)) {
+    /// The first vertex of valence below 3, and its valence.
+    fn without_rule(&self) -> Option<(usize, usize)> {
+        let valence = |v| self.topology.incidence.face_count(v);
+        let v = (0..self.mesh.len())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .find_first(|&v| valence(v) < 3)?;
+        Some((v, valence(v)))
+    }
+
+    /// The point of the edge of half-edge `c`.
+    fn edge_point(&self, c: u32) -> DVec3 {
+        let t = twin(self.topology, c);
+        match [c, t].map(|c| self.extraordinary(c)) {
+            [None, None] => self.regular(c) + self.regular(t),
+            [Some(point), None] | [None, Some(point)] => point,
+            [Some(one), Some(other)] => 0.5 * one + 0.5 * other,
+        }
+    }
+
+    /// The regular stencil's half on the side of half-edge `c`.
+    fn regular(&self, c: u32) -> DVec3 {
+        let [end, opposite, wing] = REGULAR;
+        let at = |c: usize| self.mesh.positions[self.mesh.faces.corners()[c] as usize];
+        let (next, prev) = (next_in_triangle(c), prev_in_triangle(c));
+        let across = |side: usize| at(prev_in_triangle(twin(self.topology, side as u32)));
+        end * at(c as usize) + opposite * at(prev) + wing * (across(next) + across(prev))
+    }
+
+    /// The mask of the vertex that half-edge `c` leaves, unless it is regular.
+    fn extraordinary(&self, c: u32) -> Option<DVec3> {
+        let corners = self.mesh.faces.corners();
+        let v = corners[c as usize];
+        let n = self.topology.incidence.face_count(v as usize);
+        if n == 6 {
+            return None;
+        }
+        if n > WALKED {
+            let found = self.wide.binary_search_by_key(&v, |w| w.vertex).ok()?;
+            return self.wide[found].point(c);
+        }
+        let positions = &self.mesh.positions;
+        let mut sum = DVec3::ZERO;
+        let mut spoke = c;
+        for &weight in &self.masks[n] {
+            sum += weight * positions[corners[next_in_triangle(spoke)] as usize];
+            spoke = twin(self.topology, prev_in_triangle(spoke) as u32);
+        }
+        Some(CENTER * positions[v as usize] + sum)
+    }
+}
+
+impl Wide {
+    fn new(mesh: &Mesh, topology: &Topology, v: usize) -> Self {
+        let mut star = Vec::new();
         topology.star(&mesh.faces, v, &mut star);
         let n = star.len();
-        if n < 3 {
-            return refuse(format!(
-                "vertex {v} has valence {n}, for which butterfly has no rule: remove it"
-            ));
-        }
+        let mut circle = Circle::default();
         let circle = circle.of(n);
-        let neighbor = |c: u32| corners[next_in_triangle(c)] as usize;
-        let ring = Harmonics::of(star.iter().map(|&c| old[neighbor(c)]), circle, 1);
+        let mut sum = DVec3::ZERO;
+        let mut waves = [[DVec3::ZERO; 2]; 2];
         for (j, &c) in star.iter().enumerate() {
-            let point = CENTER * old[v] + ring.at(circle, j, amplitudes(n));
-            let share = if regular(neighbor(c)) { 1.0 } else { 0.5 };
-            edge_points[edge[c as usize] as usize] += share * point;
+            let neighbor = mesh.faces.corners()[next_in_triangle(c)];
+            let point = mesh.positions[neighbor as usize];
+            sum += point;
+            for (harmonic, [cosine, sine]) in waves.iter_mut().enumerate() {
+                let unit = circle[(harmonic + 1) * j % n];
+                *cosine += unit.x * point;
+                *sine += unit.y * point;
+            }
+        }
+        let [a0, a1, a2] = amplitudes(n).map(|a| a / n as f64);
+        let mut places: Vec<(u32, u32)> = star.into_iter().zip(0..).collect();
+        places.sort_unstable();
+        Wide {
+            vertex: v as u32,
+            base: CENTER * mesh.positions[v] + a0 * sum,
+            waves: [waves[0].map(|w| a1 * w), waves[1].map(|w| a2 * w)],
+            places,
         }
     }
-    Ok(Mesh::new(positions, split_in_four(mesh, &edge)))
+
+    /// The point of the edge of half-edge `c`, which leaves the vertex.
+    fn point(&self, c: u32) -> Option<DVec3> {
+        let found = self.places.binary_search_by_key(&c, |p| p.0).ok()?;
+        let angle = TAU * f64::from(self.places[found].1) / self.places.len() as f64;
+        let (once, twice) = (DVec2::from_angle(angle), DVec2::from_angle(2.0 * angle));
+        let wave = |unit: DVec2, [cosine, sine]: [DVec3; 2]| unit.x * cosine + unit.y * sine;
+        Some(self.base + wave(once, self.waves[0]) + wave(twice, self.waves[1]))
+    }
 }

@@ -5,10 +5,12 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
+use rayon::prelude::*;
 
+use super::refined::{self, rows};
 use super::star::{
-    Circle, Tangents, centroid, edge_numbers, for_each_star, require_closed, require_room, sides,
-    twin,
+    CHUNK, Circle, Tangents, centroid, edge_numbers, for_each_star, require_closed, require_room,
+    sides, twin,
 };
 use crate::Result;
 use crate::mesh::topology::{next_in, prev_in};
@@ -29,27 +31,47 @@ use crate::mesh::{Faces, Mesh, Topology};
 pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_closed(mesh, topology)?;
     require_room(mesh, 4)?;
-    let old = &mesh.positions;
-    let (vertices, edges, faces) = (mesh.len(), topology.edges(), mesh.faces.len());
-    let edge = edge_numbers(mesh, topology);
-    let mut positions = vec![DVec3::ZERO; vertices + edges + faces];
-    let (vertex_points, others) = positions.split_at_mut(vertices);
-    let (edge_points, face_points) = others.split_at_mut(edges);
-    for (f, face) in mesh.faces.iter().enumerate() {
-        let center = centroid(old, face);
-        face_points[f] = center;
-        for (&leaving, (v, w)) in edge[mesh.faces.range(f)].iter().zip(sides(face)) {
-            // Each half-edge brings its own quarter share of the edge point, and one neighbour and one face
-            // to the vertex that it leaves.
-            edge_points[leaving as usize] += 0.25 * (old[v] + center);
-            vertex_points[v] += old[w] + center;
-        }
-    }
-    for (v, point) in vertex_points.iter_mut().enumerate() {
-        let n = topology.incidence.face_count(v) as f64;
-        *point = (n - 2.0) / n * old[v] + *point / (n * n);
-    }
+    let (old, incidence) = (&mesh.positions, &topology.incidence);
+    let corners = mesh.faces.corners();
+    let centers: Vec<DVec3> = (0..mesh.faces.len())
+        .into_par_iter()
+        .with_min_len(CHUNK)
+        .map(|f| centroid(old, mesh.faces.face(f)))
+        .collect();
+    let firsts = topology.first_sides();
+    let mut positions = Vec::with_capacity(mesh.len() + firsts.len() + centers.len());
+    positions.par_extend(
+        (0..mesh.len())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map(|v| {
+                let star = incidence.corners_at(v);
+                let mut sum = DVec3::ZERO;
+                for &c in star {
+                    let w = corners[incidence.next(&mesh.faces, c) as usize];
+                    sum += old[w as usize] + centers[incidence.face_of(c)];
+                }
+                let n = star.len() as f64;
+                (n - 2.0) / n * old[v] + sum / (n * n)
+            }),
+    );
+    positions.par_extend(firsts.par_iter().with_min_len(CHUNK).map(|&c| {
+        let [one, other] = [c, twin(topology, c)]
+            .map(|c| old[corners[c as usize] as usize] + centers[incidence.face_of(c)]);
+        0.25 * one + 0.25 * other
+    }));
+    positions.par_extend(centers);
+    let edge = edge_numbers(topology, &firsts);
     Ok(Mesh::new(positions, split(mesh, topology, &edge)))
+}
+
+/// The topology of `refined`, which is what [`refine`] made of `mesh`: that of [`Topology::new`], by index arithmetic
+/// from the coarse one.
+///
+/// # Panics
+/// If the three do not belong together.
+pub fn refined_topology(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+    refined::of_quads(mesh, topology, refined)
 }
 
 /// One step by Thall's in-place rule (Eq. 20 and 22): first the points of faces and edges, then each old vertex
@@ -65,7 +87,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
 pub fn refine_in_place(mut mesh: Mesh, topology: &Topology) -> Result<Mesh> {
     require_closed(&mesh, topology)?;
     require_room(&mesh, 4)?;
-    let edge = edge_numbers(&mesh, topology);
+    let edge = edge_numbers(topology, &topology.first_sides());
     let (vertices, edges) = (mesh.len(), topology.edges());
     let corners = mesh.faces.corners();
     let mut points = std::mem::take(&mut mesh.positions);
@@ -97,22 +119,18 @@ fn split(mesh: &Mesh, topology: &Topology, edge: &[u32]) -> Faces {
     let vertices = topology.incidence.vertices() as u32;
     let first_face = vertices + topology.edges() as u32;
     let corners = mesh.faces.corners();
-    let mut quads = Vec::with_capacity(4 * corners.len());
-    for f in 0..mesh.faces.len() {
-        let range = mesh.faces.range(f);
-        let mut entering = edge[range.end - 1];
-        for (&v, &leaving) in corners[range.clone()].iter().zip(&edge[range]) {
-            quads.extend([
-                v,
-                vertices + leaving,
-                first_face + f as u32,
-                vertices + entering,
-            ]);
-            entering = leaving;
-        }
-    }
-    let offsets = (0..=corners.len() as u32).map(|f| 4 * f).collect();
-    Faces::from_parts(offsets, quads)
+    let incidence = &topology.incidence;
+    let mut quads = vec![0; 4 * corners.len()];
+    rows(&mut quads).for_each(|(c, quad): (u32, &mut [u32; 4])| {
+        *quad = [
+            corners[c as usize],
+            vertices + edge[c as usize],
+            first_face + incidence.face_of(c) as u32,
+            vertices + edge[incidence.prev(&mesh.faces, c) as usize],
+        ];
+    });
+    let offsets = (0..corners.len() as u32 + 1).into_par_iter().map(|f| 4 * f);
+    Faces::from_parts(offsets.collect(), quads)
 }
 
 /// The limit mask of a vertex of valence `n` among quads: the weight of the vertex, of each edge neighbour, of

@@ -5,10 +5,14 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
-use super::star::{Circle, Tangents, centroid, for_each_star, require_closed, require_room, twin};
+use super::refined::{self, ends, rows};
+use super::star::{
+    CHUNK, Circle, Tangents, centroid, for_each_star, require_closed, require_room, twin,
+};
 use crate::Result;
-use crate::mesh::topology::next_in;
+use crate::mesh::topology::split_rows;
 use crate::mesh::{Faces, Mesh, Topology};
 
 /// The rule of a step.
@@ -38,26 +42,46 @@ impl Rule {
 /// The new point of every corner: the geometry of one step. O(m) for a face of m corners, since the rule is a
 /// circulant of the constant, the first harmonic and the identity.
 pub fn corner_points(mesh: &Mesh, rule: Rule) -> Vec<DVec3> {
-    let mut points = Vec::with_capacity(mesh.faces.corners().len());
-    let mut circle = Circle::default();
-    for face in mesh.faces.iter() {
-        let size = face.len() as f64;
-        let circle = circle.of(face.len());
-        let corners = || face.iter().map(|&v| mesh.positions[v as usize]);
-        let (mut sum, mut cosine, mut sine) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
-        for (point, unit) in corners().zip(circle) {
-            sum += point;
-            cosine += unit.x * point;
-            sine += unit.y * point;
-        }
-        match rule {
-            Rule::DooSabin => points.extend(corners().zip(circle).map(|(point, unit)| {
-                0.25 * point + (0.75 * sum + 0.5 * (unit.x * cosine + unit.y * sine)) / size
-            })),
-            Rule::ZhengCai => points.extend(corners().map(|point| 0.5 * (point + sum / size))),
-        }
-    }
+    let corners = (0..mesh.faces.corners().len()).into_par_iter();
+    let mut points: Vec<DVec3> = corners.map(|_| DVec3::ZERO).collect();
+    let parts = split_rows(mesh.faces.offsets(), CHUNK, &mut points);
+    parts
+        .into_par_iter()
+        .for_each_init(Circle::default, |circle, (range, mut part)| {
+            for f in range {
+                let face = mesh.faces.face(f);
+                let (points, rest) = part.split_at_mut(face.len());
+                face_points(&mesh.positions, face, circle.of(face.len()), rule, points);
+                part = rest;
+            }
+        });
     points
+}
+
+fn face_points(
+    positions: &[DVec3],
+    face: &[u32],
+    circle: &[DVec2],
+    rule: Rule,
+    points: &mut [DVec3],
+) {
+    let size = face.len() as f64;
+    let (mut sum, mut cosine, mut sine) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+    for (&v, unit) in face.iter().zip(circle) {
+        let point = positions[v as usize];
+        sum += point;
+        cosine += unit.x * point;
+        sine += unit.y * point;
+    }
+    for ((&v, unit), new) in face.iter().zip(circle).zip(points) {
+        let point = positions[v as usize];
+        *new = match rule {
+            Rule::DooSabin => {
+                0.25 * point + (0.75 * sum + 0.5 * (unit.x * cosine + unit.y * sine)) / size
+            }
+            Rule::ZhengCai => 0.5 * (point + sum / size),
+        };
+    }
 }
 
 /// One step of Doo-Sabin: [`refine_by`] with [`Rule::DooSabin`].
@@ -86,31 +110,53 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
 pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_closed(mesh, topology)?;
     require_room(mesh, 4)?;
-    let old_corners = mesh.faces.corners().len() as u32;
-    let (vertices, edges, faces) = (mesh.len(), topology.edges(), mesh.faces.len());
-    let mut corners = Vec::with_capacity(4 * old_corners as usize);
-    let mut offsets = Vec::with_capacity(faces + edges + vertices + 1);
-    corners.extend(0..old_corners);
-    offsets.extend_from_slice(mesh.faces.offsets());
-
-    let next = |c: u32| {
-        let range = mesh.faces.range(topology.incidence.face_of(c));
-        next_in(&range, c)
-    };
-    for c in topology.edge_sides() {
+    let count = mesh.faces.corners().len();
+    let incidence = &topology.incidence;
+    let firsts = topology.first_sides();
+    let mut corners = vec![0; 4 * count];
+    let (of_faces, rest) = corners.split_at_mut(count);
+    let (of_edges, of_vertices) = rest.split_at_mut(4 * firsts.len());
+    rows(of_faces).for_each(|(c, corner): (u32, &mut [u32; 1])| corner[0] = c);
+    rows(of_edges).for_each(|(k, corners): (u32, &mut [u32; 4])| {
+        let c = firsts[k as usize];
         let t = twin(topology, c);
-        corners.extend([next(c), c, next(t), t]);
-        offsets.push(corners.len() as u32);
-    }
-
-    for_each_star(mesh, topology, |_, star| {
-        corners.extend_from_slice(star);
-        offsets.push(corners.len() as u32);
+        *corners = [
+            incidence.next(&mesh.faces, c),
+            c,
+            incidence.next(&mesh.faces, t),
+            t,
+        ];
     });
+    let parts = split_rows(incidence.offsets(), CHUNK, of_vertices);
+    parts
+        .into_par_iter()
+        .for_each_init(Vec::new, |star, (range, mut part)| {
+            for v in range {
+                topology.star(&mesh.faces, v, star);
+                let (face, rest) = part.split_at_mut(star.len());
+                face.copy_from_slice(star);
+                part = rest;
+            }
+        });
+
+    let mut offsets = Vec::with_capacity(mesh.faces.len() + firsts.len() + mesh.len() + 1);
+    offsets.extend_from_slice(mesh.faces.offsets());
+    offsets.par_extend(ends(count, 4, firsts.len()));
+    let first = 3 * count as u32;
+    offsets.par_extend(incidence.offsets()[1..].par_iter().map(|&end| first + end));
     Ok(Mesh::new(
         corner_points(mesh, rule),
         Faces::from_parts(offsets, corners),
     ))
+}
+
+/// The topology of `refined`, which is what [`refine_by`] made of `mesh`: that of [`Topology::new`], by index
+/// arithmetic from the coarse one.
+///
+/// # Panics
+/// If the three do not belong together.
+pub fn refined_topology(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+    refined::of_corners(mesh, topology, refined)
 }
 
 /// The limit points of all vertices when the first step is by `rule` and all others are Doo-Sabin: the

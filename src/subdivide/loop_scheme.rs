@@ -3,9 +3,12 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
+use super::refined::{self, rows, triangle_offsets};
 use super::star::{
-    Tangents, blend_with_neighbors, edge_numbers, require_room, require_triangles, ring_tangents,
+    CHUNK, Tangents, blend_with_neighbors, edge_numbers, prev_in_triangle, require_room,
+    require_triangles, ring_tangents, twin,
 };
 use crate::Result;
 use crate::mesh::{Faces, Mesh, Topology};
@@ -42,39 +45,42 @@ pub fn limit_mask(n: usize) -> [f64; 2] {
 pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_triangles(mesh, topology, "loop")?;
     require_room(mesh, 4)?;
-    let vertices = mesh.len();
-    let edge = edge_numbers(mesh, topology);
+    let (old, corners) = (&mesh.positions, mesh.faces.corners());
+    let firsts = topology.first_sides();
     let mut positions = blend_with_neighbors(mesh, topology, vertex_mask);
-    positions.resize(vertices + topology.edges(), DVec3::ZERO);
-    let edge_points = &mut positions[vertices..];
-    let corners = mesh.faces.corners();
-    for (face, edges) in corners.chunks_exact(3).zip(edge.chunks_exact(3)) {
-        for (i, &e) in edges.iter().enumerate() {
-            // 3/8 of the vertex that the half-edge leaves, 1/8 of the vertex opposite to it; the twin brings
-            // the other half of the mask (3/8, 3/8, 1/8, 1/8).
-            let vertex = mesh.positions[face[i] as usize];
-            let opposite = mesh.positions[face[(i + 2) % 3] as usize];
-            edge_points[e as usize] += 0.375 * vertex + 0.125 * opposite;
-        }
-    }
+    positions.par_extend(firsts.par_iter().with_min_len(CHUNK).map(|&c| {
+        // 3/8 of the vertex that a side leaves, 1/8 of the vertex opposite to it.
+        let [one, other] = [c, twin(topology, c)].map(|c| {
+            let opposite = old[corners[prev_in_triangle(c)] as usize];
+            0.375 * old[corners[c as usize] as usize] + 0.125 * opposite
+        });
+        one + other
+    }));
+    let edge = edge_numbers(topology, &firsts);
     Ok(Mesh::new(positions, split_in_four(mesh, &edge)))
+}
+
+/// The topology of `refined`, which is what [`refine`] or [`butterfly`](super::butterfly) made of a mesh of the given
+/// topology: that of [`Topology::new`], by index arithmetic from the coarse one.
+///
+/// # Panics
+/// If the two do not belong together.
+pub fn refined_topology(topology: &Topology, refined: &Mesh) -> Topology {
+    refined::of_fours(topology, refined)
 }
 
 /// The faces of a 1-to-4 split of triangles.
 pub(super) fn split_in_four(mesh: &Mesh, edge: &[u32]) -> Faces {
     let vertices = mesh.len() as u32;
-    let mut corners = Vec::with_capacity(4 * mesh.faces.corners().len());
-    for (face, edges) in mesh
-        .faces
-        .corners()
-        .chunks_exact(3)
-        .zip(edge.chunks_exact(3))
-    {
-        let [a, b, c] = [edges[0], edges[1], edges[2]].map(|e| vertices + e);
-        corners.extend([face[0], a, c, face[1], b, a, face[2], c, b, a, b, c]);
-    }
-    let offsets = (0..=corners.len() as u32).step_by(3).collect();
-    Faces::from_parts(offsets, corners)
+    let old = mesh.faces.corners();
+    let mut corners = vec![0; 4 * old.len()];
+    rows(&mut corners).for_each(|(f, corners): (u32, &mut [u32; 12])| {
+        let own = [0, 1, 2].map(|i| 3 * f as usize + i);
+        let [u, v, w] = own.map(|c| old[c]);
+        let [a, b, c] = own.map(|c| vertices + edge[c]);
+        *corners = [u, a, c, v, b, a, w, c, b, a, b, c];
+    });
+    Faces::from_parts(triangle_offsets(4 * mesh.faces.len()), corners)
 }
 
 /// The limit points of all vertices.

@@ -12,8 +12,8 @@
 //! | [`labsik_greiner`] | interpolatory √3, Labsik & Greiner 2000 | triangles | yes |
 //!
 //! Meshes are closed: an open one is refused with an [`Error::Mesh`]. A step takes time and memory
-//! proportional to the mesh, with flat arrays only: contributions are scattered to the new points in one pass
-//! over the faces, and new faces come from index arithmetic on half-edges.
+//! proportional to the mesh, with flat arrays only, in parallel: every new point is gathered from the old ones, with
+//! the same result for any number of threads; new faces, and their topology, come from index arithmetic on half-edges.
 //!
 //! ```
 //! use limitlab::mesh::{Faces, Mesh};
@@ -32,6 +32,7 @@ pub mod catmull_clark;
 pub mod doo_sabin;
 pub mod labsik_greiner;
 pub mod loop_scheme;
+mod refined;
 pub mod sqrt3;
 mod star;
 pub mod unified_sqrt3;
@@ -99,7 +100,34 @@ impl Refinement {
         }
     }
 
-    /// `levels` steps, with the topology of each level found anew; none gives a copy.
+    /// The topology of `refined`, which is what [`refine`](Self::refine) made of `mesh`. Equal to [`Topology::new`] of
+    /// its faces, at a fraction of the cost: index arithmetic on the coarse topology gives it.
+    ///
+    /// # Panics
+    /// If the three do not belong together.
+    ///
+    /// ```
+    /// use limitlab::mesh::{Topology, builtin};
+    /// use limitlab::subdivide::Refinement;
+    /// let mesh = builtin::builtin("cube")?;
+    /// let topology = Topology::new(&mesh.faces, mesh.len());
+    /// let refined = Refinement::CatmullClark.refine(&mesh, &topology)?;
+    /// let finer = Refinement::CatmullClark.refined_topology(&mesh, &topology, &refined);
+    /// assert_eq!(finer, Topology::new(&refined.faces, refined.len()));
+    /// # Ok::<(), limitlab::Error>(())
+    /// ```
+    pub fn refined_topology(self, mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+        match self {
+            Refinement::CatmullClark => catmull_clark::refined_topology(mesh, topology, refined),
+            Refinement::Loop | Refinement::Butterfly => {
+                loop_scheme::refined_topology(topology, refined)
+            }
+            Refinement::DooSabin => doo_sabin::refined_topology(mesh, topology, refined),
+            Refinement::Sqrt3 => sqrt3::refined_topology(mesh, topology, refined),
+        }
+    }
+
+    /// `levels` steps; none gives a copy. The topology of each level comes from that of the level before.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).
@@ -107,12 +135,17 @@ impl Refinement {
     /// # Panics
     /// If a face names a vertex that is not there (the validator reports such faces before).
     pub fn refine_n(self, mesh: &Mesh, levels: usize) -> Result<Mesh> {
-        let mut refined = mesh.clone();
-        for _ in 0..levels {
-            let topology = Topology::new(&refined.faces, refined.len());
-            refined = self.refine(&refined, &topology)?;
+        let mut topology = Topology::new(&mesh.faces, mesh.len());
+        let mut coarse = None;
+        for level in 1..=levels {
+            let mesh = coarse.as_ref().unwrap_or(mesh);
+            let refined = self.refine(mesh, &topology)?;
+            if level < levels {
+                topology = self.refined_topology(mesh, &topology, &refined);
+            }
+            coarse = Some(refined);
         }
-        Ok(refined)
+        Ok(coarse.unwrap_or_else(|| mesh.clone()))
     }
 
     /// The limit points of all vertices; under Doo-Sabin the centroids of their type-V faces, under the

@@ -4,9 +4,12 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
+use super::refined::{self, rows, triangle_offsets};
 use super::star::{
-    Tangents, blend_with_neighbors, centroid, require_room, require_triangles, ring_tangents, twin,
+    CHUNK, Tangents, blend_with_neighbors, centroid, require_room, require_triangles,
+    ring_tangents, twin,
 };
 use crate::Result;
 use crate::mesh::{Faces, Mesh, Topology};
@@ -45,25 +48,30 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_triangles(mesh, topology, "sqrt3")?;
     require_room(mesh, 3)?;
     let mut positions = blend_with_neighbors(mesh, topology, vertex_mask);
-    positions.extend(
-        mesh.faces
-            .iter()
-            .map(|face| centroid(&mesh.positions, face)),
-    );
+    let faces = (0..mesh.faces.len()).into_par_iter().with_min_len(CHUNK);
+    positions.par_extend(faces.map(|f| centroid(&mesh.positions, mesh.faces.face(f))));
     Ok(Mesh::new(positions, flip(mesh, topology)))
+}
+
+/// The topology of `refined`, which is what [`refine`] or [`unified_sqrt3`](super::unified_sqrt3) made of `mesh`: that
+/// of [`Topology::new`], by index arithmetic from the coarse one.
+///
+/// # Panics
+/// If the three do not belong together.
+pub fn refined_topology(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+    refined::of_flips(mesh, topology, refined)
 }
 
 /// The faces after the split in three and the flip of every old edge: one for each half-edge.
 pub(super) fn flip(mesh: &Mesh, topology: &Topology) -> Faces {
     let vertices = mesh.len() as u32;
-    let mut corners = Vec::with_capacity(3 * mesh.faces.corners().len());
-    for (c, &v) in mesh.faces.corners().iter().enumerate() {
-        let c = c as u32;
+    let old = mesh.faces.corners();
+    let mut corners = vec![0; 3 * old.len()];
+    rows(&mut corners).for_each(|(c, corners): (u32, &mut [u32; 3])| {
         let across = twin(topology, c);
-        corners.extend([v, vertices + across / 3, vertices + c / 3]);
-    }
-    let offsets = (0..=corners.len() as u32).step_by(3).collect();
-    Faces::from_parts(offsets, corners)
+        *corners = [old[c as usize], vertices + across / 3, vertices + c / 3];
+    });
+    Faces::from_parts(triangle_offsets(old.len()), corners)
 }
 
 /// The limit points of all vertices.

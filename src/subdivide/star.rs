@@ -3,11 +3,14 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
-use crate::mesh::topology::NONE;
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::topology::{NONE, Scatter};
+use crate::mesh::{Incidence, Mesh, Topology};
 use crate::{Error, Result};
 
+/// Vertices, edges or faces of one task.
+pub(super) const CHUNK: usize = 1024;
 /// A normal shorter than this, relative to the reach of its star squared, is rounding: some tens of ε.
 const DEGENERATE: f64 = 1e-14;
 
@@ -45,17 +48,19 @@ pub(crate) fn require_closed(mesh: &Mesh, topology: &Topology) -> Result<()> {
             topology.boundary_edges()
         ));
     }
-    for v in 0..mesh.len() {
-        let Some(&first) = topology.incidence.corners_at(v).first() else {
-            return refuse(format!("vertex {v} belongs to no face: remove it"));
-        };
-        if umbrella(mesh, topology, first) != topology.incidence.face_count(v) {
-            return refuse(format!(
-                "the faces at vertex {v} form more than one umbrella: split the vertex"
-            ));
-        }
+    let incidence = &topology.incidence;
+    let split = (0..mesh.len())
+        .into_par_iter()
+        .with_min_len(CHUNK)
+        .find_first(|&v| incidence.face_count(v) == 0 || !topology.is_one_umbrella(&mesh.faces, v));
+    if let Some(v) = split {
+        return refuse(if incidence.face_count(v) == 0 {
+            format!("vertex {v} belongs to no face: remove it")
+        } else {
+            format!("the faces at vertex {v} form more than one umbrella: split the vertex")
+        });
     }
-    match mesh.faces.iter().position(|face| face.len() < 3) {
+    match first_face(mesh, |size| size < 3) {
         Some(f) => refuse(format!(
             "face {f} has {} corners, fewer than three: remove it",
             mesh.faces.face(f).len()
@@ -64,10 +69,17 @@ pub(crate) fn require_closed(mesh: &Mesh, topology: &Topology) -> Result<()> {
     }
 }
 
+fn first_face(mesh: &Mesh, is_bad: impl Fn(usize) -> bool + Sync) -> Option<usize> {
+    let sizes = mesh.faces.offsets().par_windows(2);
+    sizes
+        .with_min_len(CHUNK)
+        .position_first(|w| is_bad((w[1] - w[0]) as usize))
+}
+
 /// Refuses a mesh that is not closed or has a face that is no triangle, naming the first such face.
 pub(crate) fn require_triangles(mesh: &Mesh, topology: &Topology, scheme: &str) -> Result<()> {
     require_closed(mesh, topology)?;
-    match mesh.faces.iter().position(|face| face.len() != 3) {
+    match first_face(mesh, |size| size != 3) {
         Some(f) => refuse(format!(
             "face {f} has {} corners, but {scheme} needs triangles: split the faces or use catmull-clark",
             mesh.faces.face(f).len()
@@ -93,16 +105,18 @@ pub(crate) fn refuse<T>(what: String) -> Result<T> {
     Err(Error::mesh("mesh", what))
 }
 
-/// The edge of every half-edge; edges are numbered by their first half-edge.
-pub(crate) fn edge_numbers(mesh: &Mesh, topology: &Topology) -> Vec<u32> {
-    let mut edge = vec![0; mesh.faces.corners().len()];
-    for (e, c) in topology.edge_sides().enumerate() {
-        edge[c as usize] = e as u32;
-        if let Some(t) = topology.twin(c) {
-            edge[t as usize] = e as u32;
-        }
-    }
-    edge
+/// The edge of every half-edge of a closed mesh; edges are numbered by their first half-edge, `firsts`.
+pub(crate) fn edge_numbers(topology: &Topology, firsts: &[u32]) -> Vec<u32> {
+    let edge = Scatter::new(topology.twins().len());
+    firsts
+        .par_iter()
+        .enumerate()
+        .with_min_len(CHUNK)
+        .for_each(|(e, &c)| {
+            edge.set(c, e as u32);
+            edge.set(twin(topology, c), e as u32);
+        });
+    edge.into_vec()
 }
 
 /// The opposite half-edge in a mesh that [`require_closed`] has let pass.
@@ -124,36 +138,35 @@ pub(crate) fn centroid(positions: &[DVec3], face: &[u32]) -> DVec3 {
     sum / face.len() as f64
 }
 
+/// `mask(n)` for every valence up to the largest of the mesh.
+pub(crate) fn by_valence<T>(incidence: &Incidence, mask: impl Fn(usize) -> T) -> Vec<T> {
+    let valences = incidence.offsets().par_windows(2).with_min_len(CHUNK);
+    let largest = valences.map(|w| w[1] - w[0]).max().unwrap_or(0);
+    (0..=largest as usize).map(mask).collect()
+}
+
 /// `mask(n) = [a, b]` at every vertex of a closed mesh: a times the vertex plus b times the sum of its n
-/// neighbours. The cost of `mask` is paid once a valence.
+/// neighbours.
 pub(crate) fn blend_with_neighbors(
     mesh: &Mesh,
     topology: &Topology,
     mask: impl Fn(usize) -> [f64; 2],
 ) -> Vec<DVec3> {
-    let mut points = vec![DVec3::ZERO; mesh.len()];
-    for face in mesh.faces.iter() {
-        for (v, w) in sides(face) {
-            points[v] += mesh.positions[w];
-        }
-    }
-    let mut masks = Vec::new();
-    for (v, point) in points.iter_mut().enumerate() {
-        let n = topology.incidence.face_count(v);
-        while masks.len() <= n {
-            masks.push(mask(masks.len()));
-        }
-        let [a, b] = masks[n];
-        *point = a * mesh.positions[v] + b * *point;
-    }
-    points
-}
-
-/// The number of faces in the umbrella of a corner of a closed mesh.
-fn umbrella(mesh: &Mesh, topology: &Topology, first: u32) -> usize {
-    let turn = |&c: &u32| topology.counter_clockwise(&mesh.faces, c);
-    let turns = std::iter::successors(Some(first), turn).skip(1);
-    1 + turns.take_while(|&c| c != first).count()
+    let masks = by_valence(&topology.incidence, mask);
+    (0..mesh.len())
+        .into_par_iter()
+        .with_min_len(CHUNK)
+        .map(|v| {
+            let star = topology.incidence.corners_at(v);
+            let mut sum = DVec3::ZERO;
+            for &c in star {
+                let w = mesh.faces.corners()[topology.incidence.next(&mesh.faces, c) as usize];
+                sum += mesh.positions[w as usize];
+            }
+            let [a, b] = masks[star.len()];
+            a * mesh.positions[v] + b * sum
+        })
+        .collect()
 }
 
 /// Calls `visit(v, corners)` for every vertex with its corners in counter-clockwise order.
@@ -169,19 +182,29 @@ pub(crate) fn for_each_star(
     }
 }
 
-/// The points (cos, sin)(2πj/n) of the unit circle, kept until another n is asked for.
+/// The points (cos, sin)(2πj/n) of the unit circle: kept for small n, and for the last large one.
 #[derive(Default)]
-pub(crate) struct Circle(Vec<DVec2>);
+pub(crate) struct Circle {
+    small: Vec<Vec<DVec2>>,
+    large: Vec<DVec2>,
+}
 
 impl Circle {
+    const SMALL: usize = 32;
+
     pub(crate) fn of(&mut self, n: usize) -> &[DVec2] {
-        if self.0.len() != n {
+        let points = if n < Self::SMALL {
+            self.small.resize(Self::SMALL, Vec::new());
+            &mut self.small[n]
+        } else {
+            &mut self.large
+        };
+        if points.len() != n {
             let step = TAU / n as f64;
-            self.0.clear();
-            self.0
-                .extend((0..n).map(|j| DVec2::from_angle(step * j as f64)));
+            points.clear();
+            points.extend((0..n).map(|j| DVec2::from_angle(step * j as f64)));
         }
-        &self.0
+        points
     }
 }
 

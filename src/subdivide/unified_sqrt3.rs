@@ -2,9 +2,10 @@
 //! (α = 0) with an interpolatory one (α = 1). New vertices take the mean α of their triangle.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::sqrt3::{flip, relaxation};
-use super::star::{blend_with_neighbors, refuse, require_room, require_triangles};
+use super::star::{CHUNK, blend_with_neighbors, refuse, require_room, require_triangles};
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
 
@@ -40,16 +41,16 @@ pub fn refine(mesh: &Mesh, topology: &Topology, alpha: &[f64]) -> Result<(Mesh, 
     });
     let old = &mesh.positions;
     let mut positions = Vec::with_capacity(mesh.len() + mesh.faces.len());
-    positions.extend((0..mesh.len()).map(|v| old[v] + (1.0 - alpha[v]) * displacements[v]));
     let mut parameters = Vec::with_capacity(positions.capacity());
+    let vertices = (0..mesh.len()).into_par_iter().with_min_len(CHUNK);
+    positions.par_extend(vertices.map(|v| old[v] + (1.0 - alpha[v]) * displacements[v]));
     parameters.extend_from_slice(alpha);
-    for face in mesh.faces.iter() {
-        let corners = || face.iter().map(|&v| v as usize);
-        let point: DVec3 = corners()
-            .map(|v| old[v] - alpha[v] * displacements[v])
-            .sum();
-        positions.push(point / 3.0);
-        parameters.push(corners().map(|v| alpha[v]).sum::<f64>() / 3.0);
-    }
+    let faces = || (0..mesh.faces.len()).into_par_iter().with_min_len(CHUNK);
+    let corners = |f| mesh.faces.face(f).iter().map(|&v| v as usize);
+    positions.par_extend(faces().map(|f| {
+        let shares = corners(f).map(|v| old[v] - alpha[v] * displacements[v]);
+        shares.sum::<DVec3>() / 3.0
+    }));
+    parameters.par_extend(faces().map(|f| corners(f).map(|v| alpha[v]).sum::<f64>() / 3.0));
     Ok((Mesh::new(positions, flip(mesh, topology)), parameters))
 }

@@ -6,6 +6,7 @@ mod labsik_greiner;
 mod limits;
 mod meshes;
 mod normals;
+mod refined;
 mod refinement;
 
 /// Rounding of sums of some tens of terms of size 1.

@@ -1,0 +1,262 @@
+//! The topology of a refined mesh, by index arithmetic on that of the coarse one: nothing is searched or sorted but
+//! the four to six corners at a new vertex. Equal to [`Topology::new`] of the result, entry by entry.
+//!
+//! Half-edge c leaves corner c; t is its twin, V, E, F, C count the coarse mesh's vertices, edges, faces, corners.
+//! Some closed meshes have refinements with several edges between the same two vertices, whose sides
+//! [`Topology::new`] leaves without twins (a triangle and its back: the two faces of a vertex of valence 2 come to share
+//! two edges). Such meshes are recognised, and left to it.
+
+use rayon::prelude::*;
+
+use super::star::{edge_numbers, next_in_triangle, prev_in_triangle};
+use crate::mesh::topology::Scatter;
+use crate::mesh::{Incidence, Mesh, Topology};
+
+/// New faces, edges or vertices of one task.
+const CHUNK: usize = 4096;
+
+/// After the split of every face into quads, one a corner: quad c is (vertex, edge of c, face, edge of prev c).
+pub(super) fn of_quads(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+    let (faces, incidence, twin) = (&mesh.faces, &topology.incidence, topology.twins());
+    let count = twin.len();
+    let one_face_on_both_sides = (0..count as u32)
+        .into_par_iter()
+        .any(|c| incidence.face_of(c) == incidence.face_of(twin[c as usize]));
+    if one_face_on_both_sides {
+        return Topology::new(&refined.faces, refined.len());
+    }
+    let (next, prev) = (|c| incidence.next(faces, c), |c| incidence.prev(faces, c));
+    let mut twins = vec![0; 4 * count];
+    rows(&mut twins).for_each(|(c, quad): (u32, &mut [u32; 4])| {
+        let before = prev(c);
+        *quad = [
+            4 * next(twin[c as usize]) + 3,
+            4 * next(c) + 2,
+            4 * before + 1,
+            4 * twin[before as usize],
+        ];
+    });
+
+    let firsts = topology.first_sides();
+    let mut corners = vec![0; 4 * count];
+    let (at_vertices, rest) = corners.split_at_mut(count);
+    let (at_edges, at_faces) = rest.split_at_mut(4 * firsts.len());
+    scale(at_vertices, incidence.corners(), |c| 4 * c);
+    rows(at_edges).for_each(|(k, corners): (u32, &mut [u32; 4])| {
+        let c = firsts[k as usize];
+        let t = twin[c as usize];
+        *corners = [4 * c + 1, 4 * next(c) + 3, 4 * t + 1, 4 * next(t) + 3];
+        corners.sort_unstable();
+    });
+    rows(at_faces).for_each(|(c, corner): (u32, &mut [u32; 1])| corner[0] = 4 * c + 2);
+
+    let mut offsets = Vec::with_capacity(refined.len() + 1);
+    offsets.extend_from_slice(incidence.offsets());
+    offsets.par_extend(ends(count, 4, firsts.len()));
+    let first = 3 * count as u32;
+    offsets.par_extend(faces.offsets()[1..].par_iter().map(|&end| first + end));
+    closed(refined, offsets, corners, twins)
+}
+
+/// After the split of every triangle f in four: triangle 4f + i is (vertex, edge of c, edge of prev c) with c = 3f + i,
+/// triangle 4f + 3 has the three edges.
+pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
+    if has_valence_below_three(&topology.incidence) {
+        return Topology::new(&refined.faces, refined.len());
+    }
+    let (incidence, twin) = (&topology.incidence, topology.twins());
+    let count = twin.len();
+    // The first corner of the triangle at corner c.
+    let outer = |c: u32| 3 * (c + c / 3);
+    let mut twins = vec![0; 4 * count];
+    rows(&mut twins).for_each(|(f, twins): (u32, &mut [u32; 12])| {
+        let middle = 12 * f + 9;
+        for i in 0..3 {
+            let (next, prev) = ((i + 1) % 3, (i + 2) % 3);
+            let t = twin[(3 * f + i) as usize];
+            let entering = twin[(3 * f + prev) as usize];
+            let at = 3 * i as usize;
+            twins[at] = outer(next_in_triangle(t) as u32) + 2;
+            twins[at + 1] = middle + prev;
+            twins[at + 2] = outer(entering);
+            twins[9 + i as usize] = outer(3 * f + next) + 1;
+        }
+    });
+
+    let firsts = topology.first_sides();
+    let mut corners = vec![0; 4 * count];
+    let (at_vertices, at_edges) = corners.split_at_mut(count);
+    scale(at_vertices, incidence.corners(), outer);
+    rows(at_edges).for_each(|(k, corners): (u32, &mut [u32; 6])| {
+        let first = firsts[k as usize];
+        for (c, three) in [first, twin[first as usize]]
+            .into_iter()
+            .zip(corners.chunks_exact_mut(3))
+        {
+            let (here, after) = (outer(c) + 1, outer(next_in_triangle(c) as u32) + 2);
+            three[0] = here.min(after);
+            three[1] = here.max(after);
+            three[2] = 12 * (c / 3) + 9 + c % 3;
+        }
+    });
+
+    let mut offsets = Vec::with_capacity(refined.len() + 1);
+    offsets.extend_from_slice(incidence.offsets());
+    offsets.par_extend(ends(count, 6, firsts.len()));
+    closed(refined, offsets, corners, twins)
+}
+
+/// After the split of every triangle in three and the flip of every old edge: triangle c is (vertex, face of t, face
+/// of c).
+pub(super) fn of_flips(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+    if has_valence_below_three(&topology.incidence) {
+        return Topology::new(&refined.faces, refined.len());
+    }
+    let (incidence, twin) = (&topology.incidence, topology.twins());
+    let count = twin.len();
+    let mut twins = vec![0; 3 * count];
+    rows(&mut twins).for_each(|(c, twins): (u32, &mut [u32; 3])| {
+        let t = twin[c as usize];
+        *twins = [
+            3 * next_in_triangle(t) as u32 + 2,
+            3 * t + 1,
+            3 * twin[prev_in_triangle(c)],
+        ];
+    });
+
+    let mut corners = vec![0; 3 * count];
+    let (at_vertices, at_faces) = corners.split_at_mut(count);
+    scale(at_vertices, incidence.corners(), |c| 3 * c);
+    rows(at_faces).for_each(|(f, corners): (u32, &mut [u32; 6])| {
+        let own = [0, 1, 2].map(|i| 3 * f + i);
+        let mut across = own.map(|c| twin[c as usize]);
+        across.sort_unstable();
+        let before = across.iter().filter(|&&t| t < own[0]).count();
+        let (low, high) = across.split_at(before);
+        let across = |t: &u32| 3 * t + 1;
+        let own = own.iter().map(|c| 3 * c + 2);
+        let all = low
+            .iter()
+            .map(across)
+            .chain(own)
+            .chain(high.iter().map(across));
+        corners
+            .iter_mut()
+            .zip(all)
+            .for_each(|(at, corner)| *at = corner);
+    });
+
+    let mut offsets = Vec::with_capacity(refined.len() + 1);
+    offsets.extend_from_slice(incidence.offsets());
+    offsets.par_extend(ends(count, 6, mesh.faces.len()));
+    closed(refined, offsets, corners, twins)
+}
+
+/// After Doo-Sabin's split: vertex c for every corner; the old faces, then (next c, c, next t, t) for every edge whose
+/// first side is c, then the corners around every vertex.
+pub(super) fn of_corners(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+    let (faces, incidence, twin) = (&mesh.faces, &topology.incidence, topology.twins());
+    if has_valence_below_three(incidence) {
+        return Topology::new(&refined.faces, refined.len());
+    }
+    let count = twin.len();
+    let firsts = topology.first_sides();
+    let edge = edge_numbers(topology, &firsts);
+    let (next, prev) = (|c| incidence.next(faces, c), |c| incidence.prev(faces, c));
+    let first_edge = count as u32;
+    let first_star = 3 * count as u32;
+    let stars = &refined.faces.corners()[3 * count..];
+    // Where each corner stands in the face of its vertex.
+    let place = Scatter::new(count);
+    stars
+        .par_iter()
+        .enumerate()
+        .with_min_len(CHUNK)
+        .for_each(|(p, &c)| place.set(c, first_star + p as u32));
+    let place = place.into_vec();
+    // Of the quad of the edge of c, the corner that is c, and the corner that is next c.
+    let in_edge = |c: u32| {
+        let second = if c < twin[c as usize] { 0 } else { 2 };
+        first_edge + 4 * edge[c as usize] + second
+    };
+
+    let mut twins = vec![0; 4 * count];
+    let (of_faces, rest) = twins.split_at_mut(count);
+    let (of_edges, of_vertices) = rest.split_at_mut(4 * firsts.len());
+    rows(of_faces).for_each(|(c, twin): (u32, &mut [u32; 1])| twin[0] = in_edge(c));
+    rows(of_edges).for_each(|(k, twins): (u32, &mut [u32; 4])| {
+        let c = firsts[k as usize];
+        let t = twin[c as usize];
+        let at = |c: u32| place[next(c) as usize];
+        *twins = [c, at(t), t, at(c)];
+    });
+    rows(of_vertices).for_each(|(p, twins): (u32, &mut [u32; 1])| {
+        let ahead = twin[prev(stars[p as usize]) as usize];
+        twins[0] = in_edge(ahead) + 1;
+    });
+
+    let mut corners = vec![0; 4 * count];
+    rows(&mut corners).for_each(|(c, corners): (u32, &mut [u32; 4])| {
+        let (leaving, entering) = (in_edge(c) + 1, in_edge(prev(c)));
+        *corners = [
+            c,
+            leaving.min(entering),
+            leaving.max(entering),
+            place[c as usize],
+        ];
+    });
+    let offsets = (0..count as u32 + 1)
+        .into_par_iter()
+        .map(|c| 4 * c)
+        .collect();
+    closed(refined, offsets, corners, twins)
+}
+
+/// A vertex whose faces may share two edges.
+fn has_valence_below_three(incidence: &Incidence) -> bool {
+    let offsets = incidence.offsets().par_windows(2);
+    offsets.with_min_len(CHUNK).any(|w| w[1] - w[0] < 3)
+}
+
+fn closed(refined: &Mesh, offsets: Vec<u32>, corners: Vec<u32>, twins: Vec<u32>) -> Topology {
+    let incidence = Incidence::from_parts(offsets, corners, &refined.faces);
+    Topology::closed(incidence, twins)
+}
+
+/// Rows of N entries in parallel, with their numbers.
+pub(super) fn rows<const N: usize>(
+    values: &mut [u32],
+) -> impl IndexedParallelIterator<Item = (u32, &mut [u32; N])> {
+    let (rows, _) = values.as_chunks_mut();
+    rows.par_iter_mut()
+        .with_min_len(CHUNK)
+        .enumerate()
+        .map(|(k, row)| (k as u32, row))
+}
+
+fn scale(to: &mut [u32], from: &[u32], map: impl Fn(u32) -> u32 + Sync) {
+    to.par_iter_mut()
+        .zip(from)
+        .with_min_len(CHUNK)
+        .for_each(|(to, &c)| *to = map(c));
+}
+
+/// The ends of `count` rows of `size` entries that begin at `start`.
+pub(super) fn ends(
+    start: usize,
+    size: u32,
+    count: usize,
+) -> impl IndexedParallelIterator<Item = u32> {
+    let start = start as u32;
+    (1..count as u32 + 1)
+        .into_par_iter()
+        .map(move |k| start + size * k)
+}
+
+/// The offsets of `count` triangles.
+pub(super) fn triangle_offsets(count: usize) -> Vec<u32> {
+    (0..count as u32 + 1)
+        .into_par_iter()
+        .map(|f| 3 * f)
+        .collect()
+}
