@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use super::loop_scheme::split_in_four;
 use super::star::{
-    CHUNK, Circle, edge_numbers, next_in_triangle, prev_in_triangle, refuse, require_room,
-    require_triangles, twin,
+    CHUNK, Circle, edge_numbers, find_first, next_in_triangle, prev_in_triangle, refuse,
+    require_room, require_triangles, twin,
 };
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
@@ -71,7 +71,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     }
     let firsts = topology.first_sides();
     let mut positions = Vec::with_capacity(mesh.len() + firsts.len());
-    positions.extend_from_slice(&mesh.positions);
+    positions.par_extend(&mesh.positions);
     let sides = firsts.par_iter().with_min_len(CHUNK);
     positions.par_extend(sides.map(|&c| stencil.edge_point(c)));
     let edge = edge_numbers(topology, &firsts);
@@ -130,10 +130,7 @@ impl<'a> Stencil<'a> {
     /// The first vertex of valence below 3, and its valence.
     fn without_rule(&self) -> Option<(usize, usize)> {
         let valence = |v| self.topology.incidence.face_count(v);
-        let v = (0..self.mesh.len())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .find_first(|&v| valence(v) < 3)?;
+        let v = find_first(self.mesh.len(), |v| valence(v) < 3)?;
         Some((v, valence(v)))
     }
 
@@ -168,14 +165,21 @@ impl<'a> Stencil<'a> {
             let found = self.wide.binary_search_by_key(&v, |w| w.vertex).ok()?;
             return self.wide[found].point(c);
         }
-        let positions = &self.mesh.positions;
-        let mut sum = DVec3::ZERO;
-        let mut spoke = c;
-        for &weight in &self.masks[n] {
-            sum += weight * positions[corners[next_in_triangle(spoke)] as usize];
-            spoke = twin(self.topology, prev_in_triangle(spoke) as u32);
+        // The mask is symmetric about the edge, so its ring is walked from there in both directions.
+        let neighbor = |c: u32| self.mesh.positions[corners[next_in_triangle(c)] as usize];
+        let (mut left, mut right) = (c, c);
+        let mask = &self.masks[n];
+        let mut point = CENTER * self.mesh.positions[v as usize] + mask[0] * neighbor(c);
+        for weight in &mask[1..n.div_ceil(2)] {
+            left = twin(self.topology, prev_in_triangle(left) as u32);
+            right = next_in_triangle(twin(self.topology, right)) as u32;
+            point += *weight * (neighbor(left) + neighbor(right));
         }
-        Some(CENTER * positions[v as usize] + sum)
+        if n.is_multiple_of(2) {
+            left = twin(self.topology, prev_in_triangle(left) as u32);
+            point += mask[n / 2] * neighbor(left);
+        }
+        Some(point)
     }
 }
 

@@ -49,10 +49,9 @@ pub(crate) fn require_closed(mesh: &Mesh, topology: &Topology) -> Result<()> {
         ));
     }
     let incidence = &topology.incidence;
-    let split = (0..mesh.len())
-        .into_par_iter()
-        .with_min_len(CHUNK)
-        .find_first(|&v| incidence.face_count(v) == 0 || !topology.is_one_umbrella(&mesh.faces, v));
+    let split = find_first(mesh.len(), |v| {
+        incidence.face_count(v) == 0 || !topology.is_one_umbrella(&mesh.faces, v)
+    });
     if let Some(v) = split {
         return refuse(if incidence.face_count(v) == 0 {
             format!("vertex {v} belongs to no face: remove it")
@@ -70,10 +69,14 @@ pub(crate) fn require_closed(mesh: &Mesh, topology: &Topology) -> Result<()> {
 }
 
 fn first_face(mesh: &Mesh, is_bad: impl Fn(usize) -> bool + Sync) -> Option<usize> {
-    let sizes = mesh.faces.offsets().par_windows(2);
-    sizes
-        .with_min_len(CHUNK)
-        .position_first(|w| is_bad((w[1] - w[0]) as usize))
+    find_first(mesh.faces.len(), |f| is_bad(mesh.faces.range(f).len()))
+}
+
+/// The first number below `count` of which `is_it` holds, looked for in parallel.
+pub(crate) fn find_first(count: usize, is_it: impl Fn(usize) -> bool + Sync) -> Option<usize> {
+    (0..count.div_ceil(CHUNK))
+        .into_par_iter()
+        .find_map_first(|k| (k * CHUNK..count.min((k + 1) * CHUNK)).find(|&i| is_it(i)))
 }
 
 /// Refuses a mesh that is not closed or has a face that is no triangle, naming the first such face.
