@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::loop_scheme::split_in_four;
 use super::star::{
-    CHUNK, Circle, edge_numbers, find_first, next_in_triangle, prev_in_triangle, refuse,
+    CHUNK, Circle, Harmonics, edge_numbers, find_first, next_in_triangle, prev_in_triangle, refuse,
     require_room, require_triangles, twin,
 };
 use crate::Result;
@@ -94,10 +94,9 @@ const WALKED: usize = 16;
 /// The mask of a vertex is a circulant of three harmonics, so its n products with the ring cost O(n).
 struct Wide {
     vertex: u32,
-    /// The vertex's and the mean's part.
-    base: DVec3,
-    /// The amplitudes of the first and the second harmonic, as cosine and sine.
-    waves: [[DVec3; 2]; 2],
+    center: DVec3,
+    ring: Harmonics,
+    circle: Vec<DVec2>,
     /// The half-edges of the star, ascending, with their places in it.
     places: Vec<(u32, u32)>,
 }
@@ -187,28 +186,17 @@ impl Wide {
     fn new(mesh: &Mesh, topology: &Topology, v: usize) -> Self {
         let mut star = Vec::new();
         topology.star(&mesh.faces, v, &mut star);
-        let n = star.len();
-        let mut circle = Circle::default();
-        let circle = circle.of(n);
-        let mut sum = DVec3::ZERO;
-        let mut waves = [[DVec3::ZERO; 2]; 2];
-        for (j, &c) in star.iter().enumerate() {
-            let neighbor = mesh.faces.corners()[next_in_triangle(c)];
-            let point = mesh.positions[neighbor as usize];
-            sum += point;
-            for (harmonic, [cosine, sine]) in waves.iter_mut().enumerate() {
-                let unit = circle[(harmonic + 1) * j % n];
-                *cosine += unit.x * point;
-                *sine += unit.y * point;
-            }
-        }
-        let [a0, a1, a2] = amplitudes(n).map(|a| a / n as f64);
+        let circle = Circle::default().of(star.len()).to_vec();
+        let neighbor = |&c: &u32| mesh.faces.corners()[next_in_triangle(c)] as usize;
+        let points = star.iter().map(|c| mesh.positions[neighbor(c)]);
+        let ring = Harmonics::of(points, &circle, 1);
         let mut places: Vec<(u32, u32)> = star.into_iter().zip(0..).collect();
         places.sort_unstable();
         Wide {
             vertex: v as u32,
-            base: CENTER * mesh.positions[v] + a0 * sum,
-            waves: [waves[0].map(|w| a1 * w), waves[1].map(|w| a2 * w)],
+            center: CENTER * mesh.positions[v],
+            ring,
+            circle,
             places,
         }
     }
@@ -216,9 +204,8 @@ impl Wide {
     /// The point of the edge of half-edge `c`, which leaves the vertex.
     fn point(&self, c: u32) -> Option<DVec3> {
         let found = self.places.binary_search_by_key(&c, |p| p.0).ok()?;
-        let angle = TAU * f64::from(self.places[found].1) / self.places.len() as f64;
-        let (once, twice) = (DVec2::from_angle(angle), DVec2::from_angle(2.0 * angle));
-        let wave = |unit: DVec2, [cosine, sine]: [DVec3; 2]| unit.x * cosine + unit.y * sine;
-        Some(self.base + wave(once, self.waves[0]) + wave(twice, self.waves[1]))
+        let place = self.places[found].1 as usize;
+        let amplitudes = amplitudes(self.places.len());
+        Some(self.center + self.ring.at(&self.circle, place, amplitudes))
     }
 }

@@ -123,7 +123,9 @@ impl Refinement {
                 loop_scheme::refined_topology(topology, refined)
             }
             Refinement::DooSabin => doo_sabin::refined_topology(mesh, topology, refined),
-            Refinement::Sqrt3 => sqrt3::refined_topology(mesh, topology, refined),
+            Refinement::Sqrt3 | Refinement::LabsikGreiner => {
+                sqrt3::refined_topology(mesh, topology, refined)
+            }
         }
     }
 

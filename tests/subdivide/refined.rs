@@ -39,8 +39,8 @@ fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
     } else {
         meshes.extend(triangle_meshes());
     }
-    // Two triangles on the same vertices, which butterfly has no rule for.
-    if scheme != Refinement::Butterfly {
+    // Two triangles on the same vertices, for which the interpolatory schemes have no rule.
+    if !matches!(scheme, Refinement::Butterfly | Refinement::LabsikGreiner) {
         let pillow = Faces::from_lists([[0, 1, 2], [0, 2, 1]]);
         meshes.push(Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], pillow));
     }
