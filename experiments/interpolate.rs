@@ -358,12 +358,19 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
         .as_ref()
         .map_or_else(|| order.clone(), |p| p.order(&order));
     let stop = arguments.stop.stop(&input.mesh);
-    let progress = Progress::open("solving", arguments.common.quiet);
+    let progress = Progress::toward("solving", arguments.common.quiet);
     let solve = |method: Method| -> Result<Solution> {
         let setup = standard_setup(solved, method, Some(&order), &|| spectrum(solved))?;
+        let mut start = None;
         let watch = &mut |step: &Step| {
-            progress.step();
-            progress.message(format!("{method}: max error {:.2e}", step.errors.max));
+            // In digits: from the first error seen to the tolerance.
+            let error = step.errors.max;
+            let digits = |e: f64| (e / stop.tolerance).ln();
+            progress.part(1.0 - digits(error) / digits(*start.get_or_insert(error)));
+            let iteration = step.iteration;
+            progress.message(format!(
+                "{method}, iteration {iteration}: max error {error:.2e}"
+            ));
             ControlFlow::Continue(())
         };
         let points = &input.mesh.positions;

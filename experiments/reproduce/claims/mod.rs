@@ -3,7 +3,7 @@
 //!
 //! - [`finding`]: numbers, thresholds, verdicts;
 //! - [`lab`]: the meshes and small tools that claims share;
-//! - one file a paper: [`thall`] and [`thall_masks`], [`zheng_cai`] and [`zheng_cai_faces`], [`pia`], [`lin_luo`];
+//! - one file a paper, and beside it one each for subjects of their own: [`thall`], [`zheng_cai`], [`pia`], [`lin_luo`];
 //! - [`findings`]: the page on what is settled and what is wrong, filled with the ledger's numbers.
 
 mod finding;
@@ -11,10 +11,13 @@ mod findings;
 mod lab;
 mod lin_luo;
 mod pia;
+mod pia_catmull_clark;
 mod thall;
 mod thall_masks;
+mod thall_surfaces;
 mod zheng_cai;
 mod zheng_cai_faces;
+mod zheng_cai_speed;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -1,32 +1,29 @@
-//! Thall's algorithm: T1–T18. The local matrices and masks of his appendix are in [`thall_masks`](super::thall_masks).
+//! Thall's algorithm: T1–T18. Those about surfaces are checked in [`thall_surfaces`]; the local matrices and masks of
+//! his appendix are in [`thall_masks`](super::thall_masks).
 
 use std::ops::ControlFlow;
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
-use limitlab::assemble::{LimitSystem, Scheme};
-use limitlab::interpolate::normals::{Rotation, rotate_rings};
-use limitlab::interpolate::thall::{
-    AttributeRule, Inverse, LocalIteration, MedialAtom, medial_shifts, normal_deviations,
-    refine_attributes, scaled_distances,
-};
+use limitlab::assemble::Scheme;
+use limitlab::interpolate::thall::{Inverse, LocalIteration};
 use limitlab::mesh::{Mesh, Topology};
-use limitlab::solvers::{Outcome, Setup, Stop, run, solve};
-use limitlab::subdivide::Refinement;
-use limitlab::subdivide::catmull_clark;
+use limitlab::solvers::{Outcome, Setup, Stop, solve};
+use limitlab::subdivide::{Refinement, catmull_clark};
 
-use super::Claim;
 use super::finding::{Evidence, Finding};
 use super::lab::{
     Lab, distance, each, ends, entries_per_vertex, exact, excess, history, iterates, iterations,
     largest, limit_by_powers, median, quad_star, random_points, smallest, solve_random, subject,
 };
+use super::{Claim, thall_surfaces};
 use crate::context::Subject;
 
 const CC: Scheme = Scheme::CatmullClark;
+
 /// What sums of some tens of terms of size 1 may lose.
 const ROUNDING: f64 = 1e-12;
 
@@ -125,7 +122,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§2.3, Eq. 12 to 14",
         printed: "Replacing each other face by a quad of the same centroid keeps limit point and tangent plane.",
         slow: false,
-        check: regularisation,
+        check: thall_surfaces::regularisation,
     },
     Claim {
         id: "T13",
@@ -133,7 +130,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§2.3",
         printed: "After the first split the mesh is regular, and no further extraordinary vertices arise.",
         slow: false,
-        check: quads_after_one_split,
+        check: thall_surfaces::quads_after_one_split,
     },
     Claim {
         id: "T14",
@@ -141,7 +138,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§2.4",
         printed: "Distance over r, angle of normals and medial shift measure the surface; normals are not interpolated.",
         slow: false,
-        check: metrics,
+        check: thall_surfaces::metrics,
     },
     Claim {
         id: "T15",
@@ -149,7 +146,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§2.5",
         printed: "Local 1-neighbourhoods of initial vertices are disjoint after 2 subdivisions.",
         slow: false,
-        check: disjoint_rings,
+        check: thall_surfaces::disjoint_rings,
     },
     Claim {
         id: "T16",
@@ -157,7 +154,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§2.5",
         printed: "Turning a 1-ring about its limit point gives the wanted normal and leaves the limit point.",
         slow: false,
-        check: rotated_rings,
+        check: thall_surfaces::rotated_rings,
     },
     Claim {
         id: "T17",
@@ -165,7 +162,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§2.6",
         printed: "The midpoint rule keeps values at original vertices; the scheme's own rule makes them creep.",
         slow: false,
-        check: attributes,
+        check: thall_surfaces::attributes,
     },
     Claim {
         id: "T18",
@@ -593,226 +590,6 @@ fn linear_time(_: &Lab) -> Result<Finding> {
         "m does not depend on n where λ_min(A) is bounded below, as with valences from 4 on (λ_min ≥ 1/9). Meshes \
          of valence 3 throughout are the exception: on odd prisms λ_min falls like 1/k², and m grows.",
     ))
-}
-
-fn regularisation(lab: &Lab) -> Result<Finding> {
-    // Eq. 14 itself: the quad's centroid is the polygon's.
-    let mut centroids = 0.0f64;
-    for m in 3..=12 {
-        let p = random_points(m, m as u64);
-        let size = m as f64;
-        let others: DVec3 = p[2..m - 1].iter().sum();
-        let near = p[0] + p[1] + p[m - 1];
-        let fourth = 4.0 / size * others - (size - 4.0) / size * near;
-        let mean: DVec3 = p.iter().sum::<DVec3>() / size;
-        centroids = largest([centroids, mean.distance((near + fourth) / 4.0)]);
-    }
-    let rows = each(&lab.polygons()[..60], |subject| {
-        let (mesh, topology) = (&subject.mesh, &subject.topology);
-        let fine = Refinement::CatmullClark.refine(mesh, topology)?;
-        let at = Topology::new(&fine.faces, fine.len());
-        let limits = catmull_clark::limit_positions(mesh, topology)?;
-        let from_quads = catmull_clark::limit_positions(&fine, &at)?;
-        let normals = catmull_clark::limit_normals(mesh, topology)?;
-        let normals_from_quads = catmull_clark::limit_normals(&fine, &at)?;
-        let angles = normal_deviations(&normals_from_quads[..mesh.len()], &normals);
-        let defined = angles
-            .iter()
-            .zip(&normals)
-            .filter(|(_, n)| **n != DVec3::ZERO);
-        Ok((
-            distance(&limits, &from_quads[..mesh.len()]) / mesh.diagonal(),
-            largest(defined.map(|(a, _)| *a)),
-        ))
-    })?;
-    Ok(Finding::reproduced(vec![
-        Evidence::at_most(
-            "largest distance of centroids by Eq. 14, faces of 3…12 corners",
-            centroids,
-            ROUNDING,
-        ),
-        Evidence::at_most(
-            "largest distance of limit points over L, by R and by splitting first, 60 random meshes",
-            largest(rows.iter().map(|r| r.0)),
-            ROUNDING,
-        ),
-        Evidence::at_most(
-            "largest angle of their normals",
-            largest(rows.iter().map(|r| r.1)),
-            1e-9,
-        ),
-    ]))
-}
-
-fn quads_after_one_split(lab: &Lab) -> Result<Finding> {
-    let rows = each(&lab.polygons()[..60], |subject| {
-        let extraordinary = |mesh: &Mesh| {
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            (0..mesh.len())
-                .filter(|&v| topology.incidence.face_count(v) != 4)
-                .count()
-        };
-        let others = |mesh: &Mesh| mesh.faces.iter().filter(|f| f.len() != 4).count();
-        let once = Refinement::CatmullClark.refine_n(&subject.mesh, 1)?;
-        let twice = Refinement::CatmullClark.refine_n(&once, 1)?;
-        let expected = extraordinary(&subject.mesh) + others(&subject.mesh);
-        Ok([
-            others(&once) + others(&twice),
-            extraordinary(&once).abs_diff(expected),
-            extraordinary(&twice).abs_diff(expected),
-        ])
-    })?;
-    let total = |k: usize| rows.iter().map(|r| r[k]).sum::<usize>();
-    Ok(Finding::reproduced(vec![
-        Evidence::equal(
-            "faces that are no quads after one and two splits, 60 random meshes",
-            total(0),
-            0.0,
-        ),
-        Evidence::equal(
-            "extraordinary vertices after one split, less those before and the faces that were no quads",
-            total(1),
-            0.0,
-        ),
-        Evidence::equal("the same after two splits", total(2), 0.0),
-    ]))
-}
-
-fn metrics(_: &Lab) -> Result<Finding> {
-    // On the unit sphere the given normals are the points, and every medial atom is the ball itself.
-    let subject = exact("irregular-tri:300")?;
-    let (mesh, topology) = (&subject.mesh, &subject.topology);
-    let given: Vec<DVec3> = mesh.positions.iter().map(|p| p.normalize()).collect();
-    let system = subject.system(CC)?;
-    let stop = Stop {
-        tolerance: 0.0,
-        max_iterations: 100,
-    };
-    let control = run(&system, &mesh.positions, Setup::THALL, &stop).points;
-    let control = Mesh::new(control, mesh.faces.clone());
-    let limits = catmull_clark::limit_positions(&control, topology)?;
-    let normals = catmull_clark::limit_normals(&control, topology)?;
-    let radius = vec![0.1; mesh.len()];
-    let start = catmull_clark::limit_positions(mesh, topology)?;
-    let angles = normal_deviations(&normals, &given);
-    let ball = MedialAtom::fit(mesh.positions.iter().copied().zip(given.iter().copied()));
-    let shifts = medial_shifts(&mesh.faces, (&limits, &normals), (&mesh.positions, &given));
-    let shifts: Vec<f64> = shifts.into_iter().flatten().collect();
-    Ok(Finding::reproduced(vec![
-        Evidence::at_most(
-            "metric 1 after 100 iterations, r = 0.1, irregular-tri:300 on the unit sphere",
-            largest(scaled_distances(&limits, &mesh.positions, &radius)),
-            1e-4,
-        ),
-        Evidence::shown("metric 1 before", largest(scaled_distances(&start, &mesh.positions, &radius))),
-        Evidence::above("metric 2: largest angle to the sphere's normals after the iterations", largest(angles), 0.01),
-        Evidence::at_most(
-            "metric 3: distance of the fitted medial atom from the sphere's own",
-            ball.map_or(f64::NAN, |b| b.position.length() + (b.radius - 1.0).abs()),
-            ROUNDING,
-        ),
-        Evidence::shown("metric 3: median shift of the atoms of the triangles", median(shifts)),
-    ])
-    .remark(
-        "Metric 3 refers to a construction of another chapter of the thesis; the least-squares ball stands in for it.",
-    ))
-}
-
-fn disjoint_rings(lab: &Lab) -> Result<Finding> {
-    /// Vertices that lie in the 1-rings of more than one of the first `original` vertices.
-    fn shared(mesh: &Mesh, original: usize) -> usize {
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        let mut owner = vec![usize::MAX; mesh.len()];
-        let mut shared = vec![false; mesh.len()];
-        for v in 0..original {
-            for &c in topology.incidence.corners_at(v) {
-                for &w in mesh.faces.face(topology.incidence.face_of(c)) {
-                    let w = w as usize;
-                    shared[w] |= owner[w] != usize::MAX && owner[w] != v;
-                    owner[w] = v;
-                }
-            }
-        }
-        shared.iter().filter(|&&s| s).count()
-    }
-    let rows = each(&lab.polygons()[..60], |subject| {
-        let n = subject.mesh.len();
-        let once = Refinement::CatmullClark.refine_n(&subject.mesh, 1)?;
-        let twice = Refinement::CatmullClark.refine_n(&once, 1)?;
-        Ok([shared(&once, n), shared(&twice, n)])
-    })?;
-    let total = |k: usize| rows.iter().map(|r| r[k]).sum::<usize>();
-    Ok(Finding::reproduced(vec![
-        Evidence::equal(
-            "vertices in several original 1-rings after two subdivisions, 60 random meshes",
-            total(1),
-            0.0,
-        ),
-        Evidence::above("the same after one subdivision", total(0), 0.0),
-    ]))
-}
-
-fn rotated_rings(_: &Lab) -> Result<Finding> {
-    let subject = exact("irregular-poly:200")?;
-    let (mesh, topology) = (&subject.mesh, &subject.topology);
-    let limits = catmull_clark::limit_positions(mesh, topology)?;
-    let wanted: Vec<DVec3> = catmull_clark::limit_normals(mesh, topology)?
-        .into_iter()
-        .zip(random_points(mesh.len(), 1))
-        .map(|(n, axis)| DQuat::from_axis_angle(axis.normalize(), 0.4) * n)
-        .collect();
-    let given: Vec<Option<DVec3>> = wanted.iter().copied().map(Some).collect();
-    let turned = rotate_rings(mesh, Refinement::CatmullClark, &given, Rotation::default())?;
-    let at = Topology::new(&turned.mesh.faces, turned.mesh.len());
-    let after = catmull_clark::limit_positions(&turned.mesh, &at)?;
-    let normals = catmull_clark::limit_normals(&turned.mesh, &at)?;
-    Ok(Finding::reproduced(vec![
-        Evidence::at_most(
-            "largest angle between wanted and found normals, turned by up to 0.4, irregular-poly:200",
-            largest(normal_deviations(&normals[..mesh.len()], &wanted)),
-            1e-10,
-        ),
-        Evidence::at_most(
-            "largest move of a limit point over L",
-            distance(&limits, &after[..mesh.len()]) / mesh.diagonal(),
-            ROUNDING,
-        ),
-        Evidence::shown("rings turned", turned.turned.len()),
-    ]))
-}
-
-fn attributes(_: &Lab) -> Result<Finding> {
-    let subject = exact("irregular-poly:200")?;
-    let n = subject.mesh.len();
-    let values = random_points(n, 1);
-    let after = |rule: AttributeRule| -> Result<f64> {
-        let mut mesh = subject.mesh.clone();
-        let mut now = values.clone();
-        for _ in 0..3 {
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            now = refine_attributes(&mesh, &topology, now, rule)?;
-            mesh = Refinement::CatmullClark.refine(&mesh, &topology)?;
-        }
-        Ok(distance(&now[..n], &values))
-    };
-    let system = LimitSystem::new(&subject.mesh, &subject.topology, CC)?;
-    let stop = Stop {
-        tolerance: 1e-10,
-        max_iterations: 1,
-    };
-    let control = run(&system, &values, Setup::Cholesky, &stop).points;
-    let control = Mesh::new(control, subject.mesh.faces.clone());
-    let limits = catmull_clark::limit_positions(&control, &subject.topology)?;
-    Ok(Finding::reproduced(vec![
-        Evidence::equal(
-            "largest change of a random value at an original vertex, three midpoint splits, irregular-poly:200",
-            after(AttributeRule::Midpoint)?,
-            0.0,
-        ),
-        Evidence::above("the same by Catmull-Clark", after(AttributeRule::Scheme)?, 0.01),
-        Evidence::at_most("the same in the limit, values interpolated first", distance(&limits, &values), 1e-9),
-    ])
-    .remark("The paper expects some creep of interpolated values too: that of the iterations left out."))
 }
 
 fn singular_meshes(_: &Lab) -> Result<Finding> {
