@@ -7,10 +7,11 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::loop_scheme::split_in_four;
+use super::interpolatory::{RegularMask, SQRT_3, tangents};
+use super::loop_scheme::{refined_topology, split_in_four};
 use super::star::{
-    CHUNK, Circle, Harmonics, edge_numbers, find_first, next_in_triangle, prev_in_triangle, refuse,
-    require_room, require_triangles, twin,
+    CHUNK, Circle, Harmonics, Tangents, edge_numbers, find_first, next_in_triangle,
+    prev_in_triangle, refuse, require_room, require_triangles, twin,
 };
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
@@ -20,6 +21,16 @@ pub const CENTER: f64 = 0.75;
 
 /// The regular stencil: the ends of the edge, the vertices opposite to it, the four wings.
 pub const REGULAR: [f64; 3] = [0.5, 0.125, -0.0625];
+
+/// The tangents at a regular vertex, in units of 1/60 of a lattice step's inverse.
+const TANGENTS: RegularMask = RegularMask {
+    weights: &[
+        (1, 0, [16.0, 0.0]),
+        (2, 0, [1.0, 0.0]),
+        // 8/√3 at 30°.
+        (1, 1, [-4.0, -4.0 / SQRT_3]),
+    ],
+};
 
 /// The amplitudes of the harmonics 0, 1, 2 of an extraordinary vertex's mask: its weights are
 /// s_j = (a₀ + a₁cos(2πj/n) + a₂cos(4πj/n))/n. With (¼, 1, ½) for n ≥ 5 this is the published formula. The
@@ -76,6 +87,31 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     positions.par_extend(sides.map(|&c| stencil.edge_point(c)));
     let edge = edge_numbers(topology, &firsts);
     Ok(Mesh::new(positions, split_in_four(mesh, &edge)))
+}
+
+/// The tangents of the limit surface at all vertices, found in the mesh refined once, which is what they cost.
+///
+/// # Errors
+/// As [`refine`].
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_tangents(mesh: &Mesh, topology: &Topology) -> Result<Vec<Tangents>> {
+    let fine = refine(mesh, topology)?;
+    let finer = refined_topology(topology, &fine);
+    Ok(tangents(&fine, &finer, mesh.len(), &TANGENTS))
+}
+
+/// The unit normals of the limit surface at all vertices; zero where [`Tangents::normal`] is.
+///
+/// # Errors
+/// As [`limit_tangents`].
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_normals(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+    let tangents = limit_tangents(mesh, topology)?;
+    Ok(tangents.iter().map(Tangents::normal).collect())
 }
 
 /// What the points of edges are computed from.

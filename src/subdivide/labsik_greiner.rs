@@ -14,16 +14,30 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::sqrt3::flip;
+use super::interpolatory::{RegularMask, SQRT_3, tangents};
+use super::sqrt3::{flip, refined_topology};
 use super::star::{
-    Circle, Harmonics, next_in_triangle, prev_in_triangle, refuse, require_room, require_triangles,
-    twin,
+    Circle, Harmonics, Tangents, next_in_triangle, prev_in_triangle, refuse, require_room,
+    require_triangles, twin,
 };
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
 
 /// The regular mask: the corners of the triangle, the vertices opposite to its sides, the six next to those.
 pub const REGULAR: [f64; 3] = [32.0 / 81.0, -1.0 / 81.0, -2.0 / 81.0];
+
+/// The tangents at a regular vertex, in units of 1/695 700 of a lattice step's inverse.
+const TANGENTS: RegularMask = RegularMask {
+    weights: &[
+        (1, 0, [166_842.0, 0.0]),
+        (2, 0, [-11_349.0, 0.0]),
+        // 10 128 √3 at 30°.
+        (1, 1, [-15_192.0, -5_064.0 * SQRT_3]),
+        (3, 0, [-38.0, 0.0]),
+        (2, 1, [382.5, 130.5 * SQRT_3]),
+        (1, 2, [387.0, 126.0 * SQRT_3]),
+    ],
+};
 
 /// μ = ⅔cos(π/n): the subdominant eigenvalue of one step (of which each turns by π/n) at valence `n`.
 pub fn subdominant(n: usize) -> f64 {
@@ -128,6 +142,33 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
         }
     }
     Ok(Mesh::new(positions, flip(mesh, topology)))
+}
+
+/// The tangents of the limit surface at all vertices, found in the mesh refined twice, which is what they cost.
+///
+/// # Errors
+/// As [`refine`].
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_tangents(mesh: &Mesh, topology: &Topology) -> Result<Vec<Tangents>> {
+    let once = refine(mesh, topology)?;
+    let finer = refined_topology(mesh, topology, &once);
+    let twice = refine(&once, &finer)?;
+    let finest = refined_topology(&once, &finer, &twice);
+    Ok(tangents(&twice, &finest, mesh.len(), &TANGENTS))
+}
+
+/// The unit normals of the limit surface at all vertices; zero where [`Tangents::normal`] is.
+///
+/// # Errors
+/// As [`limit_tangents`].
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_normals(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+    let tangents = limit_tangents(mesh, topology)?;
+    Ok(tangents.iter().map(Tangents::normal).collect())
 }
 
 /// The corner opposite to half-edge `c` in the triangle across it.

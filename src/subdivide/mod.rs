@@ -30,6 +30,7 @@
 pub mod butterfly;
 pub mod catmull_clark;
 pub mod doo_sabin;
+mod interpolatory;
 pub mod labsik_greiner;
 pub mod loop_scheme;
 mod refined;
@@ -177,7 +178,7 @@ impl Refinement {
     /// [`Tangents::normal`] is.
     ///
     /// # Errors
-    /// As [`refine`](Self::refine); Butterfly and Labsik-Greiner have no mask for them here.
+    /// As [`refine`](Self::refine).
     ///
     /// # Panics
     /// If `topology` is not that of `mesh`.
@@ -189,9 +190,8 @@ impl Refinement {
                 doo_sabin::limit_normals(doo_sabin::Rule::DooSabin, mesh, topology)
             }
             Refinement::Sqrt3 => sqrt3::limit_normals(mesh, topology),
-            Refinement::Butterfly | Refinement::LabsikGreiner => Err(Error::Unknown(format!(
-                "{self} has no tangent masks here: use loop, sqrt3, catmull-clark or doo-sabin"
-            ))),
+            Refinement::Butterfly => butterfly::limit_normals(mesh, topology),
+            Refinement::LabsikGreiner => labsik_greiner::limit_normals(mesh, topology),
         }
     }
 }

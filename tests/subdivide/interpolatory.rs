@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 use limitlab::mesh::Mesh;
-use limitlab::subdivide::{Refinement, butterfly, sqrt3, unified_sqrt3};
+use limitlab::subdivide::{Refinement, butterfly, labsik_greiner, sqrt3, unified_sqrt3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -146,6 +146,46 @@ fn butterfly_reproduces_cubics_on_the_regular_lattice() {
         }
     }
     assert!(seen > 50);
+}
+
+/// The masks of regular vertices are the derivative of what the schemes reproduce: cubics, on a lattice large enough.
+#[test]
+fn regular_tangents_are_the_derivatives_of_cubics() {
+    let size = 12usize;
+    let lattice = |v: usize| ((v / size) as f64, (v % size) as f64);
+    let mut mesh = tri_torus(12, 12);
+    for v in 0..mesh.len() {
+        let (i, j) = lattice(v);
+        mesh.positions[v] = cubic(i, j);
+    }
+    let topology = topology(&mesh);
+    let found = [
+        butterfly::limit_tangents(&mesh, &topology).unwrap(),
+        labsik_greiner::limit_tangents(&mesh, &topology).unwrap(),
+    ];
+    for tangents in found {
+        // One mask for all vertices, so the ratios of the lengths are known once one of them is.
+        let mut scale = None;
+        for v in (0..mesh.len()).filter(|&v| {
+            let (i, j) = lattice(v);
+            (4.0..=7.0).contains(&i) && (4.0..=7.0).contains(&j)
+        }) {
+            let (i, j) = lattice(v);
+            let h = 1e-3;
+            // A central difference of a cubic errs by h² times its third derivative.
+            let along = |a: f64, b: f64| {
+                let difference = cubic(i + h * a, j + h * b) - cubic(i - h * a, j - h * b);
+                difference / (2.0 * h)
+            };
+            let expected = along(1.0, 0.0).cross(along(0.0, 1.0));
+            let cross = tangents[v].cosine.cross(tangents[v].sine);
+            let ratio = *scale.get_or_insert(cross.length() / expected.length());
+            assert!(
+                (cross / ratio).distance(expected) < 1e-6 * expected.length(),
+                "{v}"
+            );
+        }
+    }
 }
 
 #[test]

@@ -284,6 +284,40 @@ fn the_local_matrix_has_the_eigenvalues_of_the_mask() {
     assert!(values[3].norm() < 0.2);
 }
 
+/// Both tangents lie in the left invariant subspace of the matrix, on three rings: seen by what the mesh's own unit
+/// vectors give. A star of regular vertices, refined nowhere, in which two steps are one round.
+#[test]
+fn the_regular_tangent_mask_is_the_matrix_s() {
+    let mesh = tri_torus(14, 14);
+    let at = topology(&mesh);
+    let matrix = SplittingMatrix::new(LocalScheme::LabsikGreiner, 6).unwrap();
+    let space = matrix
+        .eigenspaces()
+        .unwrap()
+        .into_iter()
+        .find(|s| (s.value - 1.0 / 3.0).norm() < 1e-9)
+        .unwrap();
+    assert_eq!(space.multiplicity(), 2);
+    let v = 14 * 7 + 7;
+    let layout = LocalScheme::LabsikGreiner.layout();
+    let star = layout
+        .walk(&mesh.faces, &at, at.incidence.corners_at(v)[0], 6, 3)
+        .unwrap();
+    // Random points: the plane of the tangents is that of the subspace's two sums.
+    for seed in 0..5 {
+        let mesh = scattered(mesh.clone(), seed);
+        let normal = Refinement::LabsikGreiner.limit_normals(&mesh, &at).unwrap()[v];
+        let sum = |k: usize| -> DVec3 {
+            let terms = star.iter().enumerate();
+            terms
+                .map(|(i, &w)| space.left[(i, k)] * mesh.positions[w as usize])
+                .sum()
+        };
+        let expected = sum(0).cross(sum(1)).normalize();
+        assert!(normal.cross(expected).length() < 1e-10);
+    }
+}
+
 /// Around every vertex of a mesh refined deep, the ring is an affine image of a regular polygon's: what is left of the
 /// other modes shrinks by their eigenvalue.
 #[test]

@@ -31,6 +31,7 @@ fn normals(scheme: Refinement, mesh: &Mesh) -> Vec<DVec3> {
         Refinement::CatmullClark => catmull_clark::limit_normals(mesh, &topology),
         Refinement::Loop => loop_scheme::limit_normals(mesh, &topology),
         Refinement::Sqrt3 => sqrt3::limit_normals(mesh, &topology),
+        Refinement::Butterfly | Refinement::LabsikGreiner => scheme.limit_normals(mesh, &topology),
         _ => doo_sabin::limit_normals(Rule::DooSabin, mesh, &topology),
     }
     .unwrap()
@@ -108,6 +109,8 @@ fn refined_meshes_have_the_same_normals() {
         Refinement::CatmullClark,
         Refinement::Loop,
         Refinement::Sqrt3,
+        Refinement::Butterfly,
+        Refinement::LabsikGreiner,
     ] {
         for mesh in meshes_for(scheme) {
             let fine = scheme.refine_n(&mesh, 2).unwrap();
@@ -145,11 +148,16 @@ fn normals_are_those_of_a_finely_refined_mesh() {
         Refinement::CatmullClark,
         Refinement::Loop,
         Refinement::Sqrt3,
+        Refinement::Butterfly,
+        Refinement::LabsikGreiner,
     ] {
         for k in [3, 4, 5, 7] {
             let mesh = bipyramid(k);
             let normals = normals(scheme, &mesh);
-            let levels = if scheme == Refinement::Sqrt3 { 9 } else { 6 };
+            let levels = match scheme {
+                Refinement::Sqrt3 | Refinement::LabsikGreiner => 9,
+                _ => 6,
+            };
             let fine = scheme.refine_n(&mesh, levels).unwrap();
             for (v, normal) in normals.iter().enumerate() {
                 let seen = discrete_normal(&fine, v);
@@ -216,6 +224,8 @@ fn normals_turn_with_the_mesh_and_do_not_see_shifts_and_scales() {
         Refinement::Loop,
         Refinement::Sqrt3,
         Refinement::DooSabin,
+        Refinement::Butterfly,
+        Refinement::LabsikGreiner,
     ] {
         for mesh in meshes_for(scheme) {
             let points = mesh
@@ -237,6 +247,8 @@ fn stars_without_a_plane_have_zero_normals() {
         Refinement::Loop,
         Refinement::Sqrt3,
         Refinement::DooSabin,
+        Refinement::Butterfly,
+        Refinement::LabsikGreiner,
     ] {
         let mut line = bipyramid(5);
         for (v, p) in line.positions.iter_mut().enumerate() {

@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::Result;
 use crate::interpolate::thall::angle;
 use crate::mesh::{Mesh, Topology};
-use crate::subdivide::unified_sqrt3;
+use crate::subdivide::{Refinement, unified_sqrt3};
 
 /// α = 1, interpolated, at the vertices marked, and `elsewhere` at the others.
 pub fn choose(interpolated: &[bool], elsewhere: f64) -> Vec<f64> {
@@ -24,12 +24,16 @@ pub fn choose(interpolated: &[bool], elsewhere: f64) -> Vec<f64> {
 /// # Panics
 /// If there is not one α a vertex.
 pub fn refine_n(mesh: &Mesh, alpha: &[f64], levels: usize) -> Result<(Mesh, Vec<f64>)> {
-    let mut refined = (mesh.clone(), alpha.to_vec());
-    for _ in 0..levels {
-        let topology = Topology::new(&refined.0.faces, refined.0.len());
-        refined = unified_sqrt3::refine(&refined.0, &topology, &refined.1)?;
+    let (mut mesh, mut alpha) = (mesh.clone(), alpha.to_vec());
+    let mut topology = Topology::new(&mesh.faces, mesh.len());
+    for level in 1..=levels {
+        let (refined, parameters) = unified_sqrt3::refine(&mesh, &topology, &alpha)?;
+        if level < levels {
+            topology = Refinement::Sqrt3.refined_topology(&mesh, &topology, &refined);
+        }
+        (mesh, alpha) = (refined, parameters);
     }
-    Ok(refined)
+    Ok((mesh, alpha))
 }
 
 /// The volume that a closed, outward oriented mesh encloses: Σ over triangles of p·(q × r)/6, faces of more corners
