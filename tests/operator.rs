@@ -553,6 +553,33 @@ fn local_edits_give_what_solving_anew_gives() {
 }
 
 #[test]
+fn an_edit_of_many_points_solves_all_anew() {
+    let case = both("icosphere:5", mesh("icosphere:5"), Scheme::Loop);
+    let points = &case.mesh.positions;
+    let n = points.len();
+    let tolerance = 1e-10 * case.mesh.diagonal();
+    let stop = Stop {
+        tolerance,
+        max_iterations: 1000,
+    };
+    let (control, _) = mixed::solve(&case.operator, points, &stop);
+    let mut editor = Editor::new(&case.operator, points.clone(), control);
+    for (count, anew) in [(1, false), (n / 10, true), (n, true), (2, false)] {
+        let moves: Vec<(u32, DVec3)> = (0..count)
+            .map(|k| k * n / count)
+            .map(|v| (v as u32, editor.points()[v] + DVec3::new(0.01, 0.02, 0.0)))
+            .collect();
+        let edit = editor.edit(&moves, tolerance, usize::MAX);
+        assert_eq!(edit.anew, anew, "{count} points: {edit:?}");
+        assert!(edit.max_error <= tolerance, "{edit:?}");
+        let errors = Rows::new(n).errors(&case.explicit, editor.points(), editor.control());
+        assert!(errors.max <= 1.01 * tolerance, "{count} points: {errors:?}");
+        // The whole solution costs no more relaxations than a few steps of the edit.
+        assert!(!anew || edit.relaxations < n / 10, "{edit:?}");
+    }
+}
+
+#[test]
 fn the_work_of_an_edit_does_not_grow_with_the_mesh() {
     let work = |name| {
         let case = both(name, mesh(name), Scheme::Loop);

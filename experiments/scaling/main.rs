@@ -166,7 +166,7 @@ fn local_edits(arguments: &Arguments) -> Result<()> {
         }
     }
     table.write(&arguments.out)?;
-    edits::decay_table(&largest).write(&arguments.out)?;
+    edits::decay_table(&largest)?.write(&arguments.out)?;
     cli::print(&table.to_markdown())
 }
 

@@ -7,8 +7,9 @@
 //!
 //! The lower end is estimated: the lowest modes sit where vertices near each other have small diagonal entries (few
 //! neighbours). The places where the average of these is least are compared by the submatrices of 24 vertices around
-//! each, and the least eigenvalue of the principal submatrix around the worst of them is taken, less a margin. It bounds λ_min from above (Cauchy's interlacing), so an eigenvalue may lie beneath the interval, and a
-//! method that cannot bear this must look out for it. What valences prove is never gone below. On irregular meshes of
+//! each, and the least eigenvalue of the principal submatrix around the worst of them is taken, less a margin. It
+//! bounds λ_min from above (Cauchy's interlacing), so an eigenvalue may lie beneath the interval, and a method that
+//! cannot bear this must look out for it. What valences prove is never gone below. On irregular meshes of
 //! 40 000 vertices the submatrix' value was too high by less than 1 %, once by 2.6 %; the upper end by less than 4 %.
 
 use std::sync::Arc;

@@ -4,17 +4,30 @@
 //! ring under Catmull-Clark), so that a change of size δ is below a tolerance t after about log(δ/t)/log(1/0.268)
 //! rings, however large the mesh is. Vertices whose residual is above a threshold are relaxed one at a time
 //! (Gauss-Southwell; each such step lowers the energy of the symmetric system), and the threshold falls to the
-//! tolerance by steps, so that large residuals go first.
+//! tolerance by steps, so that large residuals go first. Where the first of these steps tell that the work would come
+//! near that of a whole solution, all is solved anew.
 
 use std::collections::VecDeque;
 
 use glam::DVec3;
 
+use super::iteration::Stop;
+use super::mixed;
 use super::system::Rows;
 use crate::assemble::Operator;
 
 /// From one threshold to the next. Tuned: 0.3 to 0.03 differ by less than a tenth.
 const FALL: f64 = 0.1;
+/// The work up to a threshold grows like the area that is reached, times the number of thresholds: with the third
+/// power of these. It is not foretold before this many.
+const FORETOLD: i32 = 2;
+/// Relaxations a vertex of the mesh that take as long as solving anew. Tuned on a million vertices.
+const WORTH: f64 = 0.5;
+/// Iterations of a whole solution at most.
+const MOST: usize = 10_000;
+/// Marks of a vertex.
+const QUEUED: u8 = 1;
+const TOUCHED: u8 = 2;
 
 /// Points, their control points, and the residual between them, kept up to date through edits.
 pub struct Editor<'a> {
@@ -24,10 +37,10 @@ pub struct Editor<'a> {
     /// P − A V.
     residual: Vec<DVec3>,
     queue: VecDeque<u32>,
-    queued: Vec<bool>,
+    /// [`QUEUED`], [`TOUCHED`].
+    marks: Vec<u8>,
     /// Vertices whose residual this edit has changed.
     touched: Vec<u32>,
-    is_touched: Vec<bool>,
 }
 
 /// What an edit took.
@@ -39,10 +52,12 @@ pub struct Edit {
     pub touched: usize,
     /// The largest residual among these, at most the tolerance unless the limit of relaxations came first.
     pub max_error: f64,
+    /// Whether the whole mesh was solved anew.
+    pub anew: bool,
 }
 
 impl<'a> Editor<'a> {
-    /// Takes a solution V = `control` for P = `points`. One sweep over A; four arrays of N points and two of N
+    /// Takes a solution V = `control` for P = `points`. One sweep over A; three arrays of N points and one of N
     /// marks.
     ///
     /// # Panics
@@ -53,26 +68,28 @@ impl<'a> Editor<'a> {
             points.len() == n && control.len() == n,
             "one point a vertex"
         );
-        let mut residual = vec![DVec3::ZERO; n];
-        Rows::new(n).residual(
-            operator,
-            &points,
-            &control,
-            &mut residual,
-            |_, e, out, _| {
-                *out = e;
-            },
-        );
-        Editor {
+        let mut editor = Editor {
             operator,
             points,
             control,
-            residual,
+            residual: vec![DVec3::ZERO; n],
             queue: VecDeque::new(),
-            queued: vec![false; n],
+            marks: vec![0; n],
             touched: Vec::new(),
-            is_touched: vec![false; n],
-        }
+        };
+        editor.evaluate();
+        editor
+    }
+
+    /// P − A V of all vertices.
+    fn evaluate(&mut self) {
+        Rows::new(self.points.len()).residual(
+            self.operator,
+            &self.points,
+            &self.control,
+            &mut self.residual,
+            |_, e, out, _| *out = e,
+        );
     }
 
     /// The points P as they are now.
@@ -87,14 +104,15 @@ impl<'a> Editor<'a> {
 
     /// Moves the points of some vertices to new places and relaxes until no residual that the edit has changed is
     /// longer than `tolerance` (absolute, in mesh units), or after `most` relaxations. Residuals elsewhere stay as
-    /// the solution given left them. O(vertices touched), whatever N is.
+    /// the solution given left them. O(vertices touched), whatever N is, unless all is solved anew by
+    /// [`mixed::solve`].
     ///
     /// # Panics
     /// If a vertex does not exist, or unless `tolerance` > 0.
     pub fn edit(&mut self, moves: &[(u32, DVec3)], tolerance: f64, most: usize) -> Edit {
         assert!(tolerance > 0.0, "a positive tolerance");
         for &v in &self.touched {
-            self.is_touched[v as usize] = false;
+            self.marks[v as usize] = 0;
         }
         self.touched.clear();
         let mut largest = 0.0f64;
@@ -107,41 +125,76 @@ impl<'a> Editor<'a> {
         }
         let mut relaxations = 0;
         let mut threshold = largest;
-        while relaxations < most && threshold > tolerance {
+        let thresholds = (tolerance / largest).ln() / FALL.ln();
+        let mut anew = false;
+        for step in 1.. {
+            if relaxations >= most || threshold <= tolerance {
+                break;
+            }
             threshold = (FALL * threshold).max(tolerance);
+            // The share that the steps so far have in work that is just worth while.
+            let share = (f64::from(step.max(FORETOLD)) / thresholds)
+                .min(1.0)
+                .powi(3);
+            let worth = (share * WORTH * self.points.len() as f64) as usize;
+            let limit = if anew { most } else { most.min(worth) };
             for k in 0..self.touched.len() {
                 self.enqueue(self.touched[k] as usize, threshold);
             }
             while let Some(v) = self.queue.pop_front() {
                 let i = v as usize;
-                self.queued[i] = false;
-                if self.residual[i].length_squared() > threshold * threshold && relaxations < most {
+                self.marks[i] &= !QUEUED;
+                if self.residual[i].length_squared() > threshold * threshold && relaxations < limit
+                {
                     relaxations += 1;
                     self.relax(i, threshold);
                 }
             }
+            if relaxations >= limit && limit < most {
+                anew = true;
+                self.solve_all(tolerance);
+                // What mixed precision leaves above the tolerance, if anything, is relaxed.
+                threshold = self.max_error();
+            }
         }
-        let errors = self
-            .touched
-            .iter()
-            .map(|&v| self.residual[v as usize].length());
         Edit {
             relaxations,
             touched: self.touched.len(),
-            max_error: errors.fold(0.0, f64::max),
+            max_error: self.max_error(),
+            anew,
         }
     }
 
+    /// The largest residual among the vertices touched.
+    fn max_error(&self) -> f64 {
+        let squares = self
+            .touched
+            .iter()
+            .map(|&v| self.residual[v as usize].length_squared());
+        squares.fold(0.0, f64::max).sqrt()
+    }
+
+    fn solve_all(&mut self, tolerance: f64) {
+        let stop = Stop {
+            tolerance,
+            max_iterations: MOST,
+        };
+        self.control = mixed::solve(self.operator, &self.points, &stop).0;
+        self.evaluate();
+        (0..self.points.len()).for_each(|i| self.touch(i));
+    }
+
     fn touch(&mut self, i: usize) {
-        if !std::mem::replace(&mut self.is_touched[i], true) {
+        if self.marks[i] & TOUCHED == 0 {
+            self.marks[i] |= TOUCHED;
             self.touched.push(i as u32);
         }
     }
 
     fn enqueue(&mut self, i: usize, threshold: f64) {
-        if self.residual[i].length_squared() > threshold * threshold
-            && !std::mem::replace(&mut self.queued[i], true)
+        if self.residual[i].length_squared() > threshold * threshold && self.marks[i] & QUEUED == 0
         {
+            self.marks[i] |= QUEUED;
             self.queue.push_back(i as u32);
         }
     }
@@ -153,9 +206,10 @@ impl<'a> Editor<'a> {
         self.control[i] += step;
         self.residual[i] = DVec3::ZERO;
         let h = operator.weights();
+        let over_h = step / h[i];
         operator.neighbours(i, |j, a_ij| {
             // M is symmetric: a_ji = h_j a_ij / h_i.
-            self.residual[j] -= (h[j] * a_ij / h[i]) * step;
+            self.residual[j] -= (h[j] * a_ij) * over_h;
             self.touch(j);
             self.enqueue(j, threshold);
         });
