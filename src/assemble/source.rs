@@ -1,5 +1,7 @@
 //! From faces to the rows of the matrix-free [`Operator`](super::Operator).
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::codes::Code;
@@ -253,6 +255,24 @@ impl<'a> Source<'a> {
         offsets: &[u32],
         listed: &Listed,
     ) -> Option<Vec<C>> {
+        // Where all faces are of one size, the corners of a face take no look-up.
+        match self.faces.uniform_size() {
+            Some(3) => self.fill_by(kinds, offsets, listed, |c| c / 3 * 3..c / 3 * 3 + 3),
+            Some(4) => self.fill_by(kinds, offsets, listed, |c| c / 4 * 4..c / 4 * 4 + 4),
+            _ => self.fill_by(kinds, offsets, listed, |c| {
+                self.faces.range(self.incidence.face_of(c as u32))
+            }),
+        }
+    }
+
+    /// `corners_by` tells the corners of the face of a corner.
+    fn fill_by<C: Encode>(
+        &self,
+        kinds: &[Kind],
+        offsets: &[u32],
+        listed: &Listed,
+        corners_by: impl Fn(usize) -> Range<usize> + Sync,
+    ) -> Option<Vec<C>> {
         let incidence = self.incidence;
         let corners = self.faces.corners();
         fill_rows(offsets, |k, row: &mut [C]| {
@@ -263,9 +283,9 @@ impl<'a> Source<'a> {
                     let (edge, opposite) = row.split_at_mut(row.len() / 2);
                     let at = incidence.corners_at(v).iter();
                     for ((edge, opposite), &c) in edge.iter_mut().zip(opposite).zip(at) {
-                        let face = self.faces.face(incidence.face_of(c));
-                        let start = self.faces.range(incidence.face_of(c)).start;
-                        let place = c as usize - start;
+                        let range = corners_by(c as usize);
+                        let place = c as usize - range.start;
+                        let face = &corners[range];
                         *edge = encode(face[(place + 1) % 4])?;
                         *opposite = encode(face[(place + 2) % 4])?;
                     }
@@ -274,7 +294,7 @@ impl<'a> Source<'a> {
                     // Every edge leaves v in one of its faces; on a boundary it may only enter.
                     let mut slots = row.iter_mut();
                     for &c in incidence.corners_at(v) {
-                        let range = self.faces.range(incidence.face_of(c));
+                        let range = corners_by(c as usize);
                         let into = prev_in(&range, c);
                         if let Some(slot) = slots.next() {
                             *slot = encode(corners[next_in(&range, c) as usize])?;

@@ -128,13 +128,15 @@ fn operator(
             &own
         }
     };
-    let numbering = (mesh.len() >= ORDERED).then(|| in_fronts(&mesh.faces, incidence));
+    let in_fronts = || (mesh.len() >= ORDERED).then(|| in_fronts(&mesh.faces, incidence));
+    // The search occupies one thread.
+    let (numbering, closed) = rayon::join(in_fronts, || {
+        topology.is_some() || incidence.is_closed(&mesh.faces)
+    });
     let rows = numbering.as_ref();
     let operator = match topology {
         Some(topology) => Operator::in_order(&mesh.faces, topology, scheme, rows)?,
-        None if incidence.is_closed(&mesh.faces) => {
-            Operator::closed_in_order(&mesh.faces, incidence, scheme, rows)?
-        }
+        None if closed => Operator::closed_in_order(&mesh.faces, incidence, scheme, rows)?,
         None => {
             let topology = Topology::new(&mesh.faces, mesh.len());
             Operator::in_order(&mesh.faces, &topology, scheme, rows)?

@@ -1,6 +1,7 @@
 //! Vertex orders, for sweeps in place and for renumbering: order `o` puts vertex `o[k]` at the k-th place.
 
 use std::fmt;
+use std::ops::Range;
 use std::str::FromStr;
 
 use glam::DVec3;
@@ -277,42 +278,77 @@ pub fn along_curve(mesh: &Mesh) -> Option<(Mesh, Numbering)> {
         .with_min_len(8192)
         .map(|f| moved.face(f).iter().copied().min().unwrap_or(0))
         .collect();
-    let mut starts = vec![0u32; n + 1];
-    for &v in &smallest {
-        starts[v as usize + 1] += 1;
-    }
-    for v in 0..n {
-        starts[v + 1] += starts[v];
-    }
-    let mut by_smallest = vec![0u32; moved.len()];
-    for (f, &v) in smallest.iter().enumerate() {
-        let slot = &mut starts[v as usize];
-        by_smallest[*slot as usize] = f as u32;
-        *slot += 1;
-    }
-    let mut faces = Faces::with_capacity(moved.len(), moved.corners().len());
-    for &f in &by_smallest {
-        faces.push(moved.face(f as usize));
-    }
+    let by_smallest = counting_sort(&smallest, n);
+    let faces = match moved.uniform_size() {
+        // Each face has its place: all threads can work.
+        Some(size) => {
+            let mut corners = vec![0; moved.corners().len()];
+            corners
+                .par_chunks_mut(size)
+                .with_min_len(8192)
+                .zip(&by_smallest)
+                .for_each(|(face, &f)| face.copy_from_slice(moved.face(f as usize)));
+            Faces::from_parts(moved.offsets().to_vec(), corners)
+        }
+        None => {
+            let mut faces = Faces::with_capacity(moved.len(), moved.corners().len());
+            for &f in &by_smallest {
+                faces.push(moved.face(f as usize));
+            }
+            faces
+        }
+    };
     let positions = numbering.there(&mesh.positions);
     Some((Mesh::new(positions, faces), numbering))
 }
 
+/// The numbers of the keys in ascending order of the keys, all below `end`; equal keys as they come. O(keys + end).
+fn counting_sort(keys: &[u32], end: usize) -> Vec<u32> {
+    let mut starts = vec![0u32; end + 1];
+    for &key in keys {
+        starts[key as usize + 1] += 1;
+    }
+    for k in 0..end {
+        starts[k + 1] += starts[k];
+    }
+    let mut sorted = vec![0u32; keys.len()];
+    for (k, &key) in (0..).zip(keys) {
+        let slot = &mut starts[key as usize];
+        sorted[*slot as usize] = k;
+        *slot += 1;
+    }
+    sorted
+}
+
+/// One counting sort by the highest bits of the codes, and a sort of each of the short lists that this gives.
 fn morton(positions: &[DVec3]) -> Vec<u32> {
     const CELLS: f64 = ((1u64 << 21) - 1) as f64;
+    /// Bits of a coordinate that the counting sort looks at.
+    const FIRST: u32 = 5;
     let (low, high) = bounding_box(positions).unwrap_or((DVec3::ZERO, DVec3::ZERO));
     let scale = CELLS / (high - low).max_element().max(f64::MIN_POSITIVE);
-    let mut codes: Vec<(u64, u32)> = positions
+    let codes: Vec<u64> = positions
         .par_iter()
-        .enumerate()
-        .map(|(v, &p)| {
+        .with_min_len(8192)
+        .map(|&p| {
             // A coordinate that is not a number becomes 0.
             let cell = ((p - low) * scale).to_array().map(|x| spread(x as u64));
-            (cell[0] | cell[1] << 1 | cell[2] << 2, v as u32)
+            cell[0] | cell[1] << 1 | cell[2] << 2
         })
         .collect();
-    codes.par_sort_unstable();
-    codes.into_iter().map(|(_, v)| v).collect()
+    let highest: Vec<u32> = codes
+        .par_iter()
+        .with_min_len(8192)
+        .map(|code| (code >> (3 * (21 - FIRST))) as u32)
+        .collect();
+    let mut order = counting_sort(&highest, 1 << (3 * FIRST));
+    let mut lists: Vec<&mut [u32]> = order
+        .chunk_by_mut(|&v, &w| highest[v as usize] == highest[w as usize])
+        .collect();
+    lists.par_iter_mut().for_each(|list| {
+        list.sort_unstable_by_key(|&v| (codes[v as usize], v));
+    });
+    order
 }
 
 /// Puts two zeros between the lowest 21 bits.
@@ -351,25 +387,46 @@ impl Met {
 
 /// The vertices breadth first from the first of every component, over faces. Each face is opened once: O(corners).
 pub fn breadth_first(faces: &Faces, incidence: &Incidence) -> Vec<u32> {
+    // Among triangles, and among quads, a corner's face takes no look-up.
+    match faces.uniform_size() {
+        Some(3) => search(faces, incidence, |c| (c / 3, c / 3 * 3..c / 3 * 3 + 3)),
+        Some(4) => search(faces, incidence, |c| (c / 4, c / 4 * 4..c / 4 * 4 + 4)),
+        _ => search(faces, incidence, |c| {
+            let f = incidence.face_of(c as u32);
+            (f, faces.range(f))
+        }),
+    }
+}
+
+fn search(
+    faces: &Faces,
+    incidence: &Incidence,
+    face_at: impl Fn(usize) -> (usize, Range<usize>),
+) -> Vec<u32> {
     let n = incidence.vertices();
     let (mut vertices, mut opened) = (Met::new(n), Met::new(faces.len()));
-    let mut order: Vec<u32> = Vec::with_capacity(n);
-    let mut next = 0;
+    // One place more, for what is written there and not kept.
+    let mut order = vec![0u32; n + 1];
+    let (mut next, mut end) = (0, 0);
     for seed in 0..n {
-        if vertices.meet(seed) {
-            order.push(seed as u32);
-        }
-        while let Some(&v) = order.get(next) {
+        order[end] = seed as u32;
+        end += usize::from(vertices.meet(seed));
+        while next < end {
+            let v = order[next];
             next += 1;
             for &c in incidence.corners_at(v as usize) {
-                let f = incidence.face_of(c);
+                let (f, range) = face_at(c as usize);
                 if opened.meet(f) {
-                    let fresh = faces.face(f).iter();
-                    order.extend(fresh.filter(|&&w| vertices.meet(w as usize)));
+                    // No branch on what was met: there is no pattern that a processor could predict.
+                    for &w in &faces.corners()[range] {
+                        order[end] = w;
+                        end += usize::from(vertices.meet(w as usize));
+                    }
                 }
             }
         }
     }
+    order.truncate(n);
     order
 }
 

@@ -165,7 +165,8 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
 /// them if single precision does not reach so far.
 fn iterations_for(interval: (f64, f64), factor: f64) -> usize {
     let parts = (factor.ln() / GAIN.ln()).ceil().max(1.0);
-    (promised_iterations(interval, factor.powf(1.0 / parts)) as usize).max(1) + SPARE
+    let spare = if parts > 1.0 { 0 } else { SPARE };
+    (promised_iterations(interval, factor.powf(1.0 / parts)) as usize).max(1) + spare
 }
 
 /// What `count` iterations promise to reduce the error to: 1/T_count(σ).
