@@ -98,11 +98,11 @@ struct ShapeFlags {
     normal_levels: u8,
     /// Scale the faces of interpolated vertices about their points after the first refinement: a positive number,
     /// or a file with lines `vertex number` (schemes zheng-cai and nasri)
-    #[arg(long, value_name = "S|FILE")]
+    #[arg(long, value_name = "S|FILE", allow_negative_numbers = true)]
     shape_handle: Option<String>,
     /// Lin & Luo's unified √3 scheme, no system solved: α from 0 (approximating) over 1 (interpolating) to 2, a number
     /// or a file with lines `vertex number` (others 0); with --vertices, those have α = 1
-    #[arg(long, value_name = "A|FILE", conflicts_with_all = ["normals", "shape_handle"])]
+    #[arg(long, value_name = "A|FILE", allow_negative_numbers = true, conflicts_with_all = ["normals", "shape_handle"])]
     alpha: Option<String>,
     /// Sweeps of --method two-phase at most
     #[arg(long, value_name = "K", default_value_t = 5)]
@@ -110,8 +110,13 @@ struct ShapeFlags {
     /// --method two-phase stops at a largest update of this part of the bounding box's diagonal
     #[arg(long, value_name = "T", default_value_t = 0.003, value_parser = cli::positive)]
     eps: f64,
-    /// Weight of the thin-plate energy in --method halstead
-    #[arg(long, value_name = "W", default_value_t = 1.0)]
+    /// Weight of the thin-plate energy in --method halstead, 0 or more
+    #[arg(
+        long,
+        value_name = "W",
+        default_value_t = 1.0,
+        allow_negative_numbers = true
+    )]
     thin_plate: f64,
     /// Weight of the membrane energy in --method halstead, positive
     #[arg(long, value_name = "W", default_value_t = 1.0, value_parser = cli::positive)]

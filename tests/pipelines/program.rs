@@ -246,6 +246,18 @@ fn failures_say_what_is_wrong_and_write_nothing() {
     let handles = bench.write("handles.txt", "4 -1\n");
     for (arguments, what) in [
         (
+            "icosahedron --alpha -0.5 --subdivide 1".to_owned(),
+            "α = -0.5 at vertex 0",
+        ),
+        (
+            "icosahedron --method halstead --thin-plate -1".to_owned(),
+            "fairness weights -1",
+        ),
+        (
+            "icosahedron --scheme nasri --shape-handle -1 --subdivide 1".to_owned(),
+            "vertex 0: the shape handle -1",
+        ),
+        (
             "icosahedron --alpha 2.5 --subdivide 1".to_owned(),
             "α = 2.5 at vertex 0",
         ),

@@ -204,7 +204,7 @@ pub fn thall_animation(album: &mut Album) -> Result<()> {
     let iterates: Vec<usize> = (0..=6).collect();
     let (panels, last) = thall_pictures(&subject, &iterates)?;
     let frames: Vec<Figure> = (panels.into_iter())
-        .map(|panel| sheet(1, (106, 116), vec![panel]))
+        .map(|panel| sheet(1, (94, 104), vec![panel]))
         .collect();
     let line = Line {
         name: "thall-animation",

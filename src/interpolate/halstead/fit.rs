@@ -103,10 +103,14 @@ pub fn fit(
     let size = points
         .iter()
         .fold(0.0f64, |a, p| a.max(p.abs().max_element()));
-    if totals.errors.max.is_nan() || totals.errors.max > MISS * size {
+    if !(totals.errors.max <= MISS * size && size.is_finite()) {
+        let what = if totals.errors.max.is_finite() {
+            "the system is too ill-conditioned; raise the membrane weight"
+        } else {
+            "the points or weights are too large for doubles; scale them down"
+        };
         return Err(Error::Computation(format!(
-            "the fairest surface misses its points by {:.1e}: the system is too ill-conditioned; raise the membrane \
-             weight",
+            "the fairest surface misses its points by {:.1e}: {what}",
             totals.errors.max
         )));
     }
