@@ -1,5 +1,7 @@
 //! Oddities of position: vertices on the same point, faces on the same points, faces without area.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -43,49 +45,70 @@ fn duplicate_positions(positions: &[DVec3]) -> Vec<(u32, u32)> {
             .to_array()
             .map(f64::to_bits)
     };
-    let keys = positions
-        .par_iter()
-        .enumerate()
-        .filter(|(_, p)| p.is_finite())
-        .map(|(v, _)| {
-            let key = bits(v as u32).into_iter().fold(0, |h, b| mix(h ^ b));
-            (key, v as u32)
-        })
-        .collect();
-    copies(keys, bits)
+    let key = |v: u32| {
+        let is_finite = positions[v as usize].is_finite();
+        is_finite.then(|| bits(v).into_iter().fold(0, |h, b| mix(h ^ b)))
+    };
+    copies(positions.len() as u32, key, bits)
 }
 
 /// The faces whose corners, in any order, lie on the same positions as those of a face before them, with the
 /// first such face; ascending. O(n log n). `same` are the duplicate positions.
 fn duplicate_faces(faces: &Faces, vertices: usize, same: &[(u32, u32)]) -> Vec<(u32, u32)> {
-    let mut place: Vec<u32> = (0..vertices as u32).collect();
-    for &(v, original) in same {
-        place[v as usize] = original;
+    let mut table: Vec<u32> = Vec::new();
+    if !same.is_empty() {
+        table.extend(0..vertices as u32);
+        for &(v, original) in same {
+            table[v as usize] = original;
+        }
     }
-    let place = &place;
-    let keys = (0..faces.len())
-        .into_par_iter()
-        .map(|f| {
-            // A sum does not depend on the order of the corners.
-            let places = faces.face(f).iter().map(|&v| place[v as usize]);
-            let key = places.fold(0u64, |h, p| h.wrapping_add(mix(u64::from(p))));
-            (key, f as u32)
-        })
-        .collect();
-    copies(keys, |f| {
-        let mut places: Vec<u32> = faces
-            .face(f as usize)
-            .iter()
-            .map(|&v| place[v as usize])
-            .collect();
+    let place = |&v: &u32| table.get(v as usize).copied().unwrap_or(v);
+    let key = |f: u32| {
+        // A sum does not depend on the order of the corners.
+        let places = faces.face(f as usize).iter().map(place);
+        Some(places.fold(0u64, |h, p| h.wrapping_add(mix(u64::from(p)))))
+    };
+    copies(faces.len() as u32, key, |f| {
+        let mut places: Vec<u32> = faces.face(f as usize).iter().map(place).collect();
         places.sort_unstable();
         places
     })
 }
 
-/// Of the items `(key, item)`, those equal to one before them by `value`, each with the first of its equals.
-/// Equal values must have equal keys; few unequal ones may.
-fn copies<T: Ord>(mut keys: Vec<(u64, u32)>, value: impl Fn(u32) -> T) -> Vec<(u32, u32)> {
+/// Of `count` items, those equal to one before them by `value`, each with the first of its equals. Equal values must
+/// have equal keys; few unequal ones may. Items without a key have no equals.
+///
+/// Only items that share a bit of a table with another are sorted, an eighth if all are different.
+fn copies<T: Ord>(
+    count: u32,
+    key: impl Fn(u32) -> Option<u64> + Sync,
+    value: impl Fn(u32) -> T,
+) -> Vec<(u32, u32)> {
+    const BITS_PER_ITEM: usize = 16;
+    let bits = (BITS_PER_ITEM * count as usize).next_power_of_two().max(64);
+    let table = || -> Vec<AtomicU64> {
+        let words = (0..bits / 64).into_par_iter();
+        words.map(|_| AtomicU64::new(0)).collect()
+    };
+    let (met, met_again) = (table(), table());
+    let place = |key: u64| {
+        let bit = key as usize & (bits - 1);
+        (bit / 64, 1u64 << (bit % 64))
+    };
+    let items = || (0..count).into_par_iter().with_min_len(4096);
+    items().filter_map(&key).for_each(|key| {
+        let (word, bit) = place(key);
+        if met[word].fetch_or(bit, Ordering::Relaxed) & bit != 0 {
+            met_again[word].fetch_or(bit, Ordering::Relaxed);
+        }
+    });
+    let mut keys: Vec<(u64, u32)> = items()
+        .filter_map(|item| {
+            let key = key(item)?;
+            let (word, bit) = place(key);
+            (met_again[word].load(Ordering::Relaxed) & bit != 0).then_some((key, item))
+        })
+        .collect();
     keys.par_sort_unstable();
     let mut copies = Vec::new();
     for run in keys.chunk_by(|a, b| a.0 == b.0).filter(|run| run.len() > 1) {

@@ -12,6 +12,9 @@ use super::topology::{Incidence, NONE, Topology, join, next_in, prev_in};
 use super::{Faces, Mesh, degenerate};
 use crate::{Error, Result};
 
+/// Vertices or corners of one task.
+const CHUNK: usize = 4096;
+
 /// What to make of boundary edges: `--boundary refuse | as-interior`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Boundary {
@@ -232,23 +235,22 @@ pub fn validate(mesh: &Mesh, lines: Option<(&[u32], &[u32])>, boundary: Boundary
     if mesh.faces.is_empty() {
         report.defects.push(Defect::new(DefectKind::NoFaces));
     }
-    let isolated = examine_faces(mesh, &mut report.defects);
-    for (v, p) in mesh.positions.iter().enumerate() {
-        if !p.is_finite() {
-            let defect = Defect::at_vertex(DefectKind::NonFiniteCoordinate, v as u32);
-            report.defects.push(defect);
-        }
-    }
-    let indices_are_good = report
-        .defects
-        .iter()
-        .all(|d| d.kind != DefectKind::IndexOutOfRange);
-    if indices_are_good {
-        let (_, remarks) = rayon::join(
-            || examine_topology(mesh, isolated, boundary, &mut report),
-            || degenerate::remarks(mesh),
-        );
-        report.remarks.extend(remarks);
+    let corners = mesh.faces.corners().par_iter().with_min_len(CHUNK);
+    let indices_are_good = corners.copied().all(|v| (v as usize) < mesh.len());
+    let ((defects, isolated), remarks) = rayon::join(
+        || examine_faces(mesh),
+        || {
+            if !indices_are_good {
+                return Vec::new();
+            }
+            let topology = || examine_topology(mesh, boundary, &mut report);
+            rayon::join(topology, || degenerate::remarks(mesh)).1
+        },
+    );
+    report.remarks.extend(remarks);
+    report.defects.extend(defects);
+    if let Some(counts) = &mut report.counts {
+        counts.components -= isolated;
     }
     report.defects.sort_by_key(|d| d.kind);
     if let Some((vertex_lines, face_lines)) = lines {
@@ -266,9 +268,10 @@ pub fn validate(mesh: &Mesh, lines: Option<(&[u32], &[u32])>, boundary: Boundary
     report
 }
 
-/// Defects of faces by themselves, and vertices of no face. Returns the number of the latter.
-fn examine_faces(mesh: &Mesh, defects: &mut Vec<Defect>) -> usize {
+/// Defects of faces and positions by themselves, and vertices of no face, with their number.
+fn examine_faces(mesh: &Mesh) -> (Vec<Defect>, usize) {
     let n = mesh.len();
+    let mut defects = Vec::new();
     // The face that named a vertex last.
     let mut named_by = vec![NONE; n];
     for (f, face) in mesh.faces.iter().enumerate() {
@@ -308,11 +311,16 @@ fn examine_faces(mesh: &Mesh, defects: &mut Vec<Defect>) -> usize {
             defects.push(Defect::at_vertex(DefectKind::IsolatedVertex, v as u32));
         }
     }
-    isolated
+    for (v, p) in mesh.positions.iter().enumerate() {
+        if !p.is_finite() {
+            defects.push(Defect::at_vertex(DefectKind::NonFiniteCoordinate, v as u32));
+        }
+    }
+    (defects, isolated)
 }
 
 /// Defects of edges and vertices, the counts, and the topology itself.
-fn examine_topology(mesh: &Mesh, isolated: usize, boundary: Boundary, report: &mut Validation) {
+fn examine_topology(mesh: &Mesh, boundary: Boundary, report: &mut Validation) {
     let faces = &mesh.faces;
     let topology = Topology::new(faces, mesh.len());
     let incidence = &topology.incidence;
@@ -339,7 +347,7 @@ fn examine_topology(mesh: &Mesh, isolated: usize, boundary: Boundary, report: &m
     }
     // Components are found one after the other, vertices in parallel.
     let ((min_valence, max_valence), components) = rayon::join(
-        || examine_vertices(faces, incidence, &mut report.defects),
+        || examine_vertices(faces, &topology, &mut report.defects),
         || topology.components(faces).1,
     );
     let boundary_edges = topology.boundary_edges();
@@ -374,7 +382,7 @@ fn examine_topology(mesh: &Mesh, isolated: usize, boundary: Boundary, report: &m
         vertices: mesh.len(),
         edges: topology.edges(),
         faces: faces.len(),
-        components: components - isolated,
+        components,
         euler_characteristic: topology.euler_characteristic(faces),
         boundary_edges,
         boundary_loops,
@@ -387,11 +395,12 @@ fn examine_topology(mesh: &Mesh, isolated: usize, boundary: Boundary, report: &m
 /// Umbrellas and valences of all vertices, in parallel. Returns the least and the greatest valence.
 fn examine_vertices(
     faces: &Faces,
-    incidence: &Incidence,
+    topology: &Topology,
     defects: &mut Vec<Defect>,
 ) -> (usize, usize) {
-    const CHUNK: usize = 4096;
+    let incidence = &topology.incidence;
     let n = incidence.vertices();
+    let is_closed = topology.is_closed();
     let chunks: Vec<(Vec<Defect>, usize, usize)> = (0..n.div_ceil(CHUNK))
         .into_par_iter()
         .map_init(Link::default, |link, chunk| {
@@ -401,7 +410,12 @@ fn examine_vertices(
                 if incidence.face_count(v) == 0 {
                     continue;
                 }
-                let (valence, umbrellas) = link.examine(faces, incidence, v);
+                // One umbrella of edges with two sides each: the valence is the number of faces.
+                let (valence, umbrellas) = if is_closed && topology.is_one_umbrella(faces, v) {
+                    (incidence.face_count(v), 1)
+                } else {
+                    link.examine(faces, incidence, v)
+                };
                 min = min.min(valence);
                 max = max.max(valence);
                 let mut report = |kind, count: usize| {
