@@ -19,10 +19,12 @@ use crate::assemble::Operator;
 /// From one threshold to the next. Tuned: 0.3 to 0.03 differ by less than a tenth.
 const FALL: f64 = 0.1;
 /// The work up to a threshold grows like the area that is reached, times the number of thresholds: with the third
-/// power of these. It is not foretold before this many.
+/// power of these. It is foretold after this many.
 const FORETOLD: i32 = 2;
 /// Relaxations a vertex of the mesh that take as long as solving anew. Tuned on a million vertices.
 const WORTH: f64 = 0.5;
+/// So many times the work foretold is done before all is solved anew after all.
+const SAFEGUARD: f64 = 2.0;
 /// Iterations of a whole solution at most.
 const MOST: usize = 10_000;
 /// Marks of a vertex.
@@ -132,12 +134,14 @@ impl<'a> Editor<'a> {
                 break;
             }
             threshold = (FALL * threshold).max(tolerance);
-            // The share that the steps so far have in work that is just worth while.
-            let share = (f64::from(step.max(FORETOLD)) / thresholds)
-                .min(1.0)
-                .powi(3);
-            let worth = (share * WORTH * self.points.len() as f64) as usize;
-            let limit = if anew { most } else { most.min(worth) };
+            // At first the share that these steps have in work that is just worth while; then a safeguard.
+            let worth = WORTH * self.points.len() as f64;
+            let worth = if step <= FORETOLD {
+                worth * (f64::from(FORETOLD) / thresholds).min(1.0).powi(3)
+            } else {
+                SAFEGUARD * worth
+            };
+            let limit = if anew { most } else { most.min(worth as usize) };
             for k in 0..self.touched.len() {
                 self.enqueue(self.touched[k] as usize, threshold);
             }
