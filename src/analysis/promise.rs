@@ -7,7 +7,7 @@ use crate::assemble::bounds::SpectralBounds;
 use crate::solvers::System;
 use crate::solvers::chebyshev::promised_iterations;
 
-/// Safe intervals and rates that follow from [`SpectralBounds`](crate::assemble::bounds::SpectralBounds).
+/// Safe intervals and rates that follow from [`SpectralBounds`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Promise {
     /// [λ_min bound, λ_max] of A.

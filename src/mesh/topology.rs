@@ -162,7 +162,7 @@ impl Incidence {
     }
 
     /// Whether every side of a face has exactly one opposite: one other side between its vertices, in the other
-    /// direction. In parallel, O(Σ n²) over the valences n up to [`FEW`], with sorts beyond.
+    /// direction. In parallel, O(Σ n²) over the valences n up to 16, with sorts beyond.
     ///
     /// ```
     /// use limitlab::mesh::{Faces, Incidence};
