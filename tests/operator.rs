@@ -11,7 +11,7 @@ use limitlab::mesh::order::{Numbering, Order, along_curve, in_fronts, is_scatter
 use limitlab::mesh::{Faces, Mesh, Topology, builtin::builtin, noise::add_noise};
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
 use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
-use limitlab::solvers::gauss_seidel::Sor;
+use limitlab::solvers::gauss_seidel::{Sor, in_waves};
 use limitlab::solvers::iteration::{Iterate, Report};
 use limitlab::solvers::jacobi::Jacobi;
 use limitlab::solvers::local::{Editor, decay};
@@ -387,6 +387,59 @@ fn mixed_precision_meets_the_tolerance_with_any_number_of_threads() {
         }
         assert!(in_threads(2, solve) == (control, report), "{}", case.name);
     }
+}
+
+#[test]
+fn sweeps_in_waves_are_the_sweeps_one_after_the_other() {
+    for (name, band) in [("torus:60x40", 200), ("irregular-quad:3000", 700)] {
+        let case = both(name, mesh(name), Scheme::CatmullClark);
+        let (operator, numbering) = in_front_order(&case);
+        let points = numbering.there(&case.mesh.positions);
+        for count in [1, 8, 11] {
+            let mut expected = points.clone();
+            Wavefront::in_bands(&operator, None).relax(1.1, count, &points, &mut expected);
+            let mut sor = Sor::new(&operator, &points, 1.1, None);
+            for _ in 0..count {
+                sor.advance().expect("a sweep");
+            }
+            assert!(sor.points() == expected, "{name}");
+            for threads in [1, 2, 3] {
+                let mut x = points.clone();
+                let waves = Wavefront::in_bands(&operator, Some(band));
+                in_threads(threads, || waves.relax(1.1, count, &points, &mut x));
+                assert!(x == expected, "{name}, {count} sweeps, {threads} threads");
+            }
+        }
+    }
+}
+
+#[test]
+fn gauss_seidel_in_waves_solves_large_meshes() {
+    let case = both("icosphere:7", mesh("icosphere:7"), Scheme::Loop);
+    let (operator, numbering) = in_front_order(&case);
+    let points = numbering.there(&case.mesh.positions);
+    let stop = Stop {
+        tolerance: 1e-10 * case.mesh.diagonal(),
+        max_iterations: 1000,
+    };
+    let (control, report) = in_waves(&operator, &points, 1.0, &stop);
+    assert_eq!(report.outcome, Outcome::Converged);
+    let mut sor = Sor::new(&operator, &points, 1.0, None);
+    let reference = solve(&mut sor, &stop, &mut |_| ControlFlow::Continue(()));
+    assert!(report.iterations >= reference.iterations);
+    assert!(report.iterations < reference.iterations + 8);
+    assert_close("icosphere:7", &control, sor.points(), 10.0 * stop.tolerance);
+    let few = Stop {
+        max_iterations: 3,
+        ..stop
+    };
+    let (_, report) = in_waves(&operator, &points, 1.0, &few);
+    assert_eq!(
+        (report.outcome, report.iterations),
+        (Outcome::MaxIterations, 3)
+    );
+    let (_, report) = in_waves(&operator, &points, 2.5, &stop);
+    assert_eq!(report.outcome, Outcome::Diverged);
 }
 
 #[test]

@@ -19,13 +19,14 @@ use limitlab::cli::{self, CommonFlags, List, Progress};
 use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::noise::add_noise;
-use limitlab::mesh::order::Order;
+use limitlab::mesh::order::{Order, in_fronts};
 use limitlab::mesh::{Mesh, Topology, builtin::builtin};
 use limitlab::report::{
     Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette,
 };
 use limitlab::solvers::chebyshev::Chebyshev;
 use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
+use limitlab::solvers::gauss_seidel::in_waves;
 use limitlab::solvers::iteration::Iterate;
 use limitlab::solvers::{Method, Setup, Stop, run, solve};
 
@@ -192,15 +193,18 @@ enum Way {
     Auto,
     Plain,
     Free(Method),
+    /// Gauss-Seidel on the operator in fronts.
+    Waves,
     Stored(Method),
 }
 
 impl Way {
-    const ALL: [Way; 9] = [
+    const ALL: [Way; 10] = [
         Way::Auto,
         Way::Plain,
         Way::Free(Method::Chebyshev),
         Way::Free(Method::Cg),
+        Way::Waves,
         Way::Stored(Method::Chebyshev),
         Way::Stored(Method::GaussSeidel),
         Way::Stored(Method::PcgIc0),
@@ -213,6 +217,7 @@ impl Way {
             Way::Auto => "auto".into(),
             Way::Plain => "plain-chebyshev".into(),
             Way::Free(method) => format!("{method} (matrix-free)"),
+            Way::Waves => format!("{} (in waves)", Method::GaussSeidel),
             Way::Stored(method) => method.name().into(),
         }
     }
@@ -321,6 +326,7 @@ fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) ->
         Way::Auto => (palette(0), Marker::Circle),
         Way::Plain => (palette(1), Marker::Square),
         Way::Free(Method::Chebyshev) => (palette(2), Marker::Circle),
+        Way::Waves => (palette(5), Marker::Circle),
         Way::Free(_) => (palette(3), Marker::Diamond),
         Way::Stored(Method::Chebyshev) => (palette(4), Marker::Circle),
         Way::Stored(Method::GaussSeidel) => (palette(5), Marker::Square),
@@ -423,6 +429,21 @@ fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<
                 } else {
                     "max-iterations"
                 },
+                solve_seconds,
+            }
+        }
+        Way::Waves => {
+            let topology = Topology::new(&mesh.faces, mesh.len());
+            let fronts = in_fronts(&mesh.faces, &topology.incidence);
+            let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&fronts))?;
+            let since = Instant::now();
+            let moved = fronts.there(points);
+            let (control, report) = in_waves(&operator, &moved, 1.0, &stop);
+            fronts.back(&control);
+            start(&mut solve_seconds, since);
+            Outcome {
+                iterations: report.iterations,
+                status: report.outcome.name(),
                 solve_seconds,
             }
         }

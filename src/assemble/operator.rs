@@ -171,6 +171,16 @@ impl Operator {
         self.stencil.row(i, x)
     }
 
+    /// (A x)_i, where `points` holds x from vertex `start` on, as far as the row [reaches](Self::reach).
+    ///
+    /// # Panics
+    /// If the row reaches beyond the points; with large faces.
+    #[inline]
+    pub fn row_within<P: Point>(&self, i: usize, points: (&[P], usize)) -> P {
+        assert!(self.stencil.large.constant.is_empty(), "no large faces");
+        self.stencil.row_within(i, points)
+    }
+
     /// (M x)_i = (A x)_i / h_i.
     pub fn symmetric_row(&self, i: usize, x: &[DVec3]) -> DVec3 {
         self.row(i, x) / self.h[i]

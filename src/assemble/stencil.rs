@@ -381,6 +381,17 @@ impl Stencil {
         }
     }
 
+    /// As [`row`](Self::row), for points from vertex `start` on, as far as the row reaches. There must be no large
+    /// faces.
+    #[inline]
+    pub(super) fn row_within<P: Point>(&self, i: usize, (points, start): (&[P], usize)) -> P {
+        let none = |_, _: &[P]| [P::ZERO; 3];
+        match self.codes.of_row(i) {
+            Row::Near(near) => self.coded_row(near, i, points, start, none),
+            Row::Far(far) => self.coded_row(far, i, points, start, none),
+        }
+    }
+
     /// Calls `visit(j, part of a_ij)` for every neighbour.
     pub(super) fn entries(&self, i: usize, visit: impl FnMut(usize, f64)) {
         match self.codes.of_row(i) {

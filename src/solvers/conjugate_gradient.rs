@@ -2,7 +2,8 @@
 //!
 //! The three coordinates share their step sizes (CG on the block system I₃ ⊗ M), so a rotation of the data
 //! rotates every iterate. Written in the differences e = P − A V: the residual of the symmetric system is
-//! H⁻¹e. One product with A and two further passes an iteration; four arrays of N points.
+//! H⁻¹e. One product with A and two further passes an iteration, the inner products among them (one more, or
+//! two, with a preconditioner that is no scaling); four arrays of N points.
 
 use glam::DVec3;
 
@@ -51,6 +52,8 @@ pub struct ConjugateGradient<'a, S> {
     work: Vec<DVec3>,
     /// ⟨H⁻¹e, z⟩ of the last direction update; `None` asks for a fresh start of the directions.
     rho: Option<f64>,
+    /// ⟨H⁻¹e, z⟩ of the current residual, where the pass that made it could tell.
+    next_rho: Option<f64>,
     recursive: Option<Errors>,
     /// An estimate of how far rounding has taken the recurrence from the true residual since the last product:
     /// each update of V by d leaves a few ε‖d‖₂, as ‖A‖_∞ = 1. Large where V grows: on singular systems.
@@ -75,6 +78,7 @@ impl<'a, S: System> ConjugateGradient<'a, S> {
             direction: vec![DVec3::ZERO; n],
             work: vec![DVec3::ZERO; n],
             rho: None,
+            next_rho: None,
             recursive: None,
             drift: 0.0,
             rows: Rows::new(n),
@@ -84,6 +88,7 @@ impl<'a, S: System> ConjugateGradient<'a, S> {
     /// Evaluates e = P − A V by a product; the recurrence goes on from there.
     fn evaluate(&mut self) -> Errors {
         self.drift = 0.0;
+        self.next_rho = None;
         let totals = self.rows.residual(
             self.system,
             self.points,
@@ -114,17 +119,21 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
 
     fn advance(&mut self) -> Result<(), Failure> {
         let h = self.system.weights();
-        // z = B H⁻¹ e
+        // z = B H⁻¹ e; a scaling is applied where z is used.
         let residual = &self.residual;
         let rho = match &self.preconditioner {
-            Preconditioner::Scaling(s) => {
-                self.rows
-                    .pass_one(&mut self.work, |i, z, tally| {
-                        *z = s[i] * residual[i];
-                        tally.dot(residual[i].dot(*z) / h[i]);
-                    })
-                    .dot
-            }
+            Preconditioner::Scaling(s) => match self.next_rho.take() {
+                Some(rho) => rho,
+                None => {
+                    // A vector of () takes no memory.
+                    let mut nothing = vec![(); residual.len()];
+                    self.rows
+                        .pass_one(&mut nothing, |i, (), tally| {
+                            tally.dot(s[i] * residual[i].length_squared() / h[i]);
+                        })
+                        .dot
+                }
+            },
             Preconditioner::Ssor { omega } => {
                 self.work.fill(DVec3::ZERO);
                 symmetric_sweep(self.system, residual, *omega, None, &mut self.work);
@@ -152,8 +161,16 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
         // p ← z + β p
         let beta = self.rho.map_or(0.0, |before| rho / before);
         let work = &self.work;
-        self.rows
-            .pass_one(&mut self.direction, |i, p, _| *p = work[i] + beta * *p);
+        let squares = match &self.preconditioner {
+            Preconditioner::Scaling(s) => self.rows.pass_one(&mut self.direction, |i, p, tally| {
+                *p = s[i] * residual[i] + beta * *p;
+                tally.dot(p.length_squared());
+            }),
+            _ => self.rows.pass_one(&mut self.direction, |i, p, tally| {
+                *p = work[i] + beta * *p;
+                tally.dot(p.length_squared());
+            }),
+        };
         // q ← A p
         let (system, direction) = (self.system, &self.direction);
         let mut nothing = vec![(); direction.len()];
@@ -178,18 +195,26 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
         let alpha = rho / curvature;
         // V ← V + α p, e ← e − α q
         let work = &self.work;
-        let totals = self
-            .rows
-            .pass(&mut self.current, &mut self.residual, |i, v, e, tally| {
-                let d = alpha * direction[i];
-                *v += d;
+        let (current, residual) = (&mut self.current, &mut self.residual);
+        let totals = match &self.preconditioner {
+            Preconditioner::Scaling(s) => self.rows.pass(current, residual, |i, v, e, tally| {
+                *v += alpha * direction[i];
                 *e -= alpha * work[i];
                 tally.error(*e);
-                tally.dot(d.length_squared());
-            });
+                tally.dot(s[i] * e.length_squared() / h[i]);
+            }),
+            _ => self.rows.pass(current, residual, |i, v, e, tally| {
+                *v += alpha * direction[i];
+                *e -= alpha * work[i];
+                tally.error(*e);
+            }),
+        };
+        if let Preconditioner::Scaling(_) = self.preconditioner {
+            self.next_rho = Some(totals.dot);
+        }
         self.rho = Some(rho);
         self.recursive = Some(totals.errors);
-        self.drift += 4.0 * f64::EPSILON * totals.dot.sqrt();
+        self.drift += 4.0 * f64::EPSILON * alpha * squares.dot.sqrt();
         Ok(())
     }
 

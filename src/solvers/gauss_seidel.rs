@@ -6,8 +6,10 @@
 
 use glam::DVec3;
 
-use super::iteration::{Errors, Failure, Iterate};
+use super::iteration::{Errors, Failure, Iterate, Outcome, Report, Stop};
 use super::system::{Rows, System};
+use super::wavefront::Wavefront;
+use crate::assemble::Operator;
 
 /// Gauss-Seidel and SOR at work.
 pub struct Sor<'a, S> {
@@ -80,4 +82,60 @@ pub fn sweep<S: System>(
         let e = points[i] - system.row(i, x);
         x[i] += (omega / diagonal[i]) * e;
     }
+}
+
+/// Sweeps between two looks at the error.
+const LOOK: usize = 8;
+
+/// Solves `A V = P` from V = P by sweeps in the order of the operator's rows, several of them in one pass over memory
+/// and on all cores ([`Wavefront::relax`]); every iterate is that of [`Sor`]. Errors are known after every few sweeps
+/// only: as many as the observed rate asks for, 8 at the most. The report's history has an entry for each look.
+///
+/// # Panics
+/// If there is not one point a vertex.
+pub fn in_waves(
+    operator: &Operator,
+    points: &[DVec3],
+    omega: f64,
+    stop: &Stop,
+) -> (Vec<DVec3>, Report) {
+    let wavefront = Wavefront::new(operator);
+    let mut rows = Rows::new(points.len());
+    let mut x = points.to_vec();
+    let mut history: Vec<Errors> = Vec::new();
+    let (mut iterations, mut count) = (0, LOOK);
+    let outcome = loop {
+        let errors = rows.errors(operator, points, &x);
+        let before = history.last().map(|e| e.max);
+        history.push(errors);
+        if errors.max <= stop.tolerance {
+            break Outcome::Converged;
+        }
+        if !errors.max.is_finite() {
+            break Outcome::Diverged;
+        }
+        if iterations >= stop.max_iterations {
+            break Outcome::MaxIterations;
+        }
+        if let Some(before) = before {
+            let rate = (errors.max / before).ln() / count as f64;
+            let needed = ((stop.tolerance / errors.max).ln() / rate).ceil();
+            // Without progress there is no such number.
+            count = if needed >= 1.0 && needed < LOOK as f64 {
+                needed as usize
+            } else {
+                LOOK
+            };
+        }
+        count = count.min(stop.max_iterations - iterations);
+        wavefront.relax(omega, count, points, &mut x);
+        iterations += count;
+    };
+    let report = Report {
+        outcome,
+        iterations,
+        history,
+        detail: None,
+    };
+    (x, report)
 }

@@ -1,4 +1,4 @@
-//! Several Chebyshev iterations in one pass over memory.
+//! Several Chebyshev iterations, or sweeps of Gauss-Seidel, in one pass over memory.
 //!
 //! Iterate k + 1 of a row needs iterate k of its neighbours only. Where the vertex order keeps neighbours within a
 //! narrow band, the vertices are cut into bands as long as a row reaches: band j of iterate k + 1 can be made as
@@ -10,9 +10,11 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::chebyshev::Recurrence;
+use super::gauss_seidel::sweep;
 use crate::assemble::Operator;
 use crate::assemble::stencil::Point;
 
@@ -104,6 +106,52 @@ impl<'a> Wavefront<'a> {
             }
             if group.len() % 2 == 1 {
                 std::mem::swap(x, other);
+            }
+        }
+    }
+
+    /// `count` sweeps of Gauss-Seidel or SOR in the order of the rows, `x_i ← x_i + ω (p_i − (A x)_i)/a_ii`.
+    ///
+    /// Sweep k + 1 may pass a band as soon as sweep k has passed the one after it: a wave advances band w − 3k of every
+    /// sweep k at once. Each works on three bands of its own, so they run in parallel, and every number is the one that
+    /// sweeps one after the other give.
+    ///
+    /// # Panics
+    /// If the arrays have not one point a vertex.
+    pub fn relax(&self, omega: f64, count: usize, p: &[DVec3], x: &mut [DVec3]) {
+        let n = self.operator.len();
+        assert!(p.len() == n && x.len() == n, "one point a vertex");
+        let Some(band) = self.band else {
+            for _ in 0..count {
+                sweep(self.operator, p, omega, 0..n, x);
+            }
+            return;
+        };
+        let diagonal = self.operator.diagonal();
+        let bands = n.div_ceil(band);
+        let at = |j: usize| (j * band).min(n);
+        for first in (0..count).step_by(GROUP) {
+            let sweeps = GROUP.min(count - first);
+            for wave in 0..bands + 3 * (sweeps - 1) {
+                let mut rest = (&mut *x, 0);
+                let tasks: Vec<_> = (0..sweeps)
+                    .rev()
+                    .filter_map(|k| wave.checked_sub(3 * k).filter(|&j| j < bands))
+                    .map(|j| {
+                        let seen = at(j.saturating_sub(1))..at(j + 2);
+                        let start = seen.start;
+                        (at(j)..at(j + 1), cut(&mut rest, seen), start)
+                    })
+                    .collect();
+                tasks
+                    .into_par_iter()
+                    .with_max_len(1)
+                    .for_each(|(rows, window, start)| {
+                        for i in rows {
+                            let e = p[i] - self.operator.row_within(i, (window, start));
+                            window[i - start] += (omega / diagonal[i]) * e;
+                        }
+                    });
             }
         }
     }
