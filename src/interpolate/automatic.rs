@@ -5,9 +5,10 @@
 //! iterations share passes over memory, and it moves half the bytes. What varies:
 //!
 //! - *Order.* A file whose vertices lie [scattered](is_scattered) is renumbered along a space-filling curve before
-//!   anything else touches its faces; from [`ORDERED`] vertices on, the rows of the operator are [breadth
-//!   first](in_fronts), which gives it the narrow band that groups of iterations need. Results come back in file order. Below, all
-//!   arrays fit the second-level cache in any order.
+//!   anything else touches its faces. From [`ORDERED`] vertices on, the rows of the operator are [breadth
+//!   first](in_fronts), which gives it the narrow band that groups of iterations need, unless so few iterations are to
+//!   be expected (Nasri, Zheng-Cai) that this does not pay. Below, all arrays fit the second-level cache in any order.
+//!   Results come back in file order.
 //! - *Bounds.* The interval starts at what λ_min usually is, or at the proven bound where that is higher; a correction
 //!   that gains less than promised stretches it, down to the proven bound at the most.
 //! - *Hard cases.* If that does not converge (λ_min below 10⁻⁴, a singular matrix), conjugate gradients on the same
@@ -20,16 +21,21 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use crate::assemble::Operator;
-use crate::assemble::Scheme;
+use crate::assemble::bounds::usual_lambda_min;
+use crate::assemble::{Operator, Scheme};
 use crate::error::Result;
 use crate::mesh::order::{Numbering, along_curve, in_fronts, is_scattered};
 use crate::mesh::{Incidence, Mesh, Topology};
+use crate::solvers::chebyshev::promised_iterations;
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::{Iterate, Method, Outcome, Report, Stop, mixed, solve};
 
 /// From this many vertices on, the operator is renumbered. Tuned.
 pub const ORDERED: usize = 50_000;
+/// So many iterations pay for renumbering. Tuned.
+const MANY: f64 = 17.0;
+/// What iterations are usually asked for: from the first error of noisy points to a tolerance of 10⁻¹⁰ L.
+const TYPICAL_REDUCTION: f64 = 1e-7;
 
 /// Control points, how they came about and what it cost.
 #[derive(Clone, Debug)]
@@ -128,7 +134,9 @@ fn operator(
             &own
         }
     };
-    let in_fronts = || (mesh.len() >= ORDERED).then(|| in_fronts(&mesh.faces, incidence));
+    let expected = promised_iterations((usual_lambda_min(scheme), 1.0), TYPICAL_REDUCTION);
+    let renumber = mesh.len() >= ORDERED && expected >= MANY;
+    let in_fronts = || renumber.then(|| in_fronts(&mesh.faces, incidence));
     // The search occupies one thread.
     let (numbering, closed) = rayon::join(in_fronts, || {
         topology.is_some() || incidence.is_closed(&mesh.faces)
