@@ -68,7 +68,7 @@ struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     profile: usize,
     /// Vertices of the meshes for the steps around the solve; 0 for none
-    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    #[arg(long, value_name = "N", default_value_t = 300_000)]
     steps: usize,
     /// Folder for the CSV, Markdown and PNG files
     #[arg(long, value_name = "DIR", default_value = "out")]
