@@ -10,7 +10,7 @@ use limitlab::mesh::{Mesh, Topology};
 use limitlab::report::{Column, Table};
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
 use limitlab::solvers::iteration::Iterate;
-use limitlab::solvers::system::System;
+use limitlab::solvers::system::{Rows, System};
 use limitlab::solvers::wavefront::Wavefront;
 
 use crate::baseline::Plain;
@@ -97,6 +97,23 @@ pub fn profile(name: &str, mesh: &Mesh, scheme: Scheme, threads: usize) -> Resul
         double + index(&front),
         free_flops,
         iterations(&front, &moved),
+    );
+    let mut rows = Rows::new(mesh.len());
+    let mut image = moved.clone();
+    let mut nothing = vec![(); mesh.len()];
+    push(
+        "matrix-free, double, front order, product alone",
+        2.0 * 24.0 + index(&front),
+        free_flops - 21.0,
+        best(|| {
+            for _ in 0..ITERATIONS {
+                let image = &mut image;
+                rows.product(&front, &moved, image, &mut nothing, |_, ax, y, (), _| {
+                    *y = ax;
+                });
+            }
+            ITERATIONS
+        }),
     );
     let singles: Vec<Vec3A> = moved.iter().map(|p| p.as_vec3a()).collect();
     let alone = Wavefront::in_bands(&front, None);
