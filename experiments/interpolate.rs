@@ -11,9 +11,9 @@ use glam::DVec3;
 use serde_json::{Value, json};
 
 use limitlab::Result;
-use limitlab::analysis::comparison::{automatic, standard_setup};
+use limitlab::analysis::comparison::{SOR_OMEGA, automatic, standard_setup};
 use limitlab::analysis::spectrum::spectrum;
-use limitlab::assemble::Scheme;
+use limitlab::assemble::{Operator, Scheme};
 use limitlab::cli::{
     self, CommonFlags, Input, MeshFlags, Progress, StopFlags, constraints, number,
 };
@@ -25,8 +25,10 @@ use limitlab::interpolate::normals::Rotation;
 use limitlab::interpolate::subset::Restriction;
 use limitlab::interpolate::surface::{Request, Surface, surface};
 use limitlab::interpolate::zheng_cai::{self, Constraints, PhaseOne, Sweep};
+use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, Topology, io};
+use limitlab::solvers::gauss_seidel::by_colours;
 use limitlab::solvers::{Errors, Method, Outcome, Report, Solution, Step, run_watched};
 use limitlab::subdivide::Refinement;
 use limitlab::subdivide::doo_sabin::{Rule, limit_positions};
@@ -51,7 +53,8 @@ struct Arguments {
     /// does
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice)]
     method: Choice,
-    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
+    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED.
+    /// By colours, gauss-seidel and sor of all vertices run on all threads without a stored matrix
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
     /// Print one JSON object on standard output, and nothing else there
@@ -334,6 +337,14 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
             "all points coincide, so no tolerance can be relative to their extent: give --tol-absolute",
         ));
     }
+    if let (
+        Choice::Solver(method @ (Method::GaussSeidel | Method::Sor)),
+        Order::Multicolour,
+        None,
+    ) = (arguments.method, arguments.order, &wishes.interpolated)
+    {
+        return by_colour(arguments, input, method);
+    }
     let mut chosen = match arguments.method {
         Choice::Solver(method) => Some(method),
         _ => None,
@@ -441,6 +452,41 @@ fn fastest(arguments: &Arguments, input: &Input) -> Result<Option<Control>> {
             ..Seconds::default()
         },
     }))
+}
+
+/// All vertices, by sweeps that relax those of one colour at once, without a stored matrix.
+fn by_colour(arguments: &Arguments, input: &Input, method: Method) -> Result<Control> {
+    let start = Instant::now();
+    let stop = arguments.stop.stop(&input.mesh);
+    let progress = Progress::open("solving", arguments.common.quiet);
+    let (mesh, topology) = (&input.mesh, &input.topology);
+    let numbering = in_colours(&mesh.faces, &topology.incidence);
+    let operator = Operator::in_order(&mesh.faces, topology, input.scheme, Some(&numbering))
+        .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
+    let assemble = input.check_seconds + start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let omega = if method == Method::Sor {
+        SOR_OMEGA
+    } else {
+        1.0
+    };
+    let points = numbering.there(&mesh.positions);
+    let (control, report) = by_colours(&operator, &points, omega, &stop);
+    drop(progress);
+    check(input, method, &report, stop.tolerance)?;
+    Ok(Control {
+        method: method.name(),
+        points: numbering.back(&control),
+        iterations: report.iterations,
+        status: report.outcome.name(),
+        errors: report.last(),
+        tolerance: stop.tolerance,
+        seconds: Seconds {
+            assemble,
+            solve: start.elapsed().as_secs_f64(),
+            ..Seconds::default()
+        },
+    })
 }
 
 /// Zheng & Cai's phase one by its own rule.

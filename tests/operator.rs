@@ -6,12 +6,14 @@ use std::ops::ControlFlow;
 use glam::{DVec3, Vec3A};
 use limitlab::assemble::{LimitSystem, Operator, Scheme};
 use limitlab::interpolate::automatic::control_points;
+use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::generate::{dual, permute_vertices, random_polygons, shuffle_faces, union};
-use limitlab::mesh::order::{Numbering, Order, along_curve, in_fronts, is_scattered};
+use limitlab::mesh::order::{Numbering, Order, along_curve, colouring, in_fronts, is_scattered};
 use limitlab::mesh::{Faces, Mesh, Topology, builtin::builtin, noise::add_noise};
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
+use limitlab::solvers::coloured::Coloured;
 use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
-use limitlab::solvers::gauss_seidel::{Sor, in_waves};
+use limitlab::solvers::gauss_seidel::{Sor, by_colours, in_waves};
 use limitlab::solvers::iteration::{Iterate, Report};
 use limitlab::solvers::jacobi::Jacobi;
 use limitlab::solvers::local::{Editor, decay};
@@ -410,6 +412,96 @@ fn sweeps_in_waves_are_the_sweeps_one_after_the_other() {
                 assert!(x == expected, "{name}, {count} sweeps, {threads} threads");
             }
         }
+    }
+}
+
+#[test]
+fn sweeps_by_colours_are_the_sweeps_one_after_the_other() {
+    // The last two have more rows of a colour than a task, or than wait together.
+    let large = [
+        ("irregular-poly:20000", Scheme::Nasri),
+        ("irregular-quad:30000", Scheme::CatmullClark),
+        ("icosphere:7", Scheme::Loop),
+    ];
+    let large = large.map(|(name, scheme)| both(name, mesh(name), scheme));
+    let open = Faces::from_lists([
+        [0u32, 1, 2],
+        [0, 2, 3],
+        [0, 3, 4],
+        [2, 1, 5],
+        [2, 5, 3],
+        [3, 5, 6],
+    ]);
+    let open = both("open", Mesh::new(rough(7), open), Scheme::Sqrt3);
+    for case in all().chain(large).chain([open]) {
+        let (faces, n) = (&case.mesh.faces, case.mesh.len());
+        let topology = Topology::new(faces, n);
+        let numbering = in_colours(faces, &topology.incidence);
+        let operator = Operator::in_order(faces, &topology, case.scheme, Some(&numbering))
+            .expect("an operator");
+        let points = numbering.there(&case.mesh.positions);
+        let order = Order::Multicolour.order(&case.mesh, &topology.incidence);
+        let mut sor = Sor::new(&operator, &points, 1.1, None);
+        let mut explicit = Sor::new(&case.explicit, &case.mesh.positions, 1.1, Some(&order));
+        for _ in 0..3 {
+            sor.advance().expect("a sweep");
+            explicit.advance().expect("a sweep");
+        }
+        let coloured = Coloured::new(&operator);
+        let colours = colouring(faces, &topology.incidence);
+        let colours = colours.into_iter().max().expect("vertices") as usize + 1;
+        assert!(coloured.colours() <= colours, "{}", case.name);
+        for threads in [1, 2, 3] {
+            let mut x = points.clone();
+            in_threads(threads, || coloured.relax(1.1, 3, &points, &mut x));
+            assert!(sor.points() == x, "{}, {threads} threads", case.name);
+        }
+        let length = case.mesh.diagonal();
+        let back = numbering.back(sor.points());
+        assert_close(
+            &case.name,
+            &back,
+            explicit.points(),
+            10.0 * ROUNDING * length,
+        );
+        // In any other order runs are short, and right.
+        if n < 2000 {
+            let mut sor = Sor::new(&case.operator, &points, 0.9, None);
+            sor.advance().expect("a sweep");
+            let mut x = points.clone();
+            Coloured::new(&case.operator).relax(0.9, 1, &points, &mut x);
+            assert!(sor.points() == x, "{}, file order", case.name);
+        }
+    }
+}
+
+#[test]
+fn gauss_seidel_by_colours_solves_and_knows_when_it_cannot() {
+    let solve = |name: &str, tolerance| {
+        let case = both(name, mesh(name), Scheme::CatmullClark);
+        let topology = Topology::new(&case.mesh.faces, case.mesh.len());
+        let numbering = in_colours(&case.mesh.faces, &topology.incidence);
+        let operator =
+            Operator::in_order(&case.mesh.faces, &topology, case.scheme, Some(&numbering))
+                .expect("an operator");
+        let points = numbering.there(&case.mesh.positions);
+        let stop = Stop {
+            tolerance,
+            max_iterations: 1000,
+        };
+        let (control, report) = by_colours(&operator, &points, 1.0, &stop);
+        let control = numbering.back(&control);
+        let errors = Rows::new(points.len()).errors(&case.explicit, &case.mesh.positions, &control);
+        (report, errors.max)
+    };
+    let (report, error) = solve("irregular-quad:3000", 1e-10);
+    assert_eq!(report.outcome, Outcome::Converged);
+    assert!(error <= 1.01e-10 && report.last().max <= 1e-10, "{error:e}");
+    // A singular matrix with noisy points, and a tolerance below rounding.
+    for (name, tolerance) in [("cube", 1e-10), ("irregular-quad:3000", 1e-18)] {
+        let (report, _) = solve(name, tolerance);
+        assert_eq!(report.outcome, Outcome::Stagnated, "{name}");
+        assert!(report.iterations < 500, "{name}");
     }
 }
 

@@ -1,34 +1,37 @@
-//! How time and memory grow with the mesh: `scaling` writes `scaling.{md,csv,png}`, `scaling-profile`, `scaling-edits`,
-//! `scaling-steps` and `scaling-decay.{md,csv}`.
+//! How time and memory grow with the mesh: `scaling` writes `scaling.{md,csv,png}`, `scaling-threads`, `scaling-profile`,
+//! `scaling-edits`, `scaling-steps` and `scaling-decay.{md,csv}`.
 
 mod baseline;
 mod edits;
 mod machine;
 mod profile;
 mod steps;
+mod threads;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
+use glam::DVec3;
 use limitlab::Result;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::{LimitSystem, Operator, Scheme};
 use limitlab::cli::{self, CommonFlags, List, Progress};
 use limitlab::interpolate::automatic::control_points;
+use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::noise::add_noise;
-use limitlab::mesh::order::{Order, in_fronts};
-use limitlab::mesh::{Mesh, Topology, builtin::builtin};
+use limitlab::mesh::order::{Numbering, Order, in_fronts};
+use limitlab::mesh::{Faces, Incidence, Mesh, Topology, builtin::builtin};
 use limitlab::report::{
     Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette,
 };
 use limitlab::solvers::chebyshev::Chebyshev;
 use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
-use limitlab::solvers::gauss_seidel::in_waves;
+use limitlab::solvers::gauss_seidel::{by_colours, in_waves};
 use limitlab::solvers::iteration::Iterate;
-use limitlab::solvers::{Method, Setup, Stop, run, solve};
+use limitlab::solvers::{Method, Report, Setup, Stop, run, solve};
 
 /// Measures time, memory and iterations of the methods over growing meshes, from faces in memory to control points,
 /// everything counted.
@@ -67,6 +70,9 @@ struct Arguments {
     /// Vertices of the profile's mesh; 0 for no profile
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     profile: usize,
+    /// Vertices of the meshes for one thread beside all; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    gains: usize,
     /// Vertices of the meshes for the steps around the solve; 0 for none
     #[arg(long, value_name = "N", default_value_t = 300_000)]
     steps: usize,
@@ -138,10 +144,14 @@ fn measure(arguments: &Arguments) -> Result<()> {
     if arguments.steps >= LEAST {
         steps::steps(arguments.steps, &arguments.out)?;
     }
+    let all = rayon::current_num_threads();
+    if arguments.gains >= LEAST && all > 1 {
+        threads::gains(arguments, all)?;
+    }
     if arguments.profile >= LEAST {
         let name = family(Scheme::CatmullClark, arguments.profile);
         let mesh = noisy(&name)?;
-        let profile = profile::profile(&name, &mesh, Scheme::CatmullClark, threads)?;
+        let profile = profile::profile(&name, &mesh, Scheme::CatmullClark, all)?;
         profile.write(&arguments.out)?;
         cli::print(&profile.to_markdown())?;
     }
@@ -195,16 +205,19 @@ enum Way {
     Free(Method),
     /// Gauss-Seidel on the operator in fronts.
     Waves,
+    /// Gauss-Seidel on the operator by colours.
+    Colours,
     Stored(Method),
 }
 
 impl Way {
-    const ALL: [Way; 10] = [
+    const ALL: [Way; 11] = [
         Way::Auto,
         Way::Plain,
         Way::Free(Method::Chebyshev),
         Way::Free(Method::Cg),
         Way::Waves,
+        Way::Colours,
         Way::Stored(Method::Chebyshev),
         Way::Stored(Method::GaussSeidel),
         Way::Stored(Method::PcgIc0),
@@ -218,6 +231,7 @@ impl Way {
             Way::Plain => "plain-chebyshev".into(),
             Way::Free(method) => format!("{method} (matrix-free)"),
             Way::Waves => format!("{} (in waves)", Method::GaussSeidel),
+            Way::Colours => format!("{} (by colours)", Method::GaussSeidel),
             Way::Stored(method) => method.name().into(),
         }
     }
@@ -245,16 +259,21 @@ struct Outcome {
     solve_seconds: f64,
 }
 
+/// Where the interval of Chebyshev iterations starts, by a small mesh.
+fn estimate(scheme: Scheme) -> Result<f64> {
+    let small = noisy(&family(scheme, ESTIMATE))?;
+    let topology = Topology::new(&small.faces, small.len());
+    let system = LimitSystem::new(&small, &topology, scheme)?;
+    Ok(0.98 * spectrum(&system)?.a.min)
+}
+
 fn of_scheme(
     arguments: &Arguments,
     scheme: Scheme,
     bandwidth: f64,
     table: &mut Table,
 ) -> Result<[LinePlot; 2]> {
-    let small = noisy(&family(scheme, ESTIMATE))?;
-    let topology = Topology::new(&small.faces, small.len());
-    let system = LimitSystem::new(&small, &topology, scheme)?;
-    let estimate = 0.98 * spectrum(&system)?.a.min;
+    let estimate = estimate(scheme)?;
     let mut curves: Vec<Curve> = Vec::new();
     let mut bound = Vec::new();
     let progress = Progress::open(scheme.name(), arguments.common.quiet);
@@ -321,18 +340,18 @@ fn of_scheme(
 
 /// Time per vertex over the number of vertices, in one of the two orders. The legend stands beside the second.
 fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) -> LinePlot {
-    const GREY: Colour = Colour(120, 120, 120);
     let look = |way: Way| match way {
         Way::Auto => (palette(0), Marker::Circle),
         Way::Plain => (palette(1), Marker::Square),
         Way::Free(Method::Chebyshev) => (palette(2), Marker::Circle),
-        Way::Waves => (palette(5), Marker::Circle),
         Way::Free(_) => (palette(3), Marker::Diamond),
-        Way::Stored(Method::Chebyshev) => (palette(4), Marker::Circle),
-        Way::Stored(Method::GaussSeidel) => (palette(5), Marker::Square),
+        Way::Waves => (palette(5), Marker::Circle),
+        Way::Colours => (Colour(140, 86, 75), Marker::Circle),
+        Way::Stored(Method::Chebyshev) => (palette(4), Marker::Square),
+        Way::Stored(Method::GaussSeidel) => (Colour(160, 160, 0), Marker::Square),
         Way::Stored(Method::PcgIc0) => (palette(6), Marker::Diamond),
-        Way::Stored(Method::Cholesky) => (GREY, Marker::Triangle),
-        Way::Stored(_) => (GREY, Marker::InvertedTriangle),
+        Way::Stored(Method::Cholesky) => (Colour(100, 100, 100), Marker::Triangle),
+        Way::Stored(_) => (Colour(170, 170, 170), Marker::InvertedTriangle),
     };
     let mut series: Vec<Series> = curves
         .iter()
@@ -360,7 +379,7 @@ fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) ->
         y_label: "nanoseconds a vertex".into(),
         x_scale: Scale::Log,
         y_scale: Scale::Log,
-        y_range: Some((20.0, 1e6)),
+        y_range: Some((30.0, 3e4)),
         series,
         ..LinePlot::default()
     }
@@ -395,6 +414,9 @@ fn timed(
     }
     Ok(Some((seconds, outcome, memory)))
 }
+
+type Number = fn(&Faces, &Incidence) -> Numbering;
+type Sweeps = fn(&Operator, &[DVec3], f64, &Stop) -> (Vec<DVec3>, Report);
 
 /// One run from faces in memory to control points; `None` if the way does not suit the mesh.
 fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<Option<Outcome>> {
@@ -432,14 +454,18 @@ fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<
                 solve_seconds,
             }
         }
-        Way::Waves => {
+        Way::Waves | Way::Colours => {
             let topology = Topology::new(&mesh.faces, mesh.len());
-            let fronts = in_fronts(&mesh.faces, &topology.incidence);
-            let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&fronts))?;
+            let (number, sweeps): (Number, Sweeps) = match way {
+                Way::Waves => (in_fronts, in_waves),
+                _ => (in_colours, by_colours),
+            };
+            let numbering = number(&mesh.faces, &topology.incidence);
+            let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&numbering))?;
             let since = Instant::now();
-            let moved = fronts.there(points);
-            let (control, report) = in_waves(&operator, &moved, 1.0, &stop);
-            fronts.back(&control);
+            let moved = numbering.there(points);
+            let (control, report) = sweeps(&operator, &moved, 1.0, &stop);
+            numbering.back(&control);
             start(&mut solve_seconds, since);
             Outcome {
                 iterations: report.iterations,

@@ -1,27 +1,63 @@
-//! Bytes and flops of one sweep, against the bandwidth measured in the same run.
+//! Bytes and flops of one iteration, against the bandwidth measured in the same run, on one thread and on all.
 
 use std::time::Instant;
 
 use glam::{DVec3, Vec3A};
 use limitlab::Result;
 use limitlab::assemble::{LimitSystem, Operator, Scheme};
+use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::order::in_fronts;
 use limitlab::mesh::{Mesh, Topology};
 use limitlab::report::{Column, Table};
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
+use limitlab::solvers::coloured::Coloured;
 use limitlab::solvers::iteration::Iterate;
 use limitlab::solvers::system::{Rows, System};
 use limitlab::solvers::wavefront::Wavefront;
 
 use crate::baseline::Plain;
 use crate::machine::triad;
+use crate::threads::on_threads;
 
 /// Iterations of one measurement, and measurements of which the best counts.
 const ITERATIONS: usize = 17;
 const RUNS: usize = 5;
 
-/// The table of one mesh: Chebyshev iterations, error norm included where the method takes it.
-pub fn profile(name: &str, mesh: &Mesh, scheme: Scheme, threads: usize) -> Result<Table> {
+/// The table of one mesh on one thread and on all: Chebyshev iterations, error norm included where the method takes it,
+/// and sweeps of Gauss-Seidel.
+pub fn profile(name: &str, mesh: &Mesh, scheme: Scheme, all: usize) -> Result<Table> {
+    let mut table = Table::new(
+        "scaling-profile",
+        format!("One iteration on {name} under {scheme}"),
+        vec![
+            Column::key("kernel"),
+            Column::key("threads"),
+            Column::number("bytes_per_vertex", 0.0, 4),
+            Column::number("flops_per_vertex", 0.0, 4),
+            Column::time("nanoseconds_per_vertex"),
+            Column::time("gigabytes_per_second"),
+            Column::time("share_of_triad"),
+        ],
+    );
+    let mut threads = vec![1, all];
+    threads.dedup();
+    let mut triads = Vec::new();
+    for count in threads {
+        let bandwidth = on_threads(count, || kernels(mesh, scheme, &mut table))??;
+        triads.push(format!("{:.1} GB/s on {count}", bandwidth / 1e9));
+    }
+    table.note(format!(
+        "{} vertices. Bytes are those that must pass between memory and processor if every array is read once; STREAM's \
+         triad moves {} threads in this run. A share above 1 says that iterations share a pass over memory.",
+        mesh.len(),
+        triads.join(", ")
+    ));
+    Ok(table)
+}
+
+/// The rows of the threads that this runs on, and the bandwidth of STREAM's triad.
+fn kernels(mesh: &Mesh, scheme: Scheme, table: &mut Table) -> Result<f64> {
+    let threads = rayon::current_num_threads().to_string();
     let n = mesh.len() as f64;
     let points = &mesh.positions;
     let topology = Topology::new(&mesh.faces, mesh.len());
@@ -40,28 +76,11 @@ pub fn profile(name: &str, mesh: &Mesh, scheme: Scheme, threads: usize) -> Resul
     let double = 4.0 * 24.0;
     let single = 4.0 * 16.0;
     let index = |operator: &Operator| operator.sweep_bytes() as f64 / n;
-    let mut table = Table::new(
-        "scaling-profile",
-        format!("One Chebyshev iteration on {name} under {scheme}, {threads} threads"),
-        vec![
-            Column::key("kernel"),
-            Column::number("bytes_per_vertex", 0.0, 4),
-            Column::number("flops_per_vertex", 0.0, 4),
-            Column::time("nanoseconds_per_vertex"),
-            Column::time("gigabytes_per_second"),
-            Column::time("share_of_triad"),
-        ],
-    );
-    table.note(format!(
-        "{} vertices. Bytes are those that must pass between memory and processor if every array is read once; STREAM's \
-         triad moves {:.1} GB/s in this run. A share above 1 says that iterations share a pass over memory.",
-        mesh.len(),
-        bandwidth / 1e9
-    ));
     let mut push = |kernel: &str, bytes: f64, flops: f64, seconds: f64| {
         let rate = bytes * n / seconds;
         table.push(vec![
             kernel.into(),
+            threads.as_str().into(),
             bytes.into(),
             flops.into(),
             (1e9 * seconds / n).into(),
@@ -137,8 +156,43 @@ pub fn profile(name: &str, mesh: &Mesh, scheme: Scheme, threads: usize) -> Resul
         without_norm,
         waves(&grouped, &singles),
     );
-    Ok(table)
+    // The iterate is read and written, the points and the diagonal are read; no norm, no momentum.
+    let sweep = 3.0 * 24.0 + 8.0;
+    let sweep_flops = free_flops - 12.0;
+    let mut sweeps = |kernel: &str, operator: &Operator, p: &[DVec3], relax: Relax| {
+        let mut x = p.to_vec();
+        let seconds = best(|| {
+            relax(ITERATIONS, p, &mut x);
+            ITERATIONS
+        });
+        push(kernel, sweep + index(operator), sweep_flops, seconds);
+    };
+    sweeps(
+        "Gauss-Seidel, front order, one by one",
+        &front,
+        &moved,
+        &|k, p, x| alone.relax(1.0, k, p, x),
+    );
+    sweeps(
+        "Gauss-Seidel, front order, in waves",
+        &front,
+        &moved,
+        &|k, p, x| grouped.relax(1.0, k, p, x),
+    );
+    let colours = in_colours(&mesh.faces, &topology.incidence);
+    let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&colours))?;
+    let coloured = Coloured::new(&operator);
+    sweeps(
+        "Gauss-Seidel, by colours",
+        &operator,
+        &colours.there(points),
+        &|k, p, x| coloured.relax(1.0, k, p, x),
+    );
+    Ok(bandwidth)
 }
+
+/// Sweeps, so many, for given points.
+type Relax<'a> = &'a dyn Fn(usize, &[DVec3], &mut [DVec3]);
 
 /// Seconds of an iteration: the best of several runs.
 fn best(mut run: impl FnMut() -> usize) -> f64 {

@@ -2,6 +2,7 @@
 //! This room knows no matrices.
 
 pub mod builtin;
+pub mod colours;
 mod defect;
 mod degenerate;
 pub mod generate;

@@ -6,7 +6,8 @@
 
 use glam::DVec3;
 
-use super::iteration::{Errors, Failure, Iterate, Outcome, Report, Stop};
+use super::coloured::Coloured;
+use super::iteration::{Errors, Failure, Iterate, Outcome, PATIENCE, PROGRESS, Report, Stop};
 use super::system::{Rows, System};
 use super::wavefront::Wavefront;
 use crate::assemble::Operator;
@@ -100,10 +101,42 @@ pub fn in_waves(
     stop: &Stop,
 ) -> (Vec<DVec3>, Report) {
     let wavefront = Wavefront::new(operator);
+    in_looks(operator, points, stop, |count, x| {
+        wavefront.relax(omega, count, points, x);
+    })
+}
+
+/// As [`in_waves`], all rows that do not couple at once ([`Coloured::relax`]): for operators with their rows [colour by
+/// colour](crate::mesh::colours::in_colours). On two threads waves take half to two thirds of the time, since a sweep
+/// by colours reads the iterate once a colour; on many, waves run out of tasks before colours do.
+///
+/// # Panics
+/// If there is not one point a vertex.
+pub fn by_colours(
+    operator: &Operator,
+    points: &[DVec3],
+    omega: f64,
+    stop: &Stop,
+) -> (Vec<DVec3>, Report) {
+    let coloured = Coloured::new(operator);
+    in_looks(operator, points, stop, |count, x| {
+        coloured.relax(omega, count, points, x);
+    })
+}
+
+/// Calls `relax(count, x)` for `count` sweeps between two looks at the error.
+fn in_looks(
+    operator: &Operator,
+    points: &[DVec3],
+    stop: &Stop,
+    relax: impl Fn(usize, &mut [DVec3]),
+) -> (Vec<DVec3>, Report) {
     let mut rows = Rows::new(points.len());
     let mut x = points.to_vec();
     let mut history: Vec<Errors> = Vec::new();
     let (mut iterations, mut count) = (0, LOOK);
+    // The smallest error that was progress, and the sweeps before it.
+    let mut progress = (f64::INFINITY, 0);
     let outcome = loop {
         let errors = rows.errors(operator, points, &x);
         let before = history.last().map(|e| e.max);
@@ -117,6 +150,11 @@ pub fn in_waves(
         if iterations >= stop.max_iterations {
             break Outcome::MaxIterations;
         }
+        if errors.max < (1.0 - PROGRESS) * progress.0 {
+            progress = (errors.max, iterations);
+        } else if errors.max <= progress.0 && iterations - progress.1 >= PATIENCE {
+            break Outcome::Stagnated;
+        }
         if let Some(before) = before {
             let rate = (errors.max / before).ln() / count as f64;
             let needed = ((stop.tolerance / errors.max).ln() / rate).ceil();
@@ -128,7 +166,7 @@ pub fn in_waves(
             };
         }
         count = count.min(stop.max_iterations - iterations);
-        wavefront.relax(omega, count, points, &mut x);
+        relax(count, &mut x);
         iterations += count;
     };
     let report = Report {

@@ -2,6 +2,7 @@
 //! [`Report`] with the whole history out. This room knows no meshes and no schemes.
 
 pub mod chebyshev;
+pub mod coloured;
 pub mod conjugate_gradient;
 pub mod direct;
 pub mod gauss_seidel;

@@ -170,22 +170,23 @@ fn every_method_gives_the_same_control_mesh() {
     let mesh = noisy("irregular-quad:400");
     io::write(&folder.path().join("p.obj"), &mesh, None).unwrap();
     let methods = "auto lu cholesky ldlt jacobi thall gauss-seidel sor ssor pia w-pia chebyshev cg pcg-jacobi pcg-ssor pcg-ic0";
+    let by_colours = ["gauss-seidel", "sor"].map(|method| (method, "multicolour"));
     let mut first: Option<Mesh> = None;
-    for method in methods.split(' ') {
+    for (method, order) in methods.split(' ').map(|m| (m, "rcm")).chain(by_colours) {
         let arguments = [
-            "p.obj", "-o", "v.obj", "--method", method, "--order", "rcm", "--quiet",
+            "p.obj", "-o", "v.obj", "--method", method, "--order", order, "--quiet",
         ];
         assert_done(&run(INTERPOLATE, folder.path(), arguments), method);
         let control = io::read(&folder.path().join("v.obj")).unwrap().mesh;
         let scheme = Scheme::CatmullClark;
         assert!(
             residual(scheme, &mesh, &control) <= 1.001e-10 * mesh.diagonal(),
-            "{method}"
+            "{method}, {order}"
         );
         let reference = first.get_or_insert_with(|| control.clone());
         assert!(
             distance(&control.positions, &reference.positions) < 1e-6,
-            "{method}"
+            "{method}, {order}"
         );
     }
 }
