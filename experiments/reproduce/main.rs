@@ -5,6 +5,7 @@ mod claims;
 mod common;
 mod context;
 mod figures;
+mod lines;
 #[path = "../common/splitting.rs"]
 mod local_matrices;
 mod methods;
@@ -60,7 +61,7 @@ struct Arguments {
 }
 
 /// All items, in the order in which they run.
-const ITEMS: [Item; 14] = [
+const ITEMS: [Item; 15] = [
     pia::TABLE1,
     thall::ITERATIONS,
     zheng_cai::SECTION_3_5,
@@ -69,6 +70,7 @@ const ITEMS: [Item; 14] = [
     sparsity::PATTERNS,
     splitting::LOCAL,
     orders::ORDERS,
+    lines::LINES,
     valences::VALENCES,
     popping::POPPING,
     ripples::RIPPLES,

@@ -8,6 +8,7 @@ pub mod dense;
 pub mod eigen;
 pub mod interval;
 pub mod lanczos;
+pub mod lines;
 pub mod order_study;
 pub mod predict;
 pub mod promise;
