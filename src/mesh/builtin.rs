@@ -368,7 +368,7 @@ fn ring(k: usize, z: f64) -> impl Iterator<Item = DVec3> {
 /// Two `k`-gons, at z = −1 and z = 1, and `k` quads between them: 2k vertices of valence 3.
 pub fn prism(k: usize) -> Mesh {
     let positions = ring(k, -1.0).chain(ring(k, 1.0)).collect();
-    let mut faces = Faces::with_capacity(k + 2, 6 * k);
+    let mut faces = Faces::with_capacity(6 * k);
     let n = k as u32;
     for j in 0..n {
         let next = (j + 1) % n;
@@ -382,7 +382,7 @@ pub fn prism(k: usize) -> Mesh {
 /// A `k`-gon of vertices of valence 4 in the plane z = 0, then the apexes (0, 0, 1) and (0, 0, −1) of valence k.
 pub fn bipyramid(k: usize) -> Mesh {
     let positions = ring(k, 0.0).chain([DVec3::Z, DVec3::NEG_Z]).collect();
-    let mut faces = Faces::with_capacity(2 * k, 6 * k);
+    let mut faces = Faces::with_capacity(6 * k);
     let n = k as u32;
     for j in 0..n {
         let next = (j + 1) % n;
@@ -422,14 +422,14 @@ fn torus_cells(n: usize, m: usize) -> impl Iterator<Item = [u32; 4]> {
 
 /// A regular grid of n × m quads on a torus, n and m at least 3.
 pub fn torus(n: usize, m: usize) -> Mesh {
-    let mut faces = Faces::with_capacity(n * m, 4 * n * m);
+    let mut faces = Faces::with_capacity(4 * n * m);
     torus_cells(n, m).for_each(|cell| faces.push(&cell));
     Mesh::new(torus_positions(n, m), faces)
 }
 
 /// The same grid with the diagonal from (i, j) to (i + 1, j + 1) in every cell.
 pub fn tri_torus(n: usize, m: usize) -> Mesh {
-    let mut faces = Faces::with_capacity(2 * n * m, 6 * n * m);
+    let mut faces = Faces::with_capacity(6 * n * m);
     for [a, b, c, d] in torus_cells(n, m) {
         faces.push(&[a, b, c]);
         faces.push(&[a, c, d]);

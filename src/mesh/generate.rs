@@ -50,7 +50,7 @@ pub fn quad_split(mesh: &Mesh) -> Mesh {
     positions.extend(midpoints(&mesh.positions, &ends));
     positions.extend((0..mesh.faces.len()).map(|f| centroid(mesh, f)));
     let corners = mesh.faces.corners().len();
-    let mut faces = Faces::with_capacity(corners, 4 * corners);
+    let mut faces = Faces::with_capacity(4 * corners);
     for f in 0..mesh.faces.len() {
         let range = mesh.faces.range(f);
         for c in range.clone() {
@@ -77,7 +77,7 @@ pub fn midpoint_split(mesh: &Mesh) -> Mesh {
     let v = mesh.len() as u32;
     let mut positions = mesh.positions.clone();
     positions.extend(midpoints(&mesh.positions, &ends));
-    let mut faces = Faces::with_capacity(4 * mesh.faces.len(), 12 * mesh.faces.len());
+    let mut faces = Faces::with_capacity(12 * mesh.faces.len());
     for (f, face) in mesh.faces.iter().enumerate() {
         let &[a, b, c] = face else {
             panic!("face {f} is not a triangle");
@@ -97,7 +97,7 @@ pub fn midpoint_split(mesh: &Mesh) -> Mesh {
 pub fn dual(mesh: &Mesh) -> Mesh {
     let topology = Topology::new(&mesh.faces, mesh.len());
     let positions = (0..mesh.faces.len()).map(|f| centroid(mesh, f)).collect();
-    let mut faces = Faces::with_capacity(mesh.len(), mesh.faces.corners().len());
+    let mut faces = Faces::with_capacity(mesh.faces.corners().len());
     let (mut star, mut face) = (Vec::new(), Vec::new());
     for v in 0..mesh.len() {
         topology.star(&mesh.faces, v, &mut star);
@@ -149,7 +149,7 @@ pub fn connected_sum(a: &Mesh, b: &Mesh) -> Mesh {
             positions.len() as u32 - 1
         })
         .collect();
-    let mut faces = Faces::with_capacity(a.faces.len() + b.faces.len() - 2, 0);
+    let mut faces = Faces::default();
     for face in a.faces.iter().take(a.faces.len() - 1) {
         faces.push(face);
     }
@@ -182,7 +182,7 @@ pub fn shuffle_faces(mesh: &Mesh, seed: u64) -> Mesh {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut order: Vec<usize> = (0..mesh.faces.len()).collect();
     order.shuffle(&mut rng);
-    let mut faces = Faces::with_capacity(order.len(), mesh.faces.corners().len());
+    let mut faces = Faces::with_capacity(mesh.faces.corners().len());
     let mut face = Vec::new();
     for f in order {
         face.clear();
@@ -370,7 +370,7 @@ pub fn merge_faces(mesh: &Mesh, removals: usize, max_size: usize, seed: u64) -> 
         valence[b] -= 1;
         left -= 1;
     }
-    let mut faces = Faces::with_capacity(mesh.faces.len(), corners.len());
+    let mut faces = Faces::with_capacity(corners.len());
     let mut face = Vec::new();
     for f in (0..size.len()).filter(|&f| size[f] > 0) {
         face.clear();
@@ -422,7 +422,7 @@ pub fn ring_sphere(n: usize) -> Mesh {
         .collect();
 
     let mut positions = vec![DVec3::Z];
-    let mut faces = Faces::with_capacity(2 * n - 4, 6 * n - 12);
+    let mut faces = Faces::with_capacity(6 * n - 12);
     // The angle of vertex j in ring k of the given size; odd rings are turned by half a step.
     let angle = |k: usize, size: usize, j: usize| {
         TAU * (j as f64 + if k % 2 == 1 { 0.5 } else { 0.0 }) / size as f64

@@ -17,9 +17,15 @@ mod text;
 pub mod topology;
 pub mod validate;
 
+use std::sync::OnceLock;
+
 use glam::DVec3;
+use rayon::prelude::*;
 
 pub use topology::{Incidence, Topology};
+
+/// Faces of one task.
+const CHUNK: usize = 1 << 16;
 
 /// A polygon mesh: one position a vertex, faces of any size as vertex indices in counter-clockwise order
 /// seen from outside. Vertices and faces are numbered from 0 in file order.
@@ -34,20 +40,41 @@ pub struct Mesh {
 /// The faces of a mesh in one flat array: face `f` holds `corners[offsets[f]..offsets[f + 1]]`. The index of an
 /// entry of `corners` is called a *corner*; it also names the half-edge that leaves the corner's vertex for the
 /// next one of the face.
-#[derive(Clone, Debug, PartialEq, Eq)]
+///
+/// Where all faces have the same size, offsets take no memory until [`offsets`](Self::offsets) is called.
+#[derive(Clone, Debug)]
 pub struct Faces {
+    count: usize,
+    /// Of every face; 0 without faces, `None` if sizes differ.
+    size: Option<usize>,
+    /// Where each face starts, and the end, if sizes differ.
     offsets: Vec<u32>,
+    /// The same if sizes do not differ, once asked for.
+    uniform_offsets: OnceLock<Vec<u32>>,
     corners: Vec<u32>,
 }
 
 impl Default for Faces {
     fn default() -> Self {
         Faces {
-            offsets: vec![0],
+            count: 0,
+            size: Some(0),
+            offsets: Vec::new(),
+            uniform_offsets: OnceLock::new(),
             corners: Vec::new(),
         }
     }
 }
+
+impl PartialEq for Faces {
+    fn eq(&self, other: &Self) -> bool {
+        (self.count, self.size) == (other.count, other.size)
+            && self.corners == other.corners
+            && self.offsets == other.offsets
+    }
+}
+
+impl Eq for Faces {}
 
 impl Faces {
     /// Faces from the two arrays.
@@ -60,8 +87,45 @@ impl Faces {
             offsets.last().map(|&l| l as usize) == Some(corners.len()),
             "offsets end at the number of corners"
         );
-        assert!(offsets.is_sorted(), "offsets ascend");
-        Faces { offsets, corners }
+        // The least size, wrapped where offsets descend, and the greatest.
+        let sizes = offsets.par_windows(2).with_min_len(CHUNK).map(|w| {
+            assert!(w[0] <= w[1], "offsets ascend");
+            let size = w[1] - w[0];
+            (size, size)
+        });
+        let sizes = sizes.reduce(|| (u32::MAX, 0), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let count = offsets.len() - 1;
+        let (size, offsets) = if count == 0 || sizes.0 == sizes.1 {
+            (Some(sizes.1 as usize), Vec::new())
+        } else {
+            (None, offsets)
+        };
+        Faces {
+            count,
+            size,
+            offsets,
+            corners,
+            ..Faces::default()
+        }
+    }
+
+    /// Faces of `size` corners each.
+    ///
+    /// # Panics
+    /// If `size` is 0 or does not divide the number of corners, or 32 bits do not number these.
+    pub fn of_size(size: usize, corners: Vec<u32>) -> Self {
+        assert!(corners.len().is_multiple_of(size), "whole faces");
+        assert!(
+            corners.len() <= u32::MAX as usize,
+            "corners fit 32-bit indices"
+        );
+        let count = corners.len() / size;
+        Faces {
+            count,
+            size: Some(if count == 0 { 0 } else { size }),
+            corners,
+            ..Faces::default()
+        }
     }
 
     /// Faces from a list of index lists.
@@ -78,47 +142,68 @@ impl Faces {
     /// # Panics
     /// If the corners no longer fit 32 bits; readers refuse such files before.
     pub fn push(&mut self, face: &[u32]) {
+        match self.size {
+            Some(size) if size == face.len() => {}
+            Some(_) if self.count == 0 => self.size = Some(face.len()),
+            Some(_) => {
+                self.offsets = self.offsets().to_vec();
+                self.size = None;
+            }
+            None => {}
+        }
         self.corners.extend_from_slice(face);
         let end = u32::try_from(self.corners.len()).expect("corners fit 32-bit indices");
-        self.offsets.push(end);
+        if self.size.is_none() {
+            self.offsets.push(end);
+        }
+        self.uniform_offsets = OnceLock::new();
+        self.count += 1;
     }
 
-    pub fn with_capacity(faces: usize, corners: usize) -> Self {
-        let mut offsets = Vec::with_capacity(faces + 1);
-        offsets.push(0);
+    /// Room for so many corners.
+    pub fn with_capacity(corners: usize) -> Self {
         Faces {
-            offsets,
             corners: Vec::with_capacity(corners),
+            ..Faces::default()
         }
     }
 
     /// The number of faces.
     pub fn len(&self) -> usize {
-        self.offsets.len() - 1
+        self.count
     }
 
     pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.count == 0
     }
 
     /// The vertices of face `f`.
+    #[inline]
     pub fn face(&self, f: usize) -> &[u32] {
         &self.corners[self.range(f)]
     }
 
     /// The corners of face `f`.
+    #[inline]
     pub fn range(&self, f: usize) -> std::ops::Range<usize> {
-        self.offsets[f] as usize..self.offsets[f + 1] as usize
+        match self.size {
+            Some(size) => size * f..size * (f + 1),
+            None => self.offsets[f] as usize..self.offsets[f + 1] as usize,
+        }
     }
 
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &[u32]> + '_ {
-        self.offsets
-            .windows(2)
-            .map(|w| &self.corners[w[0] as usize..w[1] as usize])
+        (0..self.count).map(|f| self.face(f))
     }
 
+    /// Where each face starts in [`corners`](Self::corners), and the end. O(1) where sizes differ; otherwise the first
+    /// call makes the array.
     pub fn offsets(&self) -> &[u32] {
-        &self.offsets
+        let Some(size) = self.size else {
+            return &self.offsets;
+        };
+        self.uniform_offsets
+            .get_or_init(|| (0..=self.count).map(|f| (size * f) as u32).collect())
     }
 
     pub fn corners(&self) -> &[u32] {
@@ -131,12 +216,7 @@ impl Faces {
 
     /// The face size that all faces share, if they do.
     pub fn uniform_size(&self) -> Option<usize> {
-        let first = self.face_sizes().next()?;
-        self.face_sizes().all(|s| s == first).then_some(first)
-    }
-
-    fn face_sizes(&self) -> impl Iterator<Item = usize> + '_ {
-        self.offsets.windows(2).map(|w| (w[1] - w[0]) as usize)
+        self.size.filter(|_| self.count > 0)
     }
 }
 
@@ -170,4 +250,59 @@ pub fn bounding_box(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
             None => Some((p, p)),
             Some((lo, hi)) => Some((p.min(lo), p.max(hi))),
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faces_are_the_same_however_they_were_made() {
+        let lists: [&[&[u32]]; 7] = [
+            &[],
+            &[&[0, 1, 2], &[3, 4, 5]],
+            &[&[0, 1, 2], &[3, 4, 5], &[6, 7, 8, 9]],
+            &[&[0, 1, 2, 3], &[3, 4, 5], &[6, 7, 8, 9]],
+            &[&[], &[]],
+            &[&[], &[1, 2, 3]],
+            &[&[1, 2, 3], &[], &[1, 2, 3]],
+        ];
+        for lists in lists {
+            let mut pushed = Faces::default();
+            let mut offsets = vec![0];
+            for face in lists {
+                pushed.push(face);
+                offsets.push(pushed.corners().len() as u32);
+                // Asked for in between, and still right afterwards.
+                assert_eq!(pushed.offsets(), offsets);
+            }
+            let made = Faces::from_parts(offsets.clone(), lists.concat());
+            assert_eq!(made, pushed);
+            assert_eq!(made, Faces::from_lists(lists));
+            assert_eq!(made.offsets(), offsets);
+            assert_eq!(made.iter().collect::<Vec<_>>(), lists);
+            let mut sizes: Vec<usize> = lists.iter().map(|f| f.len()).collect();
+            sizes.dedup();
+            let size = (sizes.len() == 1).then(|| sizes[0]);
+            assert_eq!(made.uniform_size(), size);
+            if let Some(size @ 1..) = size {
+                assert_eq!(Faces::of_size(size, lists.concat()), made);
+            }
+            for (f, list) in lists.iter().enumerate() {
+                assert_eq!(made.range(f), offsets[f] as usize..offsets[f + 1] as usize);
+                assert_eq!(made.face(f), *list);
+            }
+        }
+        assert_ne!(
+            Faces::from_lists([vec![0, 1, 2], vec![3, 4, 5, 6]]),
+            Faces::from_lists([vec![0, 1, 2, 3], vec![4, 5, 6]])
+        );
+        assert_eq!(Faces::of_size(3, Vec::new()), Faces::default());
+    }
+
+    #[test]
+    #[should_panic(expected = "offsets ascend")]
+    fn offsets_that_descend_are_refused() {
+        Faces::from_parts(vec![0, 3, 1, 6], vec![0; 6]);
+    }
 }

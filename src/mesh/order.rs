@@ -291,7 +291,7 @@ pub fn along_curve(mesh: &Mesh) -> Option<(Mesh, Numbering)> {
             Faces::from_parts(moved.offsets().to_vec(), corners)
         }
         None => {
-            let mut faces = Faces::with_capacity(moved.len(), moved.corners().len());
+            let mut faces = Faces::with_capacity(moved.corners().len());
             for &f in &by_smallest {
                 faces.push(moved.face(f as usize));
             }

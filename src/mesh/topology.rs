@@ -2,6 +2,7 @@
 //! loops, Euler characteristic. Built in linear time by a counting sort, in parallel; no hashing.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
@@ -38,7 +39,7 @@ impl FaceOf {
             _ => {}
         }
         let mut table = vec![0; faces.corners().len()];
-        let parts = split_rows(faces.offsets(), CHUNK, &mut table);
+        let parts = split_by_face(faces, CHUNK, &mut table);
         parts.into_par_iter().for_each(|(rows, mut part)| {
             for f in rows {
                 let (face, rest) = part.split_at_mut(faces.range(f).len());
@@ -212,14 +213,34 @@ pub(crate) fn split_rows<'a, T>(
     chunk: usize,
     values: &'a mut [T],
 ) -> Vec<(Range<usize>, &'a mut [T])> {
-    let rows = offsets.len() - 1;
+    split(offsets.len() - 1, chunk, values, |rows| {
+        (offsets[rows.end] - offsets[rows.start]) as usize
+    })
+}
+
+/// Cuts `values`, one a corner, after the corners of every `chunk` faces.
+pub(crate) fn split_by_face<'a, T>(
+    faces: &Faces,
+    chunk: usize,
+    values: &'a mut [T],
+) -> Vec<(Range<usize>, &'a mut [T])> {
+    split(faces.len(), chunk, values, |rows| {
+        faces.range(rows.end - 1).end - faces.range(rows.start).start
+    })
+}
+
+fn split<T>(
+    rows: usize,
+    chunk: usize,
+    values: &mut [T],
+    length: impl Fn(&Range<usize>) -> usize,
+) -> Vec<(Range<usize>, &mut [T])> {
     let mut rest = values;
     (0..rows)
         .step_by(chunk)
         .map(|first| {
             let range = first..(first + chunk).min(rows);
-            let length = (offsets[range.end] - offsets[first]) as usize;
-            let (part, after) = std::mem::take(&mut rest).split_at_mut(length);
+            let (part, after) = std::mem::take(&mut rest).split_at_mut(length(&range));
             rest = after;
             (range, part)
         })
@@ -246,6 +267,18 @@ impl Scatter {
     }
 }
 
+/// What was found out about a topology: no part of it, so all are equal.
+#[derive(Clone, Debug, Default)]
+struct Known(OnceLock<bool>);
+
+impl PartialEq for Known {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl Eq for Known {}
+
 /// How the faces hang together. Half-edge `c` leaves corner `c` for the next corner of its face.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topology {
@@ -254,6 +287,8 @@ pub struct Topology {
     edges: usize,
     boundary: Vec<u32>,
     irregular_edges: Vec<IrregularEdge>,
+    /// Whether the faces at every vertex form one umbrella.
+    umbrellas: Known,
 }
 
 /// An edge that is not the meeting of at most two, oppositely directed faces.
@@ -309,6 +344,7 @@ impl Topology {
             edges: 0,
             boundary: Vec::new(),
             irregular_edges: Vec::new(),
+            umbrellas: Known::default(),
         };
         for chunk in chunks {
             topology.edges += chunk.edges;
@@ -319,7 +355,7 @@ impl Topology {
         topology
     }
 
-    /// The topology of a closed mesh from its arrays: every half-edge has its twin.
+    /// The topology of a closed manifold from its arrays: every half-edge has its twin, every vertex one umbrella.
     pub(crate) fn closed(incidence: Incidence, twin: Vec<u32>) -> Self {
         Topology {
             incidence,
@@ -327,6 +363,7 @@ impl Topology {
             twin,
             boundary: Vec::new(),
             irregular_edges: Vec::new(),
+            umbrellas: Known(OnceLock::from(true)),
         }
     }
 
@@ -335,37 +372,26 @@ impl Topology {
         &self.twin
     }
 
-    /// [`edge_sides`](Self::edge_sides) as a list, found in parallel.
-    pub(crate) fn first_sides(&self) -> Vec<u32> {
-        let chunk = |k: usize| {
-            let first = k * CHUNK;
-            let twins = &self.twin[first..self.twin.len().min(first + CHUNK)];
-            twins.iter().zip(first as u32..)
-        };
-        let chunks = self.twin.len().div_ceil(CHUNK);
-        let mut offsets: Vec<u32> = (0..chunks + 1)
-            .into_par_iter()
-            .map(|k| match k {
-                0 => 0,
-                _ => chunk(k - 1).map(|(&t, c)| u32::from(c <= t)).sum(),
-            })
-            .collect();
-        for k in 0..chunks {
-            offsets[k + 1] += offsets[k];
+    /// The numbers of the edges of a closed mesh.
+    pub(crate) fn edge_numbers(&self) -> EdgeNumbers<'_> {
+        EdgeNumbers::new(&self.twin)
+    }
+
+    /// Whether every vertex of a closed mesh has faces, and these form one umbrella. Examined the first time only.
+    pub(crate) fn has_one_umbrella_each(&self, faces: &Faces) -> bool {
+        if let Some(&known) = self.umbrellas.0.get() {
+            return known;
         }
-        let mut sides = vec![0; offsets[chunks] as usize];
-        let parts = split_rows(&offsets, 1, &mut sides);
-        parts.into_par_iter().for_each(|(k, part)| {
-            let mut found = 0;
-            for (&t, c) in chunk(k.start) {
-                // Written in any case, kept if it counts: no branch to foresee.
-                if let Some(side) = part.get_mut(found) {
-                    *side = c;
-                }
-                found += usize::from(c <= t);
-            }
-        });
-        sides
+        let one_each = (0..self.incidence.vertices())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .all(|v| self.incidence.face_count(v) > 0 && self.is_one_umbrella(faces, v));
+        *self.umbrellas.0.get_or_init(|| one_each)
+    }
+
+    /// Keeps for later that [`has_one_umbrella_each`](Self::has_one_umbrella_each).
+    pub(crate) fn know_one_umbrella_each(&self) {
+        self.umbrellas.0.get_or_init(|| true);
     }
 
     /// Whether the faces at vertex `v` of a closed mesh form one umbrella, which turns through all of them.
@@ -557,6 +583,83 @@ impl Topology {
             loops.push(walk);
         }
         loops
+    }
+}
+
+/// The edges of a closed mesh, numbered by their first half-edges: the order of [`Topology::edge_sides`]. A number
+/// comes from a bit and an eighth of a byte of counts a half-edge, few enough to stay in a cache, instead of from a
+/// table.
+pub(crate) struct EdgeNumbers<'a> {
+    twins: &'a [u32],
+    /// For every 64 half-edges: which are first, and how many before them are.
+    words: Vec<(u64, u32)>,
+}
+
+impl<'a> EdgeNumbers<'a> {
+    fn new(twins: &'a [u32]) -> Self {
+        let word = |(k, twins): (usize, &[u32])| {
+            let mut bits = 0;
+            for (i, (&t, c)) in twins.iter().zip(64 * k as u32..).enumerate() {
+                bits |= u64::from(c <= t) << i;
+            }
+            (bits, bits.count_ones())
+        };
+        let chunks = twins.par_chunks(64).with_min_len(CHUNK / 64);
+        let mut words: Vec<(u64, u32)> = chunks.enumerate().map(word).collect();
+        let mut before = 0;
+        for (_, count) in &mut words {
+            before += std::mem::replace(count, before);
+        }
+        EdgeNumbers { twins, words }
+    }
+
+    /// The edge of half-edge `c`.
+    #[inline]
+    pub(crate) fn of(&self, c: u32) -> u32 {
+        let first = c.min(self.twins[c as usize]);
+        let (bits, before) = self.words[first as usize / 64];
+        before + (bits & !(u64::MAX << (first % 64))).count_ones()
+    }
+
+    /// The first half-edges, ascending.
+    pub(crate) fn firsts(&self) -> impl IndexedParallelIterator<Item = u32> + '_ {
+        let start = || Cursor {
+            next: u32::MAX,
+            word: 0,
+            bits: 0,
+        };
+        (0..self.twins.len() as u32 / 2)
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map_init(start, |cursor, edge| cursor.first_of(edge, &self.words))
+    }
+}
+
+/// Where a walk over the edges is.
+struct Cursor {
+    /// The edge that comes next.
+    next: u32,
+    word: usize,
+    /// The first half-edges of the word that are still to come.
+    bits: u64,
+}
+
+impl Cursor {
+    #[inline]
+    fn first_of(&mut self, edge: u32, words: &[(u64, u32)]) -> u32 {
+        if edge != self.next {
+            self.word = words.partition_point(|&(_, before)| before <= edge) - 1;
+            let (bits, before) = words[self.word];
+            self.bits = (before..edge).fold(bits, |bits, _| bits & (bits - 1));
+        }
+        while self.bits == 0 {
+            self.word += 1;
+            self.bits = words[self.word].0;
+        }
+        let first = 64 * self.word as u32 + self.bits.trailing_zeros();
+        self.bits &= self.bits - 1;
+        self.next = edge + 1;
+        first
     }
 }
 
@@ -825,6 +928,31 @@ mod tests {
                     .any(|e| e.is_misoriented() && e.is_loop())
             );
             assert!(t.boundary_half_edges().is_empty());
+        }
+    }
+
+    #[test]
+    fn edges_are_numbered_by_their_first_half_edges() {
+        // Several words, several tasks, and a word without any first half-edge.
+        for name in [
+            "tetrahedron",
+            "irregular-poly:500",
+            "torus:150x130",
+            "tri-torus:80x80",
+        ] {
+            let mesh = crate::mesh::builtin::builtin(name).unwrap();
+            let mut t = Topology::new(&mesh.faces, mesh.len());
+            for _ in 0..2 {
+                let firsts: Vec<u32> = t.edge_sides().collect();
+                let numbers = t.edge_numbers();
+                assert_eq!(numbers.firsts().collect::<Vec<u32>>(), firsts, "{name}");
+                for (e, &c) in (0..).zip(&firsts) {
+                    assert_eq!([numbers.of(c), numbers.of(t.twin[c as usize])], [e; 2]);
+                }
+                // Half-edge c opposite to c + count/2: all first ones before all others.
+                let half = t.twin.len() as u32 / 2;
+                t.twin = (half..2 * half).chain(0..half).collect();
+            }
         }
     }
 

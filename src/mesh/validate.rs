@@ -401,19 +401,22 @@ fn examine_vertices(
     let incidence = &topology.incidence;
     let n = incidence.vertices();
     let is_closed = topology.is_closed();
-    let chunks: Vec<(Vec<Defect>, usize, usize)> = (0..n.div_ceil(CHUNK))
+    let chunks: Vec<(Vec<Defect>, usize, usize, bool)> = (0..n.div_ceil(CHUNK))
         .into_par_iter()
         .map_init(Link::default, |link, chunk| {
             let mut found = Vec::new();
             let (mut min, mut max) = (usize::MAX, 0);
+            let mut one_each = true;
             for v in chunk * CHUNK..n.min((chunk + 1) * CHUNK) {
                 if incidence.face_count(v) == 0 {
+                    one_each = false;
                     continue;
                 }
                 // One umbrella of edges with two sides each: the valence is the number of faces.
                 let (valence, umbrellas) = if is_closed && topology.is_one_umbrella(faces, v) {
                     (incidence.face_count(v), 1)
                 } else {
+                    one_each = false;
                     link.examine(faces, incidence, v)
                 };
                 min = min.min(valence);
@@ -431,11 +434,14 @@ fn examine_vertices(
                     report(DefectKind::LowValence, valence);
                 }
             }
-            (found, min, max)
+            (found, min, max, one_each)
         })
         .collect();
+    if chunks.iter().all(|&(.., one_each)| one_each) {
+        topology.know_one_umbrella_each();
+    }
     let (mut min, mut max) = (usize::MAX, 0);
-    for (found, lo, hi) in chunks {
+    for (found, lo, hi, _) in chunks {
         defects.extend(found);
         min = min.min(lo);
         max = max.max(hi);

@@ -9,11 +9,10 @@ use rayon::prelude::*;
 
 use super::refined::{self, rows};
 use super::star::{
-    CHUNK, Circle, Tangents, centroid, edge_numbers, for_each_star, require_closed, require_room,
-    sides, twin,
+    Circle, Tangents, centroid, for_each_star, numbers, require_closed, require_room, sides, twin,
 };
 use crate::Result;
-use crate::mesh::topology::{next_in, prev_in};
+use crate::mesh::topology::{EdgeNumbers, next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
 
 /// One step.
@@ -33,36 +32,27 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_room(mesh, 4)?;
     let (old, incidence) = (&mesh.positions, &topology.incidence);
     let corners = mesh.faces.corners();
-    let centers: Vec<DVec3> = (0..mesh.faces.len())
-        .into_par_iter()
-        .with_min_len(CHUNK)
-        .map(|f| centroid(old, mesh.faces.face(f)))
-        .collect();
-    let firsts = topology.first_sides();
-    let mut positions = Vec::with_capacity(mesh.len() + firsts.len() + centers.len());
-    positions.par_extend(
-        (0..mesh.len())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(|v| {
-                let star = incidence.corners_at(v);
-                let mut sum = DVec3::ZERO;
-                for &c in star {
-                    let w = corners[incidence.next(&mesh.faces, c) as usize];
-                    sum += old[w as usize] + centers[incidence.face_of(c)];
-                }
-                let n = star.len() as f64;
-                (n - 2.0) / n * old[v] + sum / (n * n)
-            }),
-    );
-    positions.par_extend(firsts.par_iter().with_min_len(CHUNK).map(|&c| {
+    let edges = topology.edge_numbers();
+    let center = |f| centroid(old, mesh.faces.face(f));
+    let centers: Vec<DVec3> = numbers(mesh.faces.len()).map(center).collect();
+    let mut positions = Vec::with_capacity(mesh.len() + topology.edges() + centers.len());
+    positions.par_extend(numbers(mesh.len()).map(|v| {
+        let star = incidence.corners_at(v);
+        let mut sum = DVec3::ZERO;
+        for &c in star {
+            let w = corners[incidence.next(&mesh.faces, c) as usize];
+            sum += old[w as usize] + centers[incidence.face_of(c)];
+        }
+        let n = star.len() as f64;
+        (n - 2.0) / n * old[v] + sum / (n * n)
+    }));
+    positions.par_extend(edges.firsts().map(|c| {
         let [one, other] = [c, twin(topology, c)]
             .map(|c| old[corners[c as usize] as usize] + centers[incidence.face_of(c)]);
         0.25 * one + 0.25 * other
     }));
     positions.par_extend(centers);
-    let edge = edge_numbers(topology, &firsts);
-    Ok(Mesh::new(positions, split(mesh, topology, &edge)))
+    Ok(Mesh::new(positions, split(mesh, topology, &edges)))
 }
 
 /// The topology of `refined`, which is what [`refine`] made of `mesh`: that of [`Topology::new`], by index arithmetic
@@ -87,7 +77,7 @@ pub fn refined_topology(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Top
 pub fn refine_in_place(mut mesh: Mesh, topology: &Topology) -> Result<Mesh> {
     require_closed(&mesh, topology)?;
     require_room(&mesh, 4)?;
-    let edge = edge_numbers(topology, &topology.first_sides());
+    let numbers = topology.edge_numbers();
     let (vertices, edges) = (mesh.len(), topology.edges());
     let corners = mesh.faces.corners();
     let mut points = std::mem::take(&mut mesh.positions);
@@ -106,16 +96,16 @@ pub fn refine_in_place(mut mesh: Mesh, topology: &Topology) -> Result<Mesh> {
         let n = star.len() as f64;
         let neighbors: DVec3 = star
             .iter()
-            .map(|&c| 4.0 * points[vertices + edge[c as usize] as usize] - points[face_point(c)])
+            .map(|&c| 4.0 * points[vertices + numbers.of(c) as usize] - points[face_point(c)])
             .sum();
         points[v] = ((n * n - 3.0 * n) * points[v] + neighbors) / (n * n);
     }
-    let faces = split(&mesh, topology, &edge);
+    let faces = split(&mesh, topology, &numbers);
     Ok(Mesh::new(points, faces))
 }
 
 /// The faces of the refined mesh: (vertex, edge leaving it, face, edge entering it) for each old corner.
-fn split(mesh: &Mesh, topology: &Topology, edge: &[u32]) -> Faces {
+fn split(mesh: &Mesh, topology: &Topology, edges: &EdgeNumbers) -> Faces {
     let vertices = topology.incidence.vertices() as u32;
     let first_face = vertices + topology.edges() as u32;
     let corners = mesh.faces.corners();
@@ -124,13 +114,12 @@ fn split(mesh: &Mesh, topology: &Topology, edge: &[u32]) -> Faces {
     rows(&mut quads).for_each(|(c, quad): (u32, &mut [u32; 4])| {
         *quad = [
             corners[c as usize],
-            vertices + edge[c as usize],
+            vertices + edges.of(c),
             first_face + incidence.face_of(c) as u32,
-            vertices + edge[incidence.prev(&mesh.faces, c) as usize],
+            vertices + edges.of(incidence.prev(&mesh.faces, c)),
         ];
     });
-    let offsets = (0..corners.len() as u32 + 1).into_par_iter().map(|f| 4 * f);
-    Faces::from_parts(offsets.collect(), quads)
+    Faces::of_size(4, quads)
 }
 
 /// The limit mask of a vertex of valence `n` among quads: the weight of the vertex, of each edge neighbour, of

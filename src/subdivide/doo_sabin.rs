@@ -7,12 +7,12 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::refined::{self, ends, rows};
+use super::refined::{self, ends, rows, set_by_edge};
 use super::star::{
     CHUNK, Circle, Tangents, centroid, for_each_star, require_closed, require_room, twin,
 };
 use crate::Result;
-use crate::mesh::topology::split_rows;
+use crate::mesh::topology::{split_by_face, split_rows};
 use crate::mesh::{Faces, Mesh, Topology};
 
 /// The rule of a step.
@@ -44,7 +44,7 @@ impl Rule {
 pub fn corner_points(mesh: &Mesh, rule: Rule) -> Vec<DVec3> {
     let corners = (0..mesh.faces.corners().len()).into_par_iter();
     let mut points: Vec<DVec3> = corners.map(|_| DVec3::ZERO).collect();
-    let parts = split_rows(mesh.faces.offsets(), CHUNK, &mut points);
+    let parts = split_by_face(&mesh.faces, CHUNK, &mut points);
     parts
         .into_par_iter()
         .for_each_init(Circle::default, |circle, (range, mut part)| {
@@ -112,20 +112,14 @@ pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_room(mesh, 4)?;
     let count = mesh.faces.corners().len();
     let incidence = &topology.incidence;
-    let firsts = topology.first_sides();
     let mut corners = vec![0; 4 * count];
     let (of_faces, rest) = corners.split_at_mut(count);
-    let (of_edges, of_vertices) = rest.split_at_mut(4 * firsts.len());
+    let (of_edges, of_vertices) = rest.split_at_mut(2 * count);
     rows(of_faces).for_each(|(c, corner): (u32, &mut [u32; 1])| corner[0] = c);
-    rows(of_edges).for_each(|(k, corners): (u32, &mut [u32; 4])| {
-        let c = firsts[k as usize];
+    set_by_edge(of_edges, topology, |c| {
         let t = twin(topology, c);
-        *corners = [
-            incidence.next(&mesh.faces, c),
-            c,
-            incidence.next(&mesh.faces, t),
-            t,
-        ];
+        let next = |c| incidence.next(&mesh.faces, c);
+        [next(c), c, next(t), t]
     });
     let parts = split_rows(incidence.offsets(), CHUNK, of_vertices);
     parts
@@ -139,9 +133,11 @@ pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
             }
         });
 
-    let mut offsets = Vec::with_capacity(mesh.faces.len() + firsts.len() + mesh.len() + 1);
-    offsets.extend_from_slice(mesh.faces.offsets());
-    offsets.par_extend(ends(count, 4, firsts.len()));
+    let mut offsets = Vec::with_capacity(mesh.faces.len() + count / 2 + mesh.len() + 1);
+    offsets.push(0);
+    let of_faces = (0..mesh.faces.len()).into_par_iter();
+    offsets.par_extend(of_faces.map(|f| mesh.faces.range(f).end as u32));
+    offsets.par_extend(ends(count, 4, count / 2));
     let first = 3 * count as u32;
     offsets.par_extend(incidence.offsets()[1..].par_iter().map(|&end| first + end));
     Ok(Mesh::new(

@@ -13,13 +13,12 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::interpolatory::{RegularMask, SQRT_3, tangents};
+use super::ring::{Place, Rings, Rule};
 use super::sqrt3::{flip, refined_topology};
-use super::star::{
-    Circle, Harmonics, Tangents, next_in_triangle, prev_in_triangle, refuse, require_room,
-    require_triangles, twin,
-};
+use super::star::{Tangents, numbers, prev_in_triangle, require_room, require_triangles, twin};
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
 
@@ -88,60 +87,54 @@ pub fn extraordinary_mask(n: usize) -> (f64, Vec<f64>) {
 /// # Panics
 /// If `topology` is not that of `mesh`.
 pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-    require_triangles(mesh, topology, "labsik-greiner")?;
+    const NAME: &str = "labsik-greiner";
+    require_triangles(mesh, topology, NAME)?;
     require_room(mesh, 3)?;
-    let old = &mesh.positions;
-    let corners = mesh.faces.corners();
-    let is_regular = |v: u32| topology.incidence.face_count(v as usize) == 6;
-    let opposite = |c: u32| twin_opposite(topology, c);
-
+    let rule = Rule {
+        name: NAME,
+        place: Place::Triangle,
+        mask: extraordinary_mask,
+        amplitudes,
+    };
+    let rings = Rings::new(mesh, topology, rule)?;
     let mut positions = Vec::with_capacity(mesh.len() + mesh.faces.len());
-    positions.extend_from_slice(old);
-    let [corner, across, wing] = REGULAR;
-    positions.extend(mesh.faces.iter().enumerate().map(|(f, face)| {
-        if !face.iter().all(|&v| is_regular(v)) {
-            return DVec3::ZERO;
+    positions.par_extend(&mesh.positions);
+    positions.par_extend(numbers(mesh.faces.len()).map(|f| {
+        let own = [0, 1, 2].map(|i| 3 * f as u32 + i);
+        let extraordinary = own.map(|c| rings.is_extraordinary(c));
+        let sharing = extraordinary.map(usize::from).iter().sum::<usize>();
+        if sharing == 0 {
+            return regular(mesh, topology, own);
         }
-        let mut near = DVec3::ZERO;
-        let mut tips = DVec3::ZERO;
-        let mut wings = DVec3::ZERO;
-        for side in 3 * f as u32..3 * f as u32 + 3 {
-            near += old[corners[side as usize] as usize];
-            let tip = opposite(side);
-            tips += old[corners[tip] as usize];
-            // The two other sides of the triangle across: the one that ends at the tip and the one that leaves it.
-            for beyond in [prev_in_triangle(tip as u32), tip] {
-                wings += old[corners[opposite(beyond as u32)] as usize];
+        let mut sum = DVec3::ZERO;
+        for (c, extraordinary) in own.into_iter().zip(extraordinary) {
+            if extraordinary {
+                sum += rings.point(c);
             }
         }
-        corner * near + across * tips + wing * wings
+        sum / sharing as f64
     }));
+    Ok(Mesh::new(positions, flip(mesh, topology)))
+}
 
-    let new = &mut positions[mesh.len()..];
-    let mut star = Vec::new();
-    let mut circle = Circle::default();
-    for v in (0..mesh.len() as u32).filter(|&v| !is_regular(v)) {
-        topology.star(&mesh.faces, v as usize, &mut star);
-        let n = star.len();
-        if n < 3 {
-            return refuse(format!(
-                "vertex {v} has valence {n}, for which labsik-greiner has no rule: remove it"
-            ));
-        }
-        // Even places of this circle are the neighbours, odd ones the triangles.
-        let circle = circle.of(2 * n);
-        let neighbor = |&c: &u32| old[corners[next_in_triangle(c)] as usize];
-        let ring = Harmonics::of(star.iter().map(neighbor), circle, 2);
-        let amplitudes = amplitudes(n);
-        for (j, &c) in star.iter().enumerate() {
-            let point =
-                (1.0 - amplitudes[0]) * old[v as usize] + ring.at(circle, 2 * j + 1, amplitudes);
-            let face = mesh.faces.face(c as usize / 3);
-            let sharing = face.iter().filter(|&&w| !is_regular(w)).count();
-            new[c as usize / 3] += point / sharing as f64;
+/// The regular mask at the triangle with these corners.
+fn regular(mesh: &Mesh, topology: &Topology, own: [u32; 3]) -> DVec3 {
+    let [corner, across, wing] = REGULAR;
+    let at = |c: usize| mesh.positions[mesh.faces.corners()[c] as usize];
+    let opposite = |c: u32| prev_in_triangle(twin(topology, c));
+    let mut near = DVec3::ZERO;
+    let mut tips = DVec3::ZERO;
+    let mut wings = DVec3::ZERO;
+    for side in own {
+        near += at(side as usize);
+        let tip = opposite(side);
+        tips += at(tip);
+        // The two other sides of the triangle across: the one that ends at the tip and the one that leaves it.
+        for beyond in [prev_in_triangle(tip as u32), tip] {
+            wings += at(opposite(beyond as u32));
         }
     }
-    Ok(Mesh::new(positions, flip(mesh, topology)))
+    corner * near + across * tips + wing * wings
 }
 
 /// The tangents of the limit surface at all vertices, found in the mesh refined twice, which is what they cost.
@@ -169,9 +162,4 @@ pub fn limit_tangents(mesh: &Mesh, topology: &Topology) -> Result<Vec<Tangents>>
 pub fn limit_normals(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
     let tangents = limit_tangents(mesh, topology)?;
     Ok(tangents.iter().map(Tangents::normal).collect())
-}
-
-/// The corner opposite to half-edge `c` in the triangle across it.
-fn twin_opposite(topology: &Topology, c: u32) -> usize {
-    prev_in_triangle(twin(topology, c))
 }

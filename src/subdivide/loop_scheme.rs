@@ -5,12 +5,13 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::refined::{self, rows, triangle_offsets};
+use super::refined::{self, rows};
 use super::star::{
-    CHUNK, Tangents, blend_with_neighbors, edge_numbers, prev_in_triangle, require_room,
-    require_triangles, ring_tangents, twin,
+    Tangents, blend_with_neighbors, blends, prev_in_triangle, require_room, require_triangles,
+    ring_tangents, twin,
 };
 use crate::Result;
+use crate::mesh::topology::EdgeNumbers;
 use crate::mesh::{Faces, Mesh, Topology};
 
 /// The mask of the vertex point at valence `n`: the weight of the vertex, 3/8 + (3/8 + ¼cos(2π/n))², and of
@@ -46,9 +47,10 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_triangles(mesh, topology, "loop")?;
     require_room(mesh, 4)?;
     let (old, corners) = (&mesh.positions, mesh.faces.corners());
-    let firsts = topology.first_sides();
-    let mut positions = blend_with_neighbors(mesh, topology, vertex_mask);
-    positions.par_extend(firsts.par_iter().with_min_len(CHUNK).map(|&c| {
+    let edges = topology.edge_numbers();
+    let mut positions = Vec::with_capacity(mesh.len() + topology.edges());
+    positions.par_extend(blends(mesh, topology, vertex_mask));
+    positions.par_extend(edges.firsts().map(|c| {
         // 3/8 of the vertex that a side leaves, 1/8 of the vertex opposite to it.
         let [one, other] = [c, twin(topology, c)].map(|c| {
             let opposite = old[corners[prev_in_triangle(c)] as usize];
@@ -56,8 +58,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
         });
         one + other
     }));
-    let edge = edge_numbers(topology, &firsts);
-    Ok(Mesh::new(positions, split_in_four(mesh, &edge)))
+    Ok(Mesh::new(positions, split_in_four(mesh, &edges)))
 }
 
 /// The topology of `refined`, which is what [`refine`] or [`butterfly`](super::butterfly) made of a mesh of the given
@@ -70,17 +71,17 @@ pub fn refined_topology(topology: &Topology, refined: &Mesh) -> Topology {
 }
 
 /// The faces of a 1-to-4 split of triangles.
-pub(super) fn split_in_four(mesh: &Mesh, edge: &[u32]) -> Faces {
+pub(super) fn split_in_four(mesh: &Mesh, edges: &EdgeNumbers) -> Faces {
     let vertices = mesh.len() as u32;
     let old = mesh.faces.corners();
     let mut corners = vec![0; 4 * old.len()];
     rows(&mut corners).for_each(|(f, corners): (u32, &mut [u32; 12])| {
-        let own = [0, 1, 2].map(|i| 3 * f as usize + i);
-        let [u, v, w] = own.map(|c| old[c]);
-        let [a, b, c] = own.map(|c| vertices + edge[c]);
+        let own = [0, 1, 2].map(|i| 3 * f + i);
+        let [u, v, w] = own.map(|c| old[c as usize]);
+        let [a, b, c] = own.map(|c| vertices + edges.of(c));
         *corners = [u, a, c, v, b, a, w, c, b, a, b, c];
     });
-    Faces::from_parts(triangle_offsets(4 * mesh.faces.len()), corners)
+    Faces::of_size(3, corners)
 }
 
 /// The limit points of all vertices.

@@ -34,6 +34,7 @@ mod interpolatory;
 pub mod labsik_greiner;
 pub mod loop_scheme;
 mod refined;
+mod ring;
 pub mod sqrt3;
 mod star;
 pub mod unified_sqrt3;

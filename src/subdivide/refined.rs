@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use super::star::{edge_numbers, next_in_triangle, prev_in_triangle};
+use super::star::{next_in_triangle, prev_in_triangle};
 use crate::mesh::topology::Scatter;
 use crate::mesh::{Incidence, Mesh, Topology};
 
@@ -37,24 +37,24 @@ pub(super) fn of_quads(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
         ];
     });
 
-    let firsts = topology.first_sides();
     let mut corners = vec![0; 4 * count];
     let (at_vertices, rest) = corners.split_at_mut(count);
-    let (at_edges, at_faces) = rest.split_at_mut(4 * firsts.len());
+    let (at_edges, at_faces) = rest.split_at_mut(2 * count);
     scale(at_vertices, incidence.corners(), |c| 4 * c);
-    rows(at_edges).for_each(|(k, corners): (u32, &mut [u32; 4])| {
-        let c = firsts[k as usize];
+    set_by_edge(at_edges, topology, |c| {
         let t = twin[c as usize];
-        *corners = [4 * c + 1, 4 * next(c) + 3, 4 * t + 1, 4 * next(t) + 3];
+        let mut corners = [4 * c + 1, 4 * next(c) + 3, 4 * t + 1, 4 * next(t) + 3];
         corners.sort_unstable();
+        corners
     });
     rows(at_faces).for_each(|(c, corner): (u32, &mut [u32; 1])| corner[0] = 4 * c + 2);
 
     let mut offsets = Vec::with_capacity(refined.len() + 1);
-    offsets.extend_from_slice(incidence.offsets());
-    offsets.par_extend(ends(count, 4, firsts.len()));
+    offsets.par_extend(incidence.offsets());
+    offsets.par_extend(ends(count, 4, count / 2));
     let first = 3 * count as u32;
-    offsets.par_extend(faces.offsets()[1..].par_iter().map(|&end| first + end));
+    let of_faces = (0..faces.len()).into_par_iter();
+    offsets.par_extend(of_faces.map(|f| first + faces.range(f).end as u32));
     closed(refined, offsets, corners, twins)
 }
 
@@ -83,26 +83,21 @@ pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
         }
     });
 
-    let firsts = topology.first_sides();
     let mut corners = vec![0; 4 * count];
     let (at_vertices, at_edges) = corners.split_at_mut(count);
     scale(at_vertices, incidence.corners(), outer);
-    rows(at_edges).for_each(|(k, corners): (u32, &mut [u32; 6])| {
-        let first = firsts[k as usize];
-        for (c, three) in [first, twin[first as usize]]
-            .into_iter()
-            .zip(corners.chunks_exact_mut(3))
-        {
-            let (here, after) = (outer(c) + 1, outer(next_in_triangle(c) as u32) + 2);
-            three[0] = here.min(after);
-            three[1] = here.max(after);
-            three[2] = 12 * (c / 3) + 9 + c % 3;
-        }
+    let three = |c: u32| {
+        let (here, after) = (outer(c) + 1, outer(next_in_triangle(c) as u32) + 2);
+        [here.min(after), here.max(after), 12 * (c / 3) + 9 + c % 3]
+    };
+    set_by_edge(at_edges, topology, |c| {
+        let ([a, b, m], [d, e, n]) = (three(c), three(twin[c as usize]));
+        [a, b, m, d, e, n]
     });
 
     let mut offsets = Vec::with_capacity(refined.len() + 1);
-    offsets.extend_from_slice(incidence.offsets());
-    offsets.par_extend(ends(count, 6, firsts.len()));
+    offsets.par_extend(incidence.offsets());
+    offsets.par_extend(ends(count, 6, count / 2));
     closed(refined, offsets, corners, twins)
 }
 
@@ -129,25 +124,22 @@ pub(super) fn of_flips(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
     scale(at_vertices, incidence.corners(), |c| 3 * c);
     rows(at_faces).for_each(|(f, corners): (u32, &mut [u32; 6])| {
         let own = [0, 1, 2].map(|i| 3 * f + i);
-        let mut across = own.map(|c| twin[c as usize]);
-        across.sort_unstable();
-        let before = across.iter().filter(|&&t| t < own[0]).count();
-        let (low, high) = across.split_at(before);
-        let across = |t: &u32| 3 * t + 1;
-        let own = own.iter().map(|c| 3 * c + 2);
-        let all = low
-            .iter()
-            .map(across)
-            .chain(own)
-            .chain(high.iter().map(across));
-        corners
-            .iter_mut()
-            .zip(all)
-            .for_each(|(at, corner)| *at = corner);
+        let [a, b, c] = own.map(|c| twin[c as usize]);
+        let (low, high) = (a.min(b), a.max(b));
+        let across = [low.min(c), low.max(c).min(high), high.max(c)];
+        // Its own corners stand together. No branch: there is no pattern to foresee.
+        let before = across.map(|t| usize::from(t < own[0]));
+        let first = before.iter().sum::<usize>();
+        for (i, c) in own.into_iter().enumerate() {
+            corners[first + i] = 3 * c + 2;
+        }
+        for (i, (t, before)) in across.into_iter().zip(before).enumerate() {
+            corners[i + 3 * (1 - before)] = 3 * t + 1;
+        }
     });
 
     let mut offsets = Vec::with_capacity(refined.len() + 1);
-    offsets.extend_from_slice(incidence.offsets());
+    offsets.par_extend(incidence.offsets());
     offsets.par_extend(ends(count, 6, mesh.faces.len()));
     closed(refined, offsets, corners, twins)
 }
@@ -160,8 +152,7 @@ pub(super) fn of_corners(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> To
         return Topology::new(&refined.faces, refined.len());
     }
     let count = twin.len();
-    let firsts = topology.first_sides();
-    let edge = edge_numbers(topology, &firsts);
+    let edges = topology.edge_numbers();
     let (next, prev) = (|c| incidence.next(faces, c), |c| incidence.prev(faces, c));
     let first_edge = count as u32;
     let first_star = 3 * count as u32;
@@ -177,18 +168,17 @@ pub(super) fn of_corners(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> To
     // Of the quad of the edge of c, the corner that is c, and the corner that is next c.
     let in_edge = |c: u32| {
         let second = if c < twin[c as usize] { 0 } else { 2 };
-        first_edge + 4 * edge[c as usize] + second
+        first_edge + 4 * edges.of(c) + second
     };
 
     let mut twins = vec![0; 4 * count];
     let (of_faces, rest) = twins.split_at_mut(count);
-    let (of_edges, of_vertices) = rest.split_at_mut(4 * firsts.len());
+    let (of_edges, of_vertices) = rest.split_at_mut(2 * count);
     rows(of_faces).for_each(|(c, twin): (u32, &mut [u32; 1])| twin[0] = in_edge(c));
-    rows(of_edges).for_each(|(k, twins): (u32, &mut [u32; 4])| {
-        let c = firsts[k as usize];
+    set_by_edge(of_edges, topology, |c| {
         let t = twin[c as usize];
         let at = |c: u32| place[next(c) as usize];
-        *twins = [c, at(t), t, at(c)];
+        [c, at(t), t, at(c)]
     });
     rows(of_vertices).for_each(|(p, twins): (u32, &mut [u32; 1])| {
         let ahead = twin[prev(stars[p as usize]) as usize];
@@ -223,6 +213,18 @@ fn closed(refined: &Mesh, offsets: Vec<u32>, corners: Vec<u32>, twins: Vec<u32>)
     Topology::closed(incidence, twins)
 }
 
+/// Gives every edge, in order, a row: that of its first half-edge.
+pub(super) fn set_by_edge<const N: usize>(
+    values: &mut [u32],
+    topology: &Topology,
+    row: impl Fn(u32) -> [u32; N] + Sync,
+) {
+    let (rows, _) = values.as_chunks_mut();
+    let edges = topology.edge_numbers();
+    let rows = rows.par_iter_mut().zip(edges.firsts());
+    rows.for_each(|(to, c)| *to = row(c));
+}
+
 /// Rows of N entries in parallel, with their numbers.
 pub(super) fn rows<const N: usize>(
     values: &mut [u32],
@@ -251,12 +253,4 @@ pub(super) fn ends(
     (1..count as u32 + 1)
         .into_par_iter()
         .map(move |k| start + size * k)
-}
-
-/// The offsets of `count` triangles.
-pub(super) fn triangle_offsets(count: usize) -> Vec<u32> {
-    (0..count as u32 + 1)
-        .into_par_iter()
-        .map(|f| 3 * f)
-        .collect()
 }

@@ -6,9 +6,9 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::refined::{self, rows, triangle_offsets};
+use super::refined::{self, rows};
 use super::star::{
-    CHUNK, Tangents, blend_with_neighbors, centroid, require_room, require_triangles,
+    Tangents, blend_with_neighbors, blends, centroid, numbers, require_room, require_triangles,
     ring_tangents, twin,
 };
 use crate::Result;
@@ -47,9 +47,10 @@ pub fn limit_mask(n: usize) -> [f64; 2] {
 pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_triangles(mesh, topology, "sqrt3")?;
     require_room(mesh, 3)?;
-    let mut positions = blend_with_neighbors(mesh, topology, vertex_mask);
-    let faces = (0..mesh.faces.len()).into_par_iter().with_min_len(CHUNK);
-    positions.par_extend(faces.map(|f| centroid(&mesh.positions, mesh.faces.face(f))));
+    let mut positions = Vec::with_capacity(mesh.len() + mesh.faces.len());
+    positions.par_extend(blends(mesh, topology, vertex_mask));
+    let center = |f| centroid(&mesh.positions, mesh.faces.face(f));
+    positions.par_extend(numbers(mesh.faces.len()).map(center));
     Ok(Mesh::new(positions, flip(mesh, topology)))
 }
 
@@ -71,7 +72,7 @@ pub(super) fn flip(mesh: &Mesh, topology: &Topology) -> Faces {
         let across = twin(topology, c);
         *corners = [old[c as usize], vertices + across / 3, vertices + c / 3];
     });
-    Faces::from_parts(triangle_offsets(old.len()), corners)
+    Faces::of_size(3, corners)
 }
 
 /// The limit points of all vertices.

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use crate::mesh::topology::{NONE, Scatter};
+use crate::mesh::topology::NONE;
 use crate::mesh::{Incidence, Mesh, Topology};
 use crate::{Error, Result};
 
@@ -49,10 +49,10 @@ pub(crate) fn require_closed(mesh: &Mesh, topology: &Topology) -> Result<()> {
         ));
     }
     let incidence = &topology.incidence;
-    let split = find_first(mesh.len(), |v| {
-        incidence.face_count(v) == 0 || !topology.is_one_umbrella(&mesh.faces, v)
-    });
-    if let Some(v) = split {
+    let split = |v| incidence.face_count(v) == 0 || !topology.is_one_umbrella(&mesh.faces, v);
+    if !topology.has_one_umbrella_each(&mesh.faces)
+        && let Some(v) = find_first(mesh.len(), split)
+    {
         return refuse(if incidence.face_count(v) == 0 {
             format!("vertex {v} belongs to no face: remove it")
         } else {
@@ -108,20 +108,6 @@ pub(crate) fn refuse<T>(what: String) -> Result<T> {
     Err(Error::mesh("mesh", what))
 }
 
-/// The edge of every half-edge of a closed mesh; edges are numbered by their first half-edge, `firsts`.
-pub(crate) fn edge_numbers(topology: &Topology, firsts: &[u32]) -> Vec<u32> {
-    let edge = Scatter::new(topology.twins().len());
-    firsts
-        .par_iter()
-        .enumerate()
-        .with_min_len(CHUNK)
-        .for_each(|(e, &c)| {
-            edge.set(c, e as u32);
-            edge.set(twin(topology, c), e as u32);
-        });
-    edge.into_vec()
-}
-
 /// The opposite half-edge in a mesh that [`require_closed`] has let pass.
 pub(crate) fn twin(topology: &Topology, c: u32) -> u32 {
     topology.twin(c).expect("a closed mesh has every twin")
@@ -155,21 +141,38 @@ pub(crate) fn blend_with_neighbors(
     topology: &Topology,
     mask: impl Fn(usize) -> [f64; 2],
 ) -> Vec<DVec3> {
+    blends(mesh, topology, mask).collect()
+}
+
+/// [`blend_with_neighbors`], one vertex after the other.
+pub(crate) fn blends(
+    mesh: &Mesh,
+    topology: &Topology,
+    mask: impl Fn(usize) -> [f64; 2],
+) -> impl IndexedParallelIterator<Item = DVec3> {
     let masks = by_valence(&topology.incidence, mask);
-    (0..mesh.len())
-        .into_par_iter()
-        .with_min_len(CHUNK)
-        .map(|v| {
-            let star = topology.incidence.corners_at(v);
-            let mut sum = DVec3::ZERO;
-            for &c in star {
-                let w = mesh.faces.corners()[topology.incidence.next(&mesh.faces, c) as usize];
-                sum += mesh.positions[w as usize];
-            }
-            let [a, b] = masks[star.len()];
-            a * mesh.positions[v] + b * sum
-        })
-        .collect()
+    numbers(mesh.len()).map(move |v| {
+        let (n, sum) = neighbor_sum(mesh, topology, v);
+        let [a, b] = masks[n];
+        a * mesh.positions[v] + b * sum
+    })
+}
+
+/// The numbers below `count`.
+pub(crate) fn numbers(count: usize) -> impl IndexedParallelIterator<Item = usize> {
+    (0..count).into_par_iter().with_min_len(CHUNK)
+}
+
+/// The number of neighbours of vertex `v` of a closed mesh, and their sum.
+#[inline]
+pub(crate) fn neighbor_sum(mesh: &Mesh, topology: &Topology, v: usize) -> (usize, DVec3) {
+    let star = topology.incidence.corners_at(v);
+    let mut sum = DVec3::ZERO;
+    for &c in star {
+        let w = mesh.faces.corners()[topology.incidence.next(&mesh.faces, c) as usize];
+        sum += mesh.positions[w as usize];
+    }
+    (star.len(), sum)
 }
 
 /// Calls `visit(v, corners)` for every vertex with its corners in counter-clockwise order.

@@ -1,11 +1,13 @@
 //! The unified √3 scheme of Lin & Luo (§4–5): a parameter α at every vertex blends the approximating √3 scheme
 //! (α = 0) with an interpolatory one (α = 1). New vertices take the mean α of their triangle.
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use super::sqrt3::{flip, relaxation};
-use super::star::{CHUNK, blend_with_neighbors, refuse, require_room, require_triangles};
+use super::star::{
+    by_valence, centroid, find_first, neighbor_sum, numbers, refuse, require_room,
+    require_triangles,
+};
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
 
@@ -29,28 +31,34 @@ pub fn refine(mesh: &Mesh, topology: &Topology, alpha: &[f64]) -> Result<(Mesh, 
     assert!(alpha.len() == mesh.len(), "one α for each vertex");
     require_triangles(mesh, topology, "unified sqrt3")?;
     require_room(mesh, 3)?;
-    if let Some(v) = alpha.iter().position(|a| !ALPHA_RANGE.contains(a)) {
+    if let Some(v) = find_first(alpha.len(), |v| !ALPHA_RANGE.contains(&alpha[v])) {
         return refuse(format!(
             "α = {} at vertex {v}: the unified sqrt3 scheme takes 0 (approximating) to 2, 1 interpolating",
             alpha[v]
         ));
     }
-    let displacements = blend_with_neighbors(mesh, topology, |n| {
+    let masks = by_valence(&topology.incidence, |n| {
         let a = relaxation(n);
         [-a, a / n as f64]
     });
     let old = &mesh.positions;
     let mut positions = Vec::with_capacity(mesh.len() + mesh.faces.len());
-    let mut parameters = Vec::with_capacity(positions.capacity());
-    let vertices = (0..mesh.len()).into_par_iter().with_min_len(CHUNK);
-    positions.par_extend(vertices.map(|v| old[v] + (1.0 - alpha[v]) * displacements[v]));
-    parameters.extend_from_slice(alpha);
-    let faces = || (0..mesh.faces.len()).into_par_iter().with_min_len(CHUNK);
-    let corners = |f| mesh.faces.face(f).iter().map(|&v| v as usize);
-    positions.par_extend(faces().map(|f| {
-        let shares = corners(f).map(|v| old[v] - alpha[v] * displacements[v]);
-        shares.sum::<DVec3>() / 3.0
-    }));
-    parameters.par_extend(faces().map(|f| corners(f).map(|v| alpha[v]).sum::<f64>() / 3.0));
+    // What each vertex gives to its triangles.
+    let mut shares = Vec::new();
+    numbers(mesh.len())
+        .map(|v| {
+            let (n, sum) = neighbor_sum(mesh, topology, v);
+            let [a, b] = masks[n];
+            let displacement = a * old[v] + b * sum;
+            let new = old[v] + (1.0 - alpha[v]) * displacement;
+            (new, old[v] - alpha[v] * displacement)
+        })
+        .unzip_into_vecs(&mut positions, &mut shares);
+    let faces = || numbers(mesh.faces.len()).map(|f| mesh.faces.face(f));
+    positions.par_extend(faces().map(|face| centroid(&shares, face)));
+    let mut parameters = Vec::with_capacity(positions.len());
+    parameters.par_extend(alpha);
+    let sum = |face: &[u32]| face.iter().map(|&v| alpha[v as usize]).sum::<f64>();
+    parameters.par_extend(faces().map(|face| sum(face) / 3.0));
     Ok((Mesh::new(positions, flip(mesh, topology)), parameters))
 }
