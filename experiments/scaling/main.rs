@@ -61,6 +61,9 @@ struct Arguments {
     /// Methods with a stored matrix up to this many vertices
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     most_stored: usize,
+    /// Local edits, and the decay of the inverse, up to this many vertices
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    most_edits: usize,
     /// Stop at max_i ‖p_i − (A v)_i‖ ≤ T·L, L the diagonal of the bounding box
     #[arg(long, value_name = "T", default_value_t = 1e-10, value_parser = cli::positive)]
     tol: f64,
@@ -164,14 +167,19 @@ fn measure(arguments: &Arguments) -> Result<()> {
 
 /// Local edits on the meshes of all schemes and sizes, and the decay on the largest.
 fn local_edits(arguments: &Arguments) -> Result<()> {
+    let mut sizes = arguments.sizes.0.clone();
+    sizes.retain(|&n| n <= arguments.most_edits);
+    let Some(&last) = sizes.last() else {
+        return Ok(());
+    };
     let mut table = edits::edits_table(arguments.tol);
     let mut largest = Vec::new();
     for &scheme in &arguments.scheme.0 {
-        for (k, &n) in arguments.sizes.0.iter().enumerate() {
+        for &n in &sizes {
             let name = family(scheme, n);
             let mesh = noisy(&name)?;
             let operator = edits::edits(&name, &mesh, scheme, arguments.tol, &mut table)?;
-            if k + 1 == arguments.sizes.0.len() {
+            if n == last {
                 largest.push((format!("{name}, {scheme}"), operator));
             }
         }

@@ -204,6 +204,8 @@ pub fn shuffle_faces(mesh: &Mesh, seed: u64) -> Mesh {
 /// # Panics
 /// If a face is not a triangle.
 pub fn flip_edges(mesh: &mut Mesh, attempts: usize, seed: u64) {
+    /// Edges drawn and looked at together before the first of them is tried.
+    const AHEAD: usize = 64;
     // Keeps slivers away, and with them triangles that look turned round from another side.
     const LEAST_SHARE: f64 = 0.125;
     assert!(
@@ -224,9 +226,16 @@ pub fn flip_edges(mesh: &mut Mesh, attempts: usize, seed: u64) {
         .collect();
     let next = |c: u32| if c % 3 == 2 { c - 2 } else { c + 1 };
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    for _ in 0..attempts {
+    let mut drawn = Vec::new();
+    for attempt in 0..attempts {
+        if attempt % AHEAD == 0 {
+            let count = AHEAD.min(attempts - attempt);
+            drawn.clear();
+            drawn.extend((0..count).map(|_| rng.random_range(0..corners.len() as u32)));
+            read_ahead(&drawn, &twin, corners, &valence, positions);
+        }
         // Triangles (a, b, x) and (b, a, y) become (a, y, x) and (y, b, x).
-        let c = rng.random_range(0..corners.len() as u32);
+        let c = drawn[attempt % AHEAD];
         let d = twin[c as usize];
         if d == NONE {
             continue;
@@ -296,6 +305,21 @@ pub fn flip_edges(mesh: &mut Mesh, attempts: usize, seed: u64) {
         valence[b as usize] -= 1;
         valence[x as usize] += 1;
         valence[y as usize] += 1;
+    }
+}
+
+/// Reads what the flips of the drawn edges will look at, if those before them leave it there. These reads do not
+/// depend on each other, so that a processor waits for many places of a large mesh at once.
+fn read_ahead(drawn: &[u32], twin: &[u32], corners: &[u32], valence: &[u32], positions: &[DVec3]) {
+    for &c in drawn {
+        let d = twin[c as usize];
+        for c in [c, d].into_iter().filter(|&c| c != NONE) {
+            let first = (c - c % 3) as usize;
+            for &v in &corners[first..first + 3] {
+                std::hint::black_box(valence[v as usize]);
+                std::hint::black_box(positions[v as usize].x);
+            }
+        }
     }
 }
 

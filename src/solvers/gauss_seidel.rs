@@ -152,7 +152,8 @@ fn in_looks(
         }
         if errors.max < (1.0 - PROGRESS) * progress.0 {
             progress = (errors.max, iterations);
-        } else if errors.max <= progress.0 && iterations - progress.1 >= PATIENCE {
+        } else if before.is_some_and(|b| errors.max <= b) && iterations - progress.1 >= PATIENCE {
+            // Not where the error grows: that ends as divergence.
             break Outcome::Stagnated;
         }
         if let Some(before) = before {
