@@ -49,9 +49,7 @@ fn duplicate_positions(positions: &[DVec3]) -> Vec<(u32, u32)> {
         let is_finite = positions[v as usize].is_finite();
         is_finite.then(|| bits(v).into_iter().fold(0, |h, b| mix(h ^ b)))
     };
-    let table = (BITS_PER_ITEM * positions.len()).next_power_of_two();
-    let place = |_, key: u64| key as usize & (table - 1);
-    copies(positions.len() as u32, key, table, place, bits)
+    copies(positions.len() as u32, key, bits)
 }
 
 /// The faces whose corners, in any order, lie on the same positions as those of a face before them, with the
@@ -70,76 +68,45 @@ fn duplicate_faces(faces: &Faces, vertices: usize, same: &[(u32, u32)]) -> Vec<(
         let places = faces.face(f as usize).iter().map(place);
         Some(places.fold(0u64, |h, p| h.wrapping_add(mix(u64::from(p)))))
     };
-    // Equal faces have the same first vertex. What is looked up in its part of the table lies near what the face before
-    // looked up, where the vertices of faces that follow each other lie near each other.
-    let part = (BITS_PER_ITEM * faces.len())
-        .div_ceil(vertices.max(1))
-        .next_power_of_two();
-    let bit = |f: u32, key: u64| {
-        let first = faces.face(f as usize).iter().map(place).min();
-        part * first.unwrap_or(0) as usize + (key as usize & (part - 1))
-    };
-    copies(faces.len() as u32, key, part * vertices.max(1), bit, |f| {
+    copies(faces.len() as u32, key, |f| {
         let mut places: Vec<u32> = faces.face(f as usize).iter().map(place).collect();
         places.sort_unstable();
         places
     })
 }
 
-/// Bits of the tables that [`copies`] are looked for in.
-const BITS_PER_ITEM: usize = 16;
-
 /// Of `count` items, those equal to one before them by `value`, each with the first of its equals. Equal values must
 /// have equal keys; few unequal ones may. Items without a key have no equals.
 ///
-/// Only items that share a bit of a table with another are sorted, few if all are different: `bit(item, key)` below
-/// `bits`, the same for equal values.
+/// Only items that share a bit of a table with another are sorted, an eighth if all are different.
 fn copies<T: Ord>(
     count: u32,
     key: impl Fn(u32) -> Option<u64> + Sync,
-    bits: usize,
-    bit: impl Fn(u32, u64) -> usize + Sync,
     value: impl Fn(u32) -> T,
 ) -> Vec<(u32, u32)> {
-    /// Items whose bits are looked at together.
-    const GROUP: usize = 64;
+    const BITS_PER_ITEM: usize = 16;
+    let bits = (BITS_PER_ITEM * count as usize).next_power_of_two().max(64);
     let table = || -> Vec<AtomicU64> {
-        let words = (0..bits.div_ceil(64)).into_par_iter();
+        let words = (0..bits / 64).into_par_iter();
         words.map(|_| AtomicU64::new(0)).collect()
     };
     let (met, met_again) = (table(), table());
-    let place = |item: u32| {
-        let bit = bit(item, key(item)?);
-        Some((bit / 64, 1u64 << (bit % 64)))
+    let place = |key: u64| {
+        let bit = key as usize & (bits - 1);
+        (bit / 64, 1u64 << (bit % 64))
     };
-    let groups = (0..count.div_ceil(GROUP as u32)).into_par_iter();
-    groups.with_min_len(64).for_each(|group| {
-        let first = GROUP as u32 * group;
-        let mut places = [(0, 0, false); GROUP];
-        let mut found = 0;
-        for item in first..count.min(first + GROUP as u32) {
-            if let Some((word, bit)) = place(item) {
-                places[found] = (word, bit, false);
-                found += 1;
-            }
-        }
-        // Setting a bit waits for its place in memory, reading one does not: so all are read first.
-        for (word, bit, is_met) in &mut places[..found] {
-            *is_met = met[*word].load(Ordering::Relaxed) & *bit != 0;
-        }
-        for &(word, bit, is_met) in &places[..found] {
-            if is_met || met[word].fetch_or(bit, Ordering::Relaxed) & bit != 0 {
-                met_again[word].fetch_or(bit, Ordering::Relaxed);
-            }
+    let items = || (0..count).into_par_iter().with_min_len(4096);
+    items().filter_map(&key).for_each(|key| {
+        let (word, bit) = place(key);
+        if met[word].fetch_or(bit, Ordering::Relaxed) & bit != 0 {
+            met_again[word].fetch_or(bit, Ordering::Relaxed);
         }
     });
-    let mut keys: Vec<(u64, u32)> = (0..count)
-        .into_par_iter()
-        .with_min_len(4096)
+    let mut keys: Vec<(u64, u32)> = items()
         .filter_map(|item| {
-            let (word, bit) = place(item)?;
-            let again = met_again[word].load(Ordering::Relaxed) & bit != 0;
-            again.then_some((key(item)?, item))
+            let key = key(item)?;
+            let (word, bit) = place(key);
+            (met_again[word].load(Ordering::Relaxed) & bit != 0).then_some((key, item))
         })
         .collect();
     keys.par_sort_unstable();
