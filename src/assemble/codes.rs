@@ -5,17 +5,33 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::stencil::Point;
+use crate::prefetch::prefetch;
 
 /// Rows of one task.
 const CHUNK: usize = 4096;
+/// Bytes between what a row reads and what it fetches for later rows. Tuned.
+const AHEAD: usize = 512;
 
 /// A neighbour as it is stored.
-pub trait Code: Copy + Send + Sync {
+pub trait Code: Copy + Default + Send + Sync {
+    /// The greatest distance from the row that has a code.
+    const REACH: u32;
+
+    /// The code of `neighbour` in a row no further away than [`REACH`](Self::REACH).
+    fn new(row: u32, neighbour: u32) -> Self;
+
     /// The place of the neighbour of the row at `row` within a window that begins at vertex `start`.
     fn place(self, row: usize, start: usize) -> usize;
 }
 
 impl Code for u32 {
+    const REACH: u32 = u32::MAX;
+
+    #[inline(always)]
+    fn new(_row: u32, neighbour: u32) -> Self {
+        neighbour
+    }
+
     #[inline(always)]
     fn place(self, _row: usize, start: usize) -> usize {
         (self as usize).wrapping_sub(start)
@@ -24,6 +40,13 @@ impl Code for u32 {
 
 /// The distance from the row.
 impl Code for i16 {
+    const REACH: u32 = i16::MAX as u32;
+
+    #[inline(always)]
+    fn new(row: u32, neighbour: u32) -> Self {
+        neighbour.wrapping_sub(row) as i16
+    }
+
     #[inline(always)]
     fn place(self, row: usize, _start: usize) -> usize {
         row.wrapping_add_signed(self as isize)
@@ -49,28 +72,20 @@ pub struct Codes {
 }
 
 impl Codes {
-    /// `offsets` says where the neighbours of each row start, and the end. One parallel pass.
+    /// `offsets` says where the neighbours of each row start, and the end; `fill(i, neighbours)` names those of row
+    /// i. One parallel pass, two where a distance does not fit 16 bits.
     ///
     /// # Panics
-    /// If the offsets do not ascend from 0 to the number of neighbours, or a neighbour is no vertex.
-    pub(super) fn new(offsets: Vec<u32>, neighbours: Neighbours) -> Self {
-        let length = match &neighbours {
-            Neighbours::Near(near) => near.len(),
-            Neighbours::Far(far) => far.len(),
-        };
-        assert!(
-            offsets.first() == Some(&0)
-                && offsets.last().is_some_and(|&end| end as usize == length),
-            "offsets from 0 to the number of neighbours"
-        );
-        let reach = match &neighbours {
-            Neighbours::Near(near) => greatest_distance(&offsets, near),
-            Neighbours::Far(far) => greatest_distance(&offsets, far),
-        };
+    /// If the offsets do not ascend from 0, or a neighbour is no vertex.
+    pub(super) fn new(offsets: Vec<u32>, fill: impl Fn(usize, &mut [u32]) + Sync) -> Self {
+        assert!(offsets.first() == Some(&0), "offsets from 0");
+        let near = encode(&offsets, &fill).map(|(reach, near)| (reach, Neighbours::Near(near)));
+        let far = || encode(&offsets, &fill).map(|(reach, far)| (reach, Neighbours::Far(far)));
+        let (reach, neighbours) = near.or_else(far).expect("every distance has a code of 32 bits");
         Codes {
             offsets,
             neighbours,
-            reach,
+            reach: reach as usize,
         }
     }
 
@@ -126,6 +141,7 @@ impl Codes {
                 rows,
                 points,
                 start,
+                reach: self.reach,
             }),
             Neighbours::Far(codes) => Windows::Far(Window {
                 offsets,
@@ -133,28 +149,49 @@ impl Codes {
                 rows,
                 points,
                 start,
+                reach: self.reach,
             }),
         }
     }
 }
 
-/// Checks every neighbour.
-fn greatest_distance<C: Code>(offsets: &[u32], codes: &[C]) -> usize {
+/// The neighbours of all rows in one kind of code, and the greatest distance; `None` if that has no code.
+fn encode<C: Code>(
+    offsets: &[u32],
+    fill: &(impl Fn(usize, &mut [u32]) + Sync),
+) -> Option<(u32, Vec<C>)> {
     let n = offsets.len() - 1;
-    (0..n)
+    let mut codes = vec![C::default(); offsets[n] as usize];
+    let mut tasks = Vec::with_capacity(n.div_ceil(CHUNK));
+    let mut rest = codes.as_mut_slice();
+    for first in (0..n).step_by(CHUNK) {
+        let rows = first..(first + CHUNK).min(n);
+        let (part, after) = rest.split_at_mut((offsets[rows.end] - offsets[first]) as usize);
+        tasks.push((rows, part));
+        rest = after;
+    }
+    let reach = tasks
         .into_par_iter()
-        .with_min_len(CHUNK)
-        .map(|i| {
-            let mut reach = 0;
-            for c in &codes[offsets[i] as usize..offsets[i + 1] as usize] {
-                let j = c.place(i, 0);
-                assert!(j < n, "row {i} names a neighbour that is no vertex");
-                reach = reach.max(j.abs_diff(i));
+        .map_init(Vec::new, |neighbours, (rows, mut part)| {
+            let (mut reach, mut last) = (0, 0);
+            for i in rows {
+                let length = (offsets[i + 1] - offsets[i]) as usize;
+                neighbours.clear();
+                neighbours.resize(length, 0);
+                fill(i, neighbours);
+                let (row, after) = part.split_at_mut(length);
+                for (code, &j) in row.iter_mut().zip(&*neighbours) {
+                    reach = reach.max(j.abs_diff(i as u32));
+                    last = last.max(j);
+                    *code = C::new(i as u32, j);
+                }
+                part = after;
             }
-            reach
+            assert!((last as usize) < n, "a neighbour that is no vertex: {last}");
+            (reach <= C::REACH).then_some(reach)
         })
-        .max()
-        .unwrap_or(0)
+        .try_reduce(|| 0, |a, b| Some(a.max(b)))?;
+    Some((reach, codes))
 }
 
 /// The neighbours of one row.
@@ -177,6 +214,7 @@ pub(super) struct Window<'a, P, C> {
     rows: Range<usize>,
     points: &'a [P],
     start: usize,
+    reach: usize,
 }
 
 impl<'a, P: Point, C: Code> Window<'a, P, C> {
@@ -249,7 +287,11 @@ impl<'a, P: Point, C: Code> Window<'a, P, C> {
         let first = rows.start - self.start;
         let own = &self.points[first..][..rows.len()];
         let lists = codes.chunks_exact(length);
+        // The rows move on at one pace; what they read for the first time is as far ahead as they reach.
+        let front = first + self.reach + AHEAD / size_of::<P>();
         for (k, ((slot, &own), list)) in slots.zip(own).zip(lists).enumerate() {
+            prefetch(self.points, front + k);
+            prefetch(list, AHEAD / size_of::<C>());
             visit(slot, own, first + k, list);
         }
     }
@@ -277,32 +319,39 @@ impl<'a, P: Point, C: Code> Window<'a, P, C> {
 mod tests {
     use super::*;
 
-    /// A cycle of 10 vertices: the distances of the ends of the file do not fit a narrow band.
+    /// A cycle of `n` vertices: the distances of the ends of the file do not fit a narrow band.
+    fn cycle_of(n: u32) -> Codes {
+        let offsets = (0..=n).map(|i| 2 * i).collect();
+        Codes::new(offsets, |i, neighbours| {
+            neighbours.copy_from_slice(&[(i as u32 + 1) % n, (i as u32 + n - 1) % n]);
+        })
+    }
+
     fn cycle() -> Codes {
-        let near = (0..10i16).flat_map(|i| [(i + 1) % 10 - i, (i + 9) % 10 - i]);
-        Codes::new(
-            (0..=10).map(|i| 2 * i).collect(),
-            Neighbours::Near(near.collect()),
-        )
+        cycle_of(10)
     }
 
     #[test]
-    fn reach_is_the_greatest_distance_whatever_the_code() {
-        assert_eq!(cycle().reach(), 9);
-        let far = Codes::new(vec![0, 1, 2, 3], Neighbours::Far(vec![1, 2, 0]));
-        assert_eq!(far.reach(), 2);
+    fn codes_are_near_as_far_as_they_can() {
+        for (n, near) in [(10, true), (1 << 15, true), ((1 << 15) + 1, false)] {
+            let codes = cycle_of(n);
+            assert_eq!(codes.reach(), n as usize - 1);
+            assert_eq!(matches!(codes.neighbours(), Neighbours::Near(_)), near);
+            for i in [0, 1, n as usize - 1] {
+                let places: Vec<usize> = match codes.of_row(i) {
+                    Row::Near(row) => row.iter().map(|c| c.place(i, 0)).collect(),
+                    Row::Far(row) => row.iter().map(|c| c.place(i, 0)).collect(),
+                };
+                let n = n as usize;
+                assert_eq!(places, [(i + 1) % n, (i + n - 1) % n]);
+            }
+        }
     }
 
     #[test]
     #[should_panic(expected = "no vertex")]
     fn a_neighbour_beyond_the_last_vertex_is_refused() {
-        Codes::new(vec![0, 1, 2], Neighbours::Near(vec![1, 1]));
-    }
-
-    #[test]
-    #[should_panic(expected = "no vertex")]
-    fn a_neighbour_before_the_first_vertex_is_refused() {
-        Codes::new(vec![0, 1, 2], Neighbours::Near(vec![-1, -1]));
+        Codes::new(vec![0, 1, 2], |i, neighbours| neighbours[0] = i as u32 + 1);
     }
 
     #[test]

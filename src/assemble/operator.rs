@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::bounds::{SpectralBounds, usual_lambda_min};
-use super::codes::{Codes, Neighbours};
+use super::codes::Neighbours;
 use super::scheme::{Masks, Scheme};
 use super::source::Source;
 use super::stencil::{Kind, LargeFaces, Listed, Point, Stencil, runs};
@@ -103,10 +103,8 @@ impl Operator {
             .collect();
         let (mut listed, large) = source.listed(&kinds, &h);
         let offsets = source.offsets(&kinds, &listed)?;
-        let neighbours = match source.fill::<i16>(&kinds, &offsets, &listed) {
-            Some(near) => Neighbours::Near(near),
-            None => Neighbours::Far(source.fill(&kinds, &offsets, &listed).unwrap_or_default()),
-        };
+        let runs = runs(&kinds, &offsets);
+        let codes = source.codes(&kinds, offsets, &listed);
         listed.neighbours = Vec::new();
         let double = source.rings();
         let diagonal: Vec<f64> = (0..n)
@@ -121,8 +119,8 @@ impl Operator {
         let bounds = SpectralBounds::closed(scheme, &source.valences, triangles, &diagonal);
         Ok(Operator {
             stencil: Stencil {
-                runs: runs(&kinds, &offsets),
-                codes: Codes::new(offsets, neighbours),
+                runs,
+                codes,
                 kinds,
                 single: double.single(),
                 double,

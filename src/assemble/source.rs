@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::codes::Code;
+use super::codes::Codes;
 use super::scheme::{Masks, Scheme};
 use super::stencil::{Kind, LargeFaces, Listed, Ring, Rings};
 use super::system::FaceBlocks;
@@ -64,52 +64,6 @@ pub(super) struct Source<'a> {
     /// What the corners of a face that is not large add to each other.
     blocks: FaceBlocks,
     half_edge: f64,
-}
-
-/// A neighbour's code in a row, if it has one.
-pub(super) trait Encode: Code + Default {
-    fn encode(row: usize, neighbour: u32) -> Option<Self>;
-}
-
-impl Encode for u32 {
-    fn encode(_row: usize, neighbour: u32) -> Option<u32> {
-        Some(neighbour)
-    }
-}
-
-impl Encode for i16 {
-    fn encode(row: usize, neighbour: u32) -> Option<i16> {
-        i16::try_from(i64::from(neighbour) - row as i64).ok()
-    }
-}
-
-/// Fills the neighbours of all rows in parallel, unless `fill` of some row says `None`.
-pub(super) fn fill_rows<C: Encode>(
-    offsets: &[u32],
-    fill: impl Fn(usize, &mut [C]) -> Option<()> + Sync,
-) -> Option<Vec<C>> {
-    let n = offsets.len() - 1;
-    let mut codes = vec![C::default(); offsets[n] as usize];
-    let mut tasks = Vec::with_capacity(n.div_ceil(CHUNK));
-    let mut rest = codes.as_mut_slice();
-    for first in (0..n).step_by(CHUNK) {
-        let rows = first..(first + CHUNK).min(n);
-        let (part, after) = rest.split_at_mut((offsets[rows.end] - offsets[first]) as usize);
-        tasks.push((rows, part));
-        rest = after;
-    }
-    tasks
-        .into_par_iter()
-        .map(|(rows, mut part)| {
-            for i in rows {
-                let (row, after) = part.split_at_mut((offsets[i + 1] - offsets[i]) as usize);
-                fill(i, row)?;
-                part = after;
-            }
-            Some(())
-        })
-        .collect::<Option<()>>()?;
-    Some(codes)
 }
 
 impl<'a> Source<'a> {
@@ -249,35 +203,33 @@ impl<'a> Source<'a> {
         Ok(offsets)
     }
 
-    pub(super) fn fill<C: Encode>(
-        &self,
-        kinds: &[Kind],
-        offsets: &[u32],
-        listed: &Listed,
-    ) -> Option<Vec<C>> {
+    /// The neighbours of all rows.
+    pub(super) fn codes(&self, kinds: &[Kind], offsets: Vec<u32>, listed: &Listed) -> Codes {
         // Where all faces are of one size, the corners of a face take no look-up.
         match self.faces.uniform_size() {
-            Some(3) => self.fill_by(kinds, offsets, listed, |c| c / 3 * 3..c / 3 * 3 + 3),
-            Some(4) => self.fill_by(kinds, offsets, listed, |c| c / 4 * 4..c / 4 * 4 + 4),
-            _ => self.fill_by(kinds, offsets, listed, |c| {
+            Some(3) => self.codes_by(kinds, offsets, listed, |c| c / 3 * 3..c / 3 * 3 + 3),
+            Some(4) => self.codes_by(kinds, offsets, listed, |c| c / 4 * 4..c / 4 * 4 + 4),
+            _ => self.codes_by(kinds, offsets, listed, |c| {
                 self.faces.range(self.incidence.face_of(c as u32))
             }),
         }
     }
 
     /// `corners_by` tells the corners of the face of a corner.
-    fn fill_by<C: Encode>(
+    fn codes_by(
         &self,
         kinds: &[Kind],
-        offsets: &[u32],
+        offsets: Vec<u32>,
         listed: &Listed,
         corners_by: impl Fn(usize) -> Range<usize> + Sync,
-    ) -> Option<Vec<C>> {
+    ) -> Codes {
         let incidence = self.incidence;
         let corners = self.faces.corners();
-        fill_rows(offsets, |k, row: &mut [C]| {
+        Codes::new(offsets, |k, row| {
+            if let Some(numbering) = self.numbering {
+                incidence.fetch_ahead(self.faces, numbering.order(), k);
+            }
             let v = self.vertex(k);
-            let encode = |neighbour: u32| C::encode(k, self.row(neighbour));
             match kinds[k] {
                 Kind::Quads => {
                     let (edge, opposite) = row.split_at_mut(row.len() / 2);
@@ -286,8 +238,8 @@ impl<'a> Source<'a> {
                         let range = corners_by(c as usize);
                         let place = c as usize - range.start;
                         let face = &corners[range];
-                        *edge = encode(face[(place + 1) % 4])?;
-                        *opposite = encode(face[(place + 2) % 4])?;
+                        *edge = self.row(face[(place + 1) % 4]);
+                        *opposite = self.row(face[(place + 2) % 4]);
                     }
                 }
                 Kind::Edges => {
@@ -297,23 +249,22 @@ impl<'a> Source<'a> {
                         let range = corners_by(c as usize);
                         let into = prev_in(&range, c);
                         if let Some(slot) = slots.next() {
-                            *slot = encode(corners[next_in(&range, c) as usize])?;
+                            *slot = self.row(corners[next_in(&range, c) as usize]);
                         }
                         if let Some(topology) = self.open
                             && topology.twin(into).is_none()
                             && let Some(slot) = slots.next()
                         {
-                            *slot = encode(corners[into as usize])?;
+                            *slot = self.row(corners[into as usize]);
                         }
                     }
                 }
                 Kind::Listed => {
                     for (slot, &w) in row.iter_mut().zip(&listed.neighbours[listed.entries(k)]) {
-                        *slot = encode(w)?;
+                        *slot = self.row(w);
                     }
                 }
             }
-            Some(())
         })
     }
 

@@ -413,6 +413,8 @@ fn search(
         end += usize::from(vertices.meet(seed));
         while next < end {
             let v = order[next];
+            // Places of the queue that are not taken yet hold a vertex too.
+            incidence.fetch_ahead(faces, &order, next);
             next += 1;
             for &c in incidence.corners_at(v as usize) {
                 let (f, range) = face_at(c as usize);
