@@ -1,5 +1,7 @@
 //! The matrix-free twin of [`LimitSystem`](super::LimitSystem): A, M and D⁻¹A from connectivity alone.
 
+use std::sync::OnceLock;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -27,8 +29,11 @@ const CHUNK: usize = 4096;
 #[derive(Clone, Debug)]
 pub struct Operator {
     pub(super) stencil: Stencil,
+    /// h by valence.
     h: Vec<f64>,
-    diagonal: Vec<f64>,
+    /// h and a_ii by row, of use to some methods only: made when first asked for.
+    weights: OnceLock<Vec<f64>>,
+    diagonal: OnceLock<Vec<f64>>,
     bounds: SpectralBounds,
     usual_lambda_min: f64,
 }
@@ -58,11 +63,13 @@ impl Operator {
     ) -> Result<Self> {
         check_boundary(topology, scheme)?;
         let open = (topology.boundary_edges() > 0).then_some(topology);
-        let mut operator = Self::build(faces, (&topology.incidence, open), scheme, numbering)?;
-        if !topology.is_closed() {
-            operator.bounds = SpectralBounds::gershgorin(&operator.diagonal);
-        }
-        Ok(operator)
+        Self::build(
+            faces,
+            (&topology.incidence, open),
+            topology.is_closed(),
+            scheme,
+            numbering,
+        )
     }
 
     /// As [`in_order`](Self::in_order), on a mesh that is [closed](Incidence::is_closed): a topology is not needed.
@@ -78,28 +85,22 @@ impl Operator {
         scheme: Scheme,
         numbering: Option<&Numbering>,
     ) -> Result<Self> {
-        Self::build(faces, (incidence, None), scheme, numbering)
+        Self::build(faces, (incidence, None), true, scheme, numbering)
     }
 
     fn build(
         faces: &Faces,
         sides: (&Incidence, Option<&Topology>),
+        closed: bool,
         scheme: Scheme,
         numbering: Option<&Numbering>,
     ) -> Result<Self> {
         check_faces(faces, scheme)?;
         let source = Source::new(faces, sides, scheme, numbering);
-        let n = source.valences.len();
         let kinds = source.kinds();
         let greatest = source.valences.iter().copied().max().unwrap_or(0);
-        let by_valence: Vec<f64> = (0..=greatest)
+        let h: Vec<f64> = (0..=greatest)
             .map(|n| scheme.h(n.max(1) as usize))
-            .collect();
-        let h: Vec<f64> = source
-            .valences
-            .par_iter()
-            .with_min_len(CHUNK)
-            .map(|&n| by_valence[n as usize])
             .collect();
         let (mut listed, large) = source.listed(&kinds, &h);
         let offsets = source.offsets(&kinds, &listed)?;
@@ -107,28 +108,38 @@ impl Operator {
         let codes = source.codes(&kinds, offsets, &listed);
         listed.neighbours = Vec::new();
         let double = source.rings();
-        let diagonal: Vec<f64> = (0..n)
+        let stencil = Stencil {
+            runs,
+            codes,
+            kinds,
+            single: double.single(),
+            double,
+            listed,
+            large,
+        };
+        // Rows of a run that is not listed are alike.
+        let (valences, diagonal): (Vec<u32>, Vec<f64>) = (0..stencil.runs.len())
             .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(|i| match kinds[i] {
-                Kind::Listed => listed.diagonal(i, &large),
-                kind => double.own(kind, source.valences[i] as usize),
+            .flat_map_iter(|k| {
+                let run = stencil.run(k);
+                match stencil.kinds[run.start] {
+                    Kind::Listed => run,
+                    _ => run.start..run.start + 1,
+                }
             })
-            .collect();
+            .map(|i| (source.valences[i], stencil.diagonal(i)))
+            .unzip();
         let triangles = faces.uniform_size() == Some(3);
-        let bounds = SpectralBounds::closed(scheme, &source.valences, triangles, &diagonal);
+        let bounds = if closed {
+            SpectralBounds::closed(scheme, &valences, triangles, &diagonal)
+        } else {
+            SpectralBounds::gershgorin(&diagonal)
+        };
         Ok(Operator {
-            stencil: Stencil {
-                runs,
-                codes,
-                kinds,
-                single: double.single(),
-                double,
-                listed,
-                large,
-            },
+            stencil,
             h,
-            diagonal,
+            weights: OnceLock::new(),
+            diagonal: OnceLock::new(),
             bounds,
             usual_lambda_min: usual_lambda_min(scheme),
         })
@@ -136,21 +147,35 @@ impl Operator {
 
     /// The number of vertices N.
     pub fn len(&self) -> usize {
-        self.h.len()
+        self.stencil.codes.rows()
     }
 
     pub fn is_empty(&self) -> bool {
-        self.h.is_empty()
+        self.len() == 0
     }
 
     /// The diagonal of H.
     pub fn weights(&self) -> &[f64] {
-        &self.h
+        self.weights.get_or_init(|| self.by_row(|i| self.weight(i)))
     }
 
     /// diag A.
     pub fn diagonal(&self) -> &[f64] {
-        &self.diagonal
+        self.diagonal
+            .get_or_init(|| self.by_row(|i| self.stencil.diagonal(i)))
+    }
+
+    fn by_row(&self, value: impl Fn(usize) -> f64 + Send + Sync) -> Vec<f64> {
+        let rows = (0..self.len()).into_par_iter().with_min_len(CHUNK);
+        rows.map(value).collect()
+    }
+
+    /// h_i.
+    fn weight(&self, i: usize) -> f64 {
+        match self.stencil.valence(i) {
+            Some(n) => self.h[n],
+            None => self.stencil.listed.weight(i),
+        }
     }
 
     /// What valences and face sizes prove about the spectrum of A.
@@ -181,12 +206,12 @@ impl Operator {
 
     /// (M x)_i = (A x)_i / h_i.
     pub fn symmetric_row(&self, i: usize, x: &[DVec3]) -> DVec3 {
-        self.row(i, x) / self.h[i]
+        self.row(i, x) / self.weight(i)
     }
 
     /// (D⁻¹A x)_i, D = diag A.
     pub fn jacobi_row(&self, i: usize, x: &[DVec3]) -> DVec3 {
-        self.row(i, x) / self.diagonal[i]
+        self.row(i, x) / self.stencil.diagonal(i)
     }
 
     /// Calls `visit(j, a_ij)` for every neighbour j ≠ i of vertex `i`; a vertex that is joined to `i` more than once
@@ -310,7 +335,13 @@ impl Listed {
         }
     }
 
-    fn diagonal(&self, i: usize, large: &LargeFaces) -> f64 {
+    /// h of listed row `i`.
+    fn weight(&self, i: usize) -> f64 {
+        self.h[self.slots[i] as usize]
+    }
+
+    /// a_ii of listed row `i`.
+    pub(super) fn diagonal(&self, i: usize, large: &LargeFaces) -> f64 {
         let slot = self.slots[i] as usize;
         let faces: f64 = self
             .large_at(i)

@@ -330,6 +330,7 @@ impl<'a> Source<'a> {
         }
     }
 
+    /// The listed rows; `h` by valence.
     pub(super) fn listed(&self, kinds: &[Kind], h: &[f64]) -> (Listed, LargeFaces) {
         let mut large = LargeFaces {
             offsets: vec![0],
@@ -347,9 +348,10 @@ impl<'a> Source<'a> {
         let listed = Listed::collect(kinds, |k, listed, scratch| {
             let v = self.vertex(k);
             let own = self.list(v, self.valences[k], scratch);
-            listed.own.push(h[k] * own);
-            listed.h.push(h[k]);
-            listed.weights.extend(scratch.iter().map(|e| h[k] * e.1));
+            let h = h[self.valences[k] as usize];
+            listed.own.push(h * own);
+            listed.h.push(h);
+            listed.weights.extend(scratch.iter().map(|e| h * e.1));
             listed.neighbours.extend(scratch.iter().map(|e| e.0));
             for &c in incidence.corners_at(v) {
                 let f = incidence.face_of(c);

@@ -135,14 +135,6 @@ impl Rings<f64> {
             edges: single(&self.edges),
         }
     }
-
-    pub(super) fn own(&self, kind: Kind, valence: usize) -> f64 {
-        match kind {
-            Kind::Quads => self.quads[valence].own,
-            Kind::Edges => self.edges[valence].own,
-            Kind::Listed => f64::NAN,
-        }
-    }
 }
 
 /// How the weights of a row are known.
@@ -266,6 +258,32 @@ pub(super) fn runs(kinds: &[Kind], offsets: &[u32]) -> Vec<u32> {
 }
 
 impl Stencil {
+    /// The rows of run `k`.
+    pub(super) fn run(&self, k: usize) -> Range<usize> {
+        let end = self.runs.get(k + 1).map_or(self.kinds.len(), |&r| r as usize);
+        self.runs[k] as usize..end
+    }
+
+    /// The valence of row `i`, unless it is listed.
+    pub(super) fn valence(&self, i: usize) -> Option<usize> {
+        let offsets = self.codes.offsets();
+        let length = (offsets[i + 1] - offsets[i]) as usize;
+        match self.kinds[i] {
+            Kind::Quads => Some(length / 2),
+            Kind::Edges => Some(length),
+            Kind::Listed => None,
+        }
+    }
+
+    /// a_ii.
+    pub(super) fn diagonal(&self, i: usize) -> f64 {
+        match (self.kinds[i], self.valence(i)) {
+            (Kind::Quads, Some(n)) => self.double.quads[n].own,
+            (_, Some(n)) => self.double.edges[n].own,
+            (_, None) => self.listed.diagonal(i, &self.large),
+        }
+    }
+
     /// The moments of all large faces, for the passes over rows that follow; empty without large faces.
     pub(super) fn moments<P: Point>(&self, x: &[P], moments: &mut Vec<[P; 3]>) {
         moments.clear();

@@ -433,24 +433,46 @@ fn search(
 }
 
 /// An order for sweeps that share passes over memory: [breadth first](breadth_first), so that neighbours lie within
-/// a narrow band, and among 256 consecutive vertices by their number of faces and of those faces' corners, so that
+/// a narrow band, and among 256 consecutive vertices by their number of faces and the kind of these, so that
 /// rows of one kind follow each other: few enough to leave the band narrow, enough for a branch predictor (tuned).
 pub fn in_fronts(faces: &Faces, incidence: &Incidence) -> Numbering {
     const GROUP: usize = 256;
-    let mut order = breadth_first(faces, incidence);
+    /// Larger numbers of faces count as one.
+    const MOST: usize = 15;
     let uniform = faces.uniform_size().is_some();
+    let key = |v: u32| {
+        let at = incidence.corners_at(v as usize);
+        let kind = if uniform {
+            0
+        } else {
+            // Triangles only; quads only, as a rule; between these; larger faces.
+            let sizes = at.iter().map(|&c| faces.range(incidence.face_of(c)).len());
+            let beyond_triangles = sizes.sum::<usize>().saturating_sub(3 * at.len());
+            match beyond_triangles {
+                0 => 0,
+                b if b == at.len() => 1,
+                b if b < at.len() => 2,
+                _ => 3,
+            }
+        };
+        4 * at.len().min(MOST) + kind
+    };
+    let mut order = breadth_first(faces, incidence);
     order.par_chunks_mut(GROUP).for_each(|group| {
-        group.sort_by_key(|&v| {
-            let at = incidence.corners_at(v as usize);
-            let corners = if uniform {
-                0
-            } else {
-                at.iter()
-                    .map(|&c| faces.range(incidence.face_of(c)).len())
-                    .sum()
-            };
-            (at.len(), corners)
-        });
+        let mut vertices = [(0, 0); GROUP];
+        let vertices = &mut vertices[..group.len()];
+        let mut starts = [0; 4 * MOST + 5];
+        for (slot, &v) in vertices.iter_mut().zip(&*group) {
+            *slot = (v, key(v));
+            starts[slot.1 + 1] += 1;
+        }
+        for k in 1..starts.len() {
+            starts[k] += starts[k - 1];
+        }
+        for &(v, key) in &*vertices {
+            group[starts[key]] = v;
+            starts[key] += 1;
+        }
     });
     Numbering::new(order)
 }
