@@ -17,6 +17,7 @@ use super::chebyshev::Recurrence;
 use super::gauss_seidel::sweep;
 use crate::assemble::Operator;
 use crate::assemble::stencil::Point;
+use crate::prefetch::prefetch;
 
 /// Iterations of one group: they share a pass over memory. Tuned: twice as many no longer fit the last-level cache
 /// of the machine at hand for 10⁶ vertices.
@@ -26,6 +27,7 @@ const CHUNK: usize = 4096;
 /// Rows of one task in a group: short tasks end together, so that no thread waits long enough to fall asleep, which
 /// costs more than a task. Tuned.
 const PIECE: usize = 2048;
+const AHEAD: usize = 32;
 /// Below, all arrays stay in cache anyhow, and iterations go one after the other.
 const SMALL: usize = 100_000;
 
@@ -231,7 +233,11 @@ impl<'a> Wavefront<'a> {
                 let out = out.split_off_mut(..count).unwrap_or_default();
                 out.iter_mut().zip(r.split_off(..count).unwrap_or_default())
             },
-            |(out, &r), v, ax| *out = v + (v - *out).times(gamma) + (r - ax).times(tau),
+            |(out, r), v, ax| {
+                prefetch(std::slice::from_ref(out), AHEAD);
+                prefetch(std::slice::from_ref(r), AHEAD);
+                *out = v + (v - *out).times(gamma) + (*r - ax).times(tau);
+            },
         );
     }
 }
