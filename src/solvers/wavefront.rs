@@ -19,9 +19,10 @@ use crate::assemble::Operator;
 use crate::assemble::stencil::Point;
 use crate::prefetch::prefetch;
 
-/// Iterations of one group: they share a pass over memory. Tuned: twice as many no longer fit the last-level cache
-/// of the machine at hand for 10⁶ vertices.
-const GROUP: usize = 8;
+/// Iterations of one group, which share a pass over memory, at the most.
+const GROUP: usize = 16;
+/// Bytes that a group may keep between its first iteration and its last: a part of a usual last-level cache.
+const CACHE: usize = 1 << 24;
 /// Rows of one task where iterations go one after the other, and of a band at the least.
 const CHUNK: usize = 4096;
 /// Rows of one task in a group: short tasks end together, so that no thread waits long enough to fall asleep, which
@@ -56,7 +57,7 @@ impl<'a> Wavefront<'a> {
         let band = operator
             .reach()
             .map(|reach| reach.max(CHUNK))
-            .filter(|band| n >= SMALL && n / band >= 2 * GROUP);
+            .filter(|band| n >= SMALL && n / band >= GROUP);
         Wavefront { operator, band }
     }
 
@@ -76,7 +77,7 @@ impl<'a> Wavefront<'a> {
     /// a multiple of `r` and must be in `x` already: `x = τ₀ r` with the recurrence's first coefficient. The last
     /// iterate is returned in `x`; `other` is overwritten.
     ///
-    /// Reads, for each group of `GROUP` iterations, the operator, `r` and both iterates once from memory.
+    /// Reads, for each group of up to 16 iterations, the operator, `r` and both iterates once from memory.
     ///
     /// # Panics
     /// If the arrays have not one point a vertex.
@@ -100,7 +101,7 @@ impl<'a> Wavefront<'a> {
                 recurrence.coefficients()
             })
             .collect();
-        let length = if self.band.is_some() { GROUP } else { 1 };
+        let length = self.band.map_or(1, |band| self.group_length::<P>(2 * band));
         for group in coefficients.chunks(length) {
             match self.band {
                 Some(band) => self.group(band, group, r, x, other),
@@ -132,8 +133,9 @@ impl<'a> Wavefront<'a> {
         let diagonal = self.operator.diagonal();
         let bands = n.div_ceil(band);
         let at = |j: usize| (j * band).min(n);
-        for first in (0..count).step_by(GROUP) {
-            let sweeps = GROUP.min(count - first);
+        let length = self.group_length::<DVec3>(3 * band);
+        for first in (0..count).step_by(length) {
+            let sweeps = length.min(count - first);
             for wave in 0..bands + 3 * (sweeps - 1) {
                 let mut rest = (&mut *x, 0);
                 let tasks: Vec<_> = (0..sweeps)
@@ -156,6 +158,13 @@ impl<'a> Wavefront<'a> {
                     });
             }
         }
+    }
+
+    /// How many iterations fit the cache if each is `lag` rows behind the one before it.
+    fn group_length<P>(&self, lag: usize) -> usize {
+        // Two iterates, the right-hand side, the operator.
+        let row = 3 * size_of::<P>() + self.operator.sweep_bytes() / self.operator.len().max(1);
+        (CACHE / (lag * row)).clamp(2, GROUP)
     }
 
     /// One iteration: `other` becomes the next one after `x`.
