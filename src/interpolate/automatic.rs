@@ -106,9 +106,12 @@ fn in_order(
     let moved = numbering.as_ref().map(|n| n.there(&mesh.positions));
     let points = moved.as_ref().unwrap_or(&mesh.positions);
     let (method, control, report) = iterate(&operator, points, stop);
-    let points = match &numbering {
-        Some(numbering) => numbering.back(&control),
-        None => control,
+    let points = match (numbering, moved) {
+        (Some(numbering), Some(mut points)) => {
+            numbering.back_into(&control, &mut points);
+            points
+        }
+        _ => control,
     };
     Ok(Automatic {
         points,

@@ -194,6 +194,19 @@ impl Numbering {
     pub fn back<T: Copy + Send + Sync>(&self, values: &[T]) -> Vec<T> {
         gather(values, &self.place)
     }
+
+    /// As [`back`](Self::back), into memory that is there already: fresh pages cost more than the copy.
+    ///
+    /// # Panics
+    /// If there is not one value, and one place in `out`, a vertex.
+    pub fn back_into<T: Copy + Send + Sync>(&self, values: &[T], out: &mut [T]) {
+        let n = self.place.len();
+        assert!(values.len() == n && out.len() == n, "one value a vertex");
+        out.par_iter_mut()
+            .zip(&self.place)
+            .with_min_len(4096)
+            .for_each(|(out, &k)| *out = values[k as usize]);
+    }
 }
 
 /// The k-th is `values[order[k]]`.
