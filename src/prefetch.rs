@@ -3,6 +3,9 @@
 //! Sweeps over rows, and walks over a mesh, know long before what they are going to read. Told of it, the processor
 //! fetches it while it works on something else; left alone, it stands still for each line of memory.
 
+/// Points between the one that a sweep works on and the one that it fetches. Tuned.
+pub const POINTS_AHEAD: usize = 32;
+
 /// Fetches the line of memory where `slice[i]` begins; `i` may lie beyond the end. Without a meaning for the result of
 /// a program, and without an effect on processors other than x86-64.
 #[inline(always)]

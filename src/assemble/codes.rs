@@ -81,7 +81,9 @@ impl Codes {
         assert!(offsets.first() == Some(&0), "offsets from 0");
         let near = encode(&offsets, &fill).map(|(reach, near)| (reach, Neighbours::Near(near)));
         let far = || encode(&offsets, &fill).map(|(reach, far)| (reach, Neighbours::Far(far)));
-        let (reach, neighbours) = near.or_else(far).expect("every distance has a code of 32 bits");
+        let (reach, neighbours) = near
+            .or_else(far)
+            .expect("every distance has a code of 32 bits");
         Codes {
             offsets,
             neighbours,

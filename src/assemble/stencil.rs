@@ -260,7 +260,10 @@ pub(super) fn runs(kinds: &[Kind], offsets: &[u32]) -> Vec<u32> {
 impl Stencil {
     /// The rows of run `k`.
     pub(super) fn run(&self, k: usize) -> Range<usize> {
-        let end = self.runs.get(k + 1).map_or(self.kinds.len(), |&r| r as usize);
+        let end = self
+            .runs
+            .get(k + 1)
+            .map_or(self.kinds.len(), |&r| r as usize);
         self.runs[k] as usize..end
     }
 

@@ -13,10 +13,9 @@ use super::iteration::{Errors, Outcome, Report, Stop};
 use super::system::Rows;
 use super::wavefront::Wavefront;
 use crate::assemble::Operator;
-use crate::prefetch::prefetch;
+use crate::prefetch::{POINTS_AHEAD, prefetch};
 
 /// A correction in single precision is not asked for more than this: half a digit above its rounding.
-const AHEAD: usize = 32;
 const GAIN: f64 = 2e-6;
 /// Iterations of the last correction beyond those promised, since the promise is in another norm than the test.
 const SPARE: usize = 1;
@@ -86,9 +85,9 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
                 &mut residual,
                 &mut correction,
                 |i, ax, r, d, tally| {
-                    prefetch(points, i + AHEAD);
-                    prefetch(std::slice::from_ref(r), AHEAD);
-                    prefetch(std::slice::from_ref(d), AHEAD);
+                    prefetch(points, i + POINTS_AHEAD);
+                    prefetch(std::slice::from_ref(r), POINTS_AHEAD);
+                    prefetch(std::slice::from_ref(d), POINTS_AHEAD);
                     let e = points[i] - ax;
                     tally.error(e);
                     *r = (e / unit).as_vec3a();

@@ -17,7 +17,7 @@ use super::chebyshev::Recurrence;
 use super::gauss_seidel::sweep;
 use crate::assemble::Operator;
 use crate::assemble::stencil::Point;
-use crate::prefetch::prefetch;
+use crate::prefetch::{POINTS_AHEAD, prefetch};
 
 /// Iterations of one group, which share a pass over memory, at the most.
 const GROUP: usize = 16;
@@ -28,7 +28,6 @@ const CHUNK: usize = 4096;
 /// Rows of one task in a group: short tasks end together, so that no thread waits long enough to fall asleep, which
 /// costs more than a task. Tuned.
 const PIECE: usize = 2048;
-const AHEAD: usize = 32;
 /// Below, all arrays stay in cache anyhow, and iterations go one after the other.
 const SMALL: usize = 100_000;
 
@@ -243,8 +242,8 @@ impl<'a> Wavefront<'a> {
                 out.iter_mut().zip(r.split_off(..count).unwrap_or_default())
             },
             |(out, r), v, ax| {
-                prefetch(std::slice::from_ref(out), AHEAD);
-                prefetch(std::slice::from_ref(r), AHEAD);
+                prefetch(std::slice::from_ref(out), POINTS_AHEAD);
+                prefetch(std::slice::from_ref(r), POINTS_AHEAD);
                 *out = v + (v - *out).times(gamma) + (*r - ax).times(tau);
             },
         );
