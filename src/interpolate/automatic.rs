@@ -7,8 +7,8 @@
 //! - *Order.* A file whose vertices lie [scattered](is_scattered) is renumbered along a space-filling curve before
 //!   anything else touches its faces. From [`ORDERED`] vertices on, the rows of the operator are [breadth
 //!   first](in_fronts), which gives it the narrow band that groups of iterations need, unless so few iterations are to
-//!   be expected (Nasri, Zheng-Cai) that this does not pay. Below, all arrays fit the second-level cache in any order.
-//!   Results come back in file order.
+//!   be expected (Nasri, Zheng-Cai) that this does not pay. Below, all arrays fit the second-level cache in any order,
+//!   and rows are [grouped by kind](in_kinds) only. Results come back in file order.
 //! - *Bounds.* The interval starts at what λ_min usually is, or at the proven bound where that is higher; a correction
 //!   that gains less than promised stretches it, down to the proven bound at the most.
 //! - *Hard cases.* If that does not converge (λ_min below 10⁻⁴, a singular matrix), conjugate gradients on the same
@@ -24,13 +24,13 @@ use glam::DVec3;
 use crate::assemble::bounds::usual_lambda_min;
 use crate::assemble::{Operator, Scheme};
 use crate::error::Result;
-use crate::mesh::order::{Numbering, along_curve, in_fronts, is_scattered};
+use crate::mesh::order::{Numbering, along_curve, in_fronts, in_kinds, is_scattered};
 use crate::mesh::{Incidence, Mesh, Topology};
 use crate::solvers::chebyshev::promised_iterations;
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::{Iterate, Method, Outcome, Report, Stop, mixed, solve};
 
-/// From this many vertices on, the operator is renumbered. Tuned.
+/// From this many vertices on, the operator is renumbered breadth first. Tuned.
 pub const ORDERED: usize = 50_000;
 /// So many iterations pay for renumbering. Tuned.
 const MANY: f64 = 17.0;
@@ -139,9 +139,15 @@ fn operator(
     };
     let expected = promised_iterations((usual_lambda_min(scheme), 1.0), TYPICAL_REDUCTION);
     let renumber = mesh.len() >= ORDERED && expected >= MANY;
-    let in_fronts = || renumber.then(|| in_fronts(&mesh.faces, incidence));
+    let number = || {
+        if renumber {
+            Some(in_fronts(&mesh.faces, incidence))
+        } else {
+            in_kinds(&mesh.faces, incidence)
+        }
+    };
     // The search occupies one thread.
-    let (numbering, closed) = rayon::join(in_fronts, || {
+    let (numbering, closed) = rayon::join(number, || {
         topology.is_some() || incidence.is_closed(&mesh.faces)
     });
     let rows = numbering.as_ref();

@@ -446,9 +446,24 @@ fn search(
 }
 
 /// An order for sweeps that share passes over memory: [breadth first](breadth_first), so that neighbours lie within
-/// a narrow band, and among 256 consecutive vertices by their number of faces and the kind of these, so that
-/// rows of one kind follow each other: few enough to leave the band narrow, enough for a branch predictor (tuned).
+/// a narrow band, and [rows of one kind](in_kinds) together.
 pub fn in_fronts(faces: &Faces, incidence: &Incidence) -> Numbering {
+    let mut order = breadth_first(faces, incidence);
+    group_kinds(faces, incidence, &mut order);
+    Numbering::new(order)
+}
+
+/// The file's order, but with rows of one kind together: each 256 consecutive vertices by their number of faces and the
+/// kind of these. Few enough to leave neighbours near, enough for a branch predictor (tuned). `None` where the file is
+/// like this already. O(corners), in parallel.
+pub fn in_kinds(faces: &Faces, incidence: &Incidence) -> Option<Numbering> {
+    let mut order: Vec<u32> = (0..incidence.vertices() as u32).collect();
+    group_kinds(faces, incidence, &mut order);
+    (!order.is_sorted()).then(|| Numbering::new(order))
+}
+
+/// Sorts each 256 consecutive vertices by kind, those of one kind left as they come.
+fn group_kinds(faces: &Faces, incidence: &Incidence, order: &mut [u32]) {
     const GROUP: usize = 256;
     /// Larger numbers of faces count as one.
     const MOST: usize = 15;
@@ -470,7 +485,6 @@ pub fn in_fronts(faces: &Faces, incidence: &Incidence) -> Numbering {
         };
         4 * at.len().min(MOST) + kind
     };
-    let mut order = breadth_first(faces, incidence);
     order.par_chunks_mut(GROUP).for_each(|group| {
         let mut vertices = [(0, 0); GROUP];
         let vertices = &mut vertices[..group.len()];
@@ -487,7 +501,6 @@ pub fn in_fronts(faces: &Faces, incidence: &Incidence) -> Numbering {
             starts[key] += 1;
         }
     });
-    Numbering::new(order)
 }
 
 /// Searches over vertices that share a face. Every face is opened once, so large faces cost no more than their
