@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::CommonFlags;
 use crate::assemble::{LimitSystem, Scheme};
 use crate::error::{Error, Result};
-use crate::interpolate::automatic::ORDERED;
+use crate::interpolate::automatic::SCATTERED;
 use crate::mesh::io::{self, Loaded};
 use crate::mesh::noise::{Noise, add_noise};
 use crate::mesh::order::{along_curve, is_scattered};
@@ -144,7 +144,7 @@ impl MeshFlags {
             .as_ref()
             .map(|l| (l.vertices.as_slice(), l.faces.as_slice()));
         let mesh = &loaded.mesh;
-        if mesh.len() >= ORDERED && is_scattered(&mesh.faces) {
+        if mesh.len() >= SCATTERED && is_scattered(&mesh.faces) {
             // Looking for what is not there is many times faster on a renumbered copy. What is there needs the
             // file's own numbers.
             if let Some((moved, _)) = along_curve(mesh) {

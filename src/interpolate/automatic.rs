@@ -5,10 +5,9 @@
 //! iterations share passes over memory, and it moves half the bytes. What varies:
 //!
 //! - *Order.* A file whose vertices lie [scattered](is_scattered) is renumbered along a space-filling curve before
-//!   anything else touches its faces. From [`ORDERED`] vertices on, the rows of the operator are [breadth
-//!   first](in_fronts), which gives it the narrow band that groups of iterations need, unless so few iterations are to
-//!   be expected (Nasri, Zheng-Cai) that this does not pay. Below, all arrays fit the second-level cache in any order,
-//!   and rows are [grouped by kind](in_kinds) only. Results come back in file order.
+//!   anything else touches its faces, from [`SCATTERED`] vertices on. From [`ORDERED`] vertices on, the rows of the
+//!   operator are [breadth first](in_fronts), which gives it the narrow band that groups of iterations need. Below, all
+//!   arrays stay in cache in any order, and rows are [grouped by kind](in_kinds) only. Results come back in file order.
 //! - *Bounds.* The interval starts at what λ_min usually is, or at the proven bound where that is higher; a correction
 //!   that gains less than promised stretches it, down to the proven bound at the most.
 //! - *Hard cases.* If that does not converge (λ_min below 10⁻⁴, a singular matrix), conjugate gradients on the same
@@ -21,21 +20,17 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use crate::assemble::bounds::usual_lambda_min;
 use crate::assemble::{Operator, Scheme};
 use crate::error::Result;
 use crate::mesh::order::{Numbering, along_curve, in_fronts, in_kinds, is_scattered};
 use crate::mesh::{Incidence, Mesh, Topology};
-use crate::solvers::chebyshev::promised_iterations;
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::{Iterate, Method, Outcome, Report, Stop, mixed, solve};
 
-/// From this many vertices on, the operator is renumbered breadth first. Tuned.
-pub const ORDERED: usize = 50_000;
-/// So many iterations pay for renumbering. Tuned.
-const MANY: f64 = 17.0;
-/// What iterations are usually asked for: from the first error of noisy points to a tolerance of 10⁻¹⁰ L.
-const TYPICAL_REDUCTION: f64 = 1e-7;
+/// From this many vertices on, a scattered file is renumbered. Tuned.
+pub const SCATTERED: usize = 50_000;
+/// From this many vertices on, the rows of the operator are breadth first. Tuned.
+pub const ORDERED: usize = 200_000;
 
 /// Control points, how they came about and what it cost.
 #[derive(Clone, Debug)]
@@ -78,7 +73,7 @@ pub fn control_points(
     stop: &Stop,
 ) -> Result<Automatic> {
     let start = Instant::now();
-    if mesh.len() >= ORDERED
+    if mesh.len() >= SCATTERED
         && is_scattered(&mesh.faces)
         && let Some((moved, numbering)) = along_curve(mesh)
     {
@@ -137,10 +132,8 @@ fn operator(
             &own
         }
     };
-    let expected = promised_iterations((usual_lambda_min(scheme), 1.0), TYPICAL_REDUCTION);
-    let renumber = mesh.len() >= ORDERED && expected >= MANY;
     let number = || {
-        if renumber {
+        if mesh.len() >= ORDERED {
             Some(in_fronts(&mesh.faces, incidence))
         } else {
             in_kinds(&mesh.faces, incidence)

@@ -271,12 +271,12 @@ pub fn is_scattered(faces: &Faces) -> bool {
     f64::from(near) < NEAR_SHARE * f64::from(fresh)
 }
 
-/// The mesh with its vertices along Morton's curve, its faces by smallest vertex, and that numbering. Every later pass over the mesh then runs through memory almost in order.
-/// `None` if a face names a vertex that does not exist. One parallel sort of the vertices, one counting sort of the
-/// faces.
+/// The mesh with its vertices along Morton's curve through the cells of a grid of 64³, its faces by smallest vertex, and
+/// that numbering. Every later pass over the mesh then runs through memory almost in order.
+/// `None` if a face names a vertex that does not exist. Two counting sorts, of vertices and of faces.
 pub fn along_curve(mesh: &Mesh) -> Option<(Mesh, Numbering)> {
     let n = mesh.len();
-    let numbering = Numbering::new(morton(&mesh.positions));
+    let numbering = Numbering::new(morton_cells(&mesh.positions));
     let place = numbering.place();
     let corners: Option<Vec<u32>> = mesh
         .faces
@@ -335,25 +335,10 @@ fn counting_sort(keys: &[u32], end: usize) -> Vec<u32> {
 
 /// One counting sort by the highest bits of the codes, and a sort of each of the short lists that this gives.
 fn morton(positions: &[DVec3]) -> Vec<u32> {
-    const CELLS: f64 = ((1u64 << 21) - 1) as f64;
     /// Bits of a coordinate that the counting sort looks at.
     const FIRST: u32 = 5;
-    let (low, high) = bounding_box(positions).unwrap_or((DVec3::ZERO, DVec3::ZERO));
-    let scale = CELLS / (high - low).max_element().max(f64::MIN_POSITIVE);
-    let codes: Vec<u64> = positions
-        .par_iter()
-        .with_min_len(8192)
-        .map(|&p| {
-            // A coordinate that is not a number becomes 0.
-            let cell = ((p - low) * scale).to_array().map(|x| spread(x as u64));
-            cell[0] | cell[1] << 1 | cell[2] << 2
-        })
-        .collect();
-    let highest: Vec<u32> = codes
-        .par_iter()
-        .with_min_len(8192)
-        .map(|code| (code >> (3 * (21 - FIRST))) as u32)
-        .collect();
+    let codes = morton_codes(positions, |code| code);
+    let highest = morton_codes(positions, |code| (code >> (3 * (21 - FIRST))) as u32);
     let mut order = counting_sort(&highest, 1 << (3 * FIRST));
     let mut lists: Vec<&mut [u32]> = order
         .chunk_by_mut(|&v, &w| highest[v as usize] == highest[w as usize])
@@ -362,6 +347,29 @@ fn morton(positions: &[DVec3]) -> Vec<u32> {
         list.sort_unstable_by_key(|&v| (codes[v as usize], v));
     });
     order
+}
+
+/// The positions by the cells of a grid of 64³ along the curve, within a cell as they come: near enough for memory.
+fn morton_cells(positions: &[DVec3]) -> Vec<u32> {
+    const BITS: u32 = 6;
+    let cells = morton_codes(positions, |code| (code >> (3 * (21 - BITS))) as u32);
+    counting_sort(&cells, 1 << (3 * BITS))
+}
+
+/// `take` of the place of every position along the curve, 21 bits a coordinate.
+fn morton_codes<T: Send>(positions: &[DVec3], take: impl Fn(u64) -> T + Send + Sync) -> Vec<T> {
+    const CELLS: f64 = ((1u64 << 21) - 1) as f64;
+    let (low, high) = bounding_box(positions).unwrap_or((DVec3::ZERO, DVec3::ZERO));
+    let scale = CELLS / (high - low).max_element().max(f64::MIN_POSITIVE);
+    positions
+        .par_iter()
+        .with_min_len(8192)
+        .map(|&p| {
+            // A coordinate that is not a number becomes 0.
+            let cell = ((p - low) * scale).to_array().map(|x| spread(x as u64));
+            take(cell[0] | cell[1] << 1 | cell[2] << 2)
+        })
+        .collect()
 }
 
 /// Puts two zeros between the lowest 21 bits.
