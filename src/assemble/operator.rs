@@ -18,6 +18,8 @@ use crate::mesh::{Faces, Incidence, Topology};
 
 /// Rows of one task.
 const CHUNK: usize = 4096;
+/// Room for so many neighbours of a listed row.
+const USUAL: usize = 12;
 
 /// A = H·M without stored entries: a row knows its neighbours, and its weights follow from valence and face size.
 ///
@@ -272,6 +274,25 @@ impl Operator {
     }
 }
 
+/// One list of all parts, one after the other. In parallel.
+fn concat<T: Copy + Default + Send + Sync>(
+    parts: &[Listed],
+    list: impl Fn(&Listed) -> &[T] + Sync,
+) -> Vec<T> {
+    let mut all = vec![T::default(); parts.iter().map(|part| list(part).len()).sum()];
+    let mut rest = all.as_mut_slice();
+    let mut pairs = Vec::with_capacity(parts.len());
+    for part in parts {
+        let (place, after) = rest.split_at_mut(list(part).len());
+        pairs.push((place, part));
+        rest = after;
+    }
+    pairs
+        .into_par_iter()
+        .for_each(|(place, part)| place.copy_from_slice(list(part)));
+    all
+}
+
 impl Listed {
     /// Puts together the listed rows of these kinds, in their order: `fill(i, …)` adds those of row `i`, but for its
     /// starts. In parallel.
@@ -283,10 +304,14 @@ impl Listed {
         if !kinds.contains(&Kind::Listed) {
             return all;
         }
-        let parts: Vec<Listed> = (0..kinds.len().div_ceil(CHUNK))
+        let mut parts: Vec<Listed> = (0..kinds.len().div_ceil(CHUNK))
             .into_par_iter()
             .map_init(Vec::new, |scratch, k| {
-                let mut part = Listed::default();
+                let mut part = Listed {
+                    weights: Vec::with_capacity(USUAL * CHUNK),
+                    neighbours: Vec::with_capacity(USUAL * CHUNK),
+                    ..Listed::default()
+                };
                 let rows = k * CHUNK..((k + 1) * CHUNK).min(kinds.len());
                 for i in rows.filter(|&i| kinds[i] == Kind::Listed) {
                     part.slots.push(i as u32);
@@ -297,23 +322,27 @@ impl Listed {
                 part
             })
             .collect();
-        all.slots = vec![NONE; kinds.len()];
-        for part in parts {
-            let (weights, corners) = (all.weights.len() as u32, all.corners.len() as u32);
-            for (k, &i) in (all.own.len() as u32..).zip(&part.slots) {
-                all.slots[i as usize] = k;
-            }
-            all.starts.extend(part.starts.iter().map(|s| s + weights));
-            all.large_starts
-                .extend(part.large_starts.iter().map(|s| s + corners));
-            all.own.extend(part.own);
-            all.h.extend(part.h);
-            all.weights.extend(part.weights);
-            all.neighbours.extend(part.neighbours);
-            all.corners.extend(part.corners);
+        let (mut weights, mut corners) = (0, 0);
+        for part in &mut parts {
+            part.starts.iter_mut().for_each(|s| *s += weights);
+            part.large_starts.iter_mut().for_each(|s| *s += corners);
+            weights += part.weights.len() as u32;
+            corners += part.corners.len() as u32;
         }
-        all.starts.push(all.weights.len() as u32);
-        all.large_starts.push(all.corners.len() as u32);
+        all.slots = vec![NONE; kinds.len()];
+        let listed = parts.iter().flat_map(|part| &part.slots);
+        for (slot, &i) in (0..).zip(listed) {
+            all.slots[i as usize] = slot;
+        }
+        all.own = concat(&parts, |part| &part.own);
+        all.h = concat(&parts, |part| &part.h);
+        all.starts = concat(&parts, |part| &part.starts);
+        all.starts.push(weights);
+        all.weights = concat(&parts, |part| &part.weights);
+        all.neighbours = concat(&parts, |part| &part.neighbours);
+        all.large_starts = concat(&parts, |part| &part.large_starts);
+        all.large_starts.push(corners);
+        all.corners = concat(&parts, |part| &part.corners);
         all
     }
 

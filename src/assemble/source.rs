@@ -66,6 +66,14 @@ pub(super) struct Source<'a> {
     half_edge: f64,
 }
 
+/// Adds to the entry of a vertex, or makes it.
+fn add(entries: &mut Vec<(u32, f64)>, vertex: u32, weight: f64) {
+    match entries.iter_mut().find(|e| e.0 == vertex) {
+        Some(entry) => entry.1 += weight,
+        None => entries.push((vertex, weight)),
+    }
+}
+
 impl<'a> Source<'a> {
     /// # Panics
     /// If the numbering is not of these vertices.
@@ -139,6 +147,14 @@ impl<'a> Source<'a> {
     fn vertex(&self, k: usize) -> usize {
         self.numbering
             .map_or(k, |numbering| numbering.order()[k] as usize)
+    }
+
+    /// Fetches what rows after `k` will read, where they are not in the file's order.
+    #[inline(always)]
+    fn fetch_ahead(&self, k: usize) {
+        if let Some(numbering) = self.numbering {
+            self.incidence.fetch_ahead(self.faces, numbering.order(), k);
+        }
     }
 
     /// The row of a vertex.
@@ -226,9 +242,7 @@ impl<'a> Source<'a> {
         let incidence = self.incidence;
         let corners = self.faces.corners();
         Codes::new(offsets, |k, row| {
-            if let Some(numbering) = self.numbering {
-                incidence.fetch_ahead(self.faces, numbering.order(), k);
-            }
+            self.fetch_ahead(k);
             let v = self.vertex(k);
             match kinds[k] {
                 Kind::Quads => {
@@ -268,40 +282,39 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// The entries of the row of vertex `v`, of valence `n`, of M off the diagonal, large faces aside, by ascending
-    /// vertices; returns the part of the diagonal that is no part of a large face's sum.
+    /// The entries of the row of vertex `v`, of valence `n`, of M off the diagonal, large faces aside: one for each end
+    /// of an edge, however many faces have it, and one for each other corner of a face. Returns the part of the diagonal
+    /// that is no part of a large face's sum.
     fn list(&self, v: usize, n: u32, entries: &mut Vec<(u32, f64)>) -> f64 {
         entries.clear();
         let incidence = self.incidence;
         let mut own = self.scheme.vertex_weight(n as usize);
         for &c in incidence.corners_at(v) {
             let f = incidence.face_of(c);
-            let face = self.faces.face(f);
-            let size = face.len();
-            let place = c as usize - self.faces.range(f).start;
-            let at = |steps: usize| face[(place + steps) % size];
+            let range = self.faces.range(f);
+            let size = range.len();
+            let place = c as usize - range.start;
+            let face = &self.faces.corners()[range];
+            // The ends of edges first, where the next face at v looks for them.
+            let (ahead, behind) = (face[(place + 1) % size], face[(place + size - 1) % size]);
             if let Some(modes) = self.modes(size) {
                 own += modes.identity;
                 if self.half_edge != 0.0 {
-                    entries.push((at(1), self.half_edge));
-                    entries.push((at(size - 1), self.half_edge));
+                    add(entries, ahead, self.half_edge);
+                    add(entries, behind, self.half_edge);
                 }
                 continue;
             }
             let block = &self.blocks.by_size[size];
             own += block[0];
-            let (before, after) = (&face[..place], &face[place + 1..]);
-            let ahead = after.iter().chain(before).copied();
-            entries.extend(ahead.zip(block[1..].iter().copied()));
-        }
-        entries.sort_by_key(|e| e.0);
-        entries.dedup_by(|later, kept| {
-            let same = later.0 == kept.0;
-            if same {
-                kept.1 += later.1;
+            add(entries, ahead, block[1]);
+            add(entries, behind, block[size - 1]);
+            for (steps, &weight) in block.iter().enumerate().take(size - 1).skip(2) {
+                let t = place + steps;
+                let corner = if t < size { t } else { t - size };
+                entries.push((face[corner], weight));
             }
-            same
-        });
+        }
         own
     }
 
@@ -346,6 +359,7 @@ impl<'a> Source<'a> {
         }
         let incidence = self.incidence;
         let listed = Listed::collect(kinds, |k, listed, scratch| {
+            self.fetch_ahead(k);
             let v = self.vertex(k);
             let own = self.list(v, self.valences[k], scratch);
             let h = h[self.valences[k] as usize];

@@ -7,6 +7,7 @@ use std::ops::{Add, AddAssign, Range, Sub};
 use glam::{DVec3, Vec3A};
 
 use super::codes::{Code, Codes, Row, Window, Windows};
+use crate::prefetch::prefetch;
 
 /// What an operator acts on: three right-hand sides of one vertex, interleaved, in doubles (24 bytes) or singles
 /// (16 bytes, one vector register); or a single one, for eigenvectors.
@@ -461,13 +462,27 @@ impl Stencil {
         start: usize,
         moments: impl Fn(usize, &[P]) -> [P; 3],
     ) -> P {
+        /// Entries between what is read and what is fetched for later rows. Tuned.
+        const AHEAD: usize = 64;
         let listed = &self.listed;
         let slot = listed.slots[i] as usize;
-        let weights = &listed.weights[listed.starts[slot] as usize..];
+        let weights = &listed.weights[listed.starts[slot] as usize..][..codes.len()];
+        prefetch(weights, AHEAD);
+        prefetch(codes, AHEAD);
+        let term = |c: C, w| window[c.place(row, start)].times(P::weight(w));
+        // Two sums, so that one addition need not wait for the other.
         let mut sum = window[row].times(P::weight(listed.own[slot]));
-        for (&c, &w) in codes.iter().zip(weights) {
-            sum += window[c.place(row, start)].times(P::weight(w));
+        let mut other = P::ZERO;
+        let (pairs, last) = codes.as_chunks::<2>();
+        let (pairs_of_weights, last_weight) = weights.as_chunks::<2>();
+        for (c, w) in pairs.iter().zip(pairs_of_weights) {
+            sum += term(c[0], w[0]);
+            other += term(c[1], w[1]);
         }
+        if let (&[c], &[w]) = (last, last_weight) {
+            sum += term(c, w);
+        }
+        sum += other;
         if listed.corners.is_empty() {
             return sum;
         }

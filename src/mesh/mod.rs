@@ -5,6 +5,7 @@ pub mod builtin;
 pub mod colours;
 mod defect;
 mod degenerate;
+pub(crate) mod edge_numbers;
 pub mod generate;
 pub mod io;
 pub mod noise;
@@ -87,7 +88,7 @@ impl Faces {
             offsets.last().map(|&l| l as usize) == Some(corners.len()),
             "offsets end at the number of corners"
         );
-        // The least size, wrapped where offsets descend, and the greatest.
+        // The least size and the greatest.
         let sizes = offsets.par_windows(2).with_min_len(CHUNK).map(|w| {
             assert!(w[0] <= w[1], "offsets ascend");
             let size = w[1] - w[0];

@@ -470,33 +470,29 @@ pub fn in_kinds(faces: &Faces, incidence: &Incidence) -> Option<Numbering> {
     (!order.is_sorted()).then(|| Numbering::new(order))
 }
 
-/// Sorts each 256 consecutive vertices by kind, those of one kind left as they come.
+/// Sorts each 256 consecutive vertices by kind: rows of one length, with weights known by valence or listed. Those of one
+/// kind are left as they come.
 fn group_kinds(faces: &Faces, incidence: &Incidence, order: &mut [u32]) {
     const GROUP: usize = 256;
-    /// Larger numbers of faces count as one.
-    const MOST: usize = 15;
-    let uniform = faces.uniform_size().is_some();
+    /// Larger numbers, of faces or of neighbours, count as one.
+    const MOST: usize = 63;
+    let uniform = faces.uniform_size();
+    // Triangles only; quads only, as a rule; others by the number of neighbours.
     let key = |v: u32| {
         let at = incidence.corners_at(v as usize);
-        let kind = if uniform {
-            0
-        } else {
-            // Triangles only; quads only, as a rule; between these; larger faces.
-            let sizes = at.iter().map(|&c| faces.range(incidence.face_of(c)).len());
-            let beyond_triangles = sizes.sum::<usize>().saturating_sub(3 * at.len());
-            match beyond_triangles {
-                0 => 0,
-                b if b == at.len() => 1,
-                b if b < at.len() => 2,
-                _ => 3,
-            }
-        };
-        4 * at.len().min(MOST) + kind
+        let n = at.len();
+        let sizes = at.iter().map(|&c| faces.range(incidence.face_of(c)).len());
+        let corners = uniform.map_or_else(|| sizes.sum(), |size| size * n);
+        match corners {
+            c if c == 3 * n => n.min(MOST),
+            c if c == 4 * n => MOST + 1 + n.min(MOST),
+            c => 2 * (MOST + 1) + c.saturating_sub(2 * n).min(MOST),
+        }
     };
     order.par_chunks_mut(GROUP).for_each(|group| {
         let mut vertices = [(0, 0); GROUP];
         let vertices = &mut vertices[..group.len()];
-        let mut starts = [0; 4 * MOST + 5];
+        let mut starts = [0; 3 * (MOST + 1) + 1];
         for (slot, &v) in vertices.iter_mut().zip(&*group) {
             *slot = (v, key(v));
             starts[slot.1 + 1] += 1;

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use rayon::prelude::*;
 
 use super::Faces;
+use super::edge_numbers::EdgeNumbers;
 use crate::prefetch::prefetch;
 
 /// Marks an absent index in the arrays of this room.
@@ -155,9 +156,9 @@ impl Incidence {
         }
         if let Some(&v) = order.get(k + AHEAD) {
             for &c in self.corners_at(v as usize) {
-                match &self.face {
-                    FaceOf::Triangles | FaceOf::Quads => prefetch(faces.corners(), c as usize),
-                    FaceOf::Table(table) => prefetch(table, c as usize),
+                prefetch(faces.corners(), c as usize);
+                if let FaceOf::Table(table) = &self.face {
+                    prefetch(table, c as usize);
                 }
             }
         }
@@ -609,83 +610,6 @@ impl Topology {
     }
 }
 
-/// The edges of a closed mesh, numbered by their first half-edges: the order of [`Topology::edge_sides`]. A number
-/// comes from a bit and an eighth of a byte of counts a half-edge, few enough to stay in a cache, instead of from a
-/// table.
-pub(crate) struct EdgeNumbers<'a> {
-    twins: &'a [u32],
-    /// For every 64 half-edges: which are first, and how many before them are.
-    words: Vec<(u64, u32)>,
-}
-
-impl<'a> EdgeNumbers<'a> {
-    fn new(twins: &'a [u32]) -> Self {
-        let word = |(k, twins): (usize, &[u32])| {
-            let mut bits = 0;
-            for (i, (&t, c)) in twins.iter().zip(64 * k as u32..).enumerate() {
-                bits |= u64::from(c <= t) << i;
-            }
-            (bits, bits.count_ones())
-        };
-        let chunks = twins.par_chunks(64).with_min_len(CHUNK / 64);
-        let mut words: Vec<(u64, u32)> = chunks.enumerate().map(word).collect();
-        let mut before = 0;
-        for (_, count) in &mut words {
-            before += std::mem::replace(count, before);
-        }
-        EdgeNumbers { twins, words }
-    }
-
-    /// The edge of half-edge `c`.
-    #[inline]
-    pub(crate) fn of(&self, c: u32) -> u32 {
-        let first = c.min(self.twins[c as usize]);
-        let (bits, before) = self.words[first as usize / 64];
-        before + (bits & !(u64::MAX << (first % 64))).count_ones()
-    }
-
-    /// The first half-edges, ascending.
-    pub(crate) fn firsts(&self) -> impl IndexedParallelIterator<Item = u32> + '_ {
-        let start = || Cursor {
-            next: u32::MAX,
-            word: 0,
-            bits: 0,
-        };
-        (0..self.twins.len() as u32 / 2)
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map_init(start, |cursor, edge| cursor.first_of(edge, &self.words))
-    }
-}
-
-/// Where a walk over the edges is.
-struct Cursor {
-    /// The edge that comes next.
-    next: u32,
-    word: usize,
-    /// The first half-edges of the word that are still to come.
-    bits: u64,
-}
-
-impl Cursor {
-    #[inline]
-    fn first_of(&mut self, edge: u32, words: &[(u64, u32)]) -> u32 {
-        if edge != self.next {
-            self.word = words.partition_point(|&(_, before)| before <= edge) - 1;
-            let (bits, before) = words[self.word];
-            self.bits = (before..edge).fold(bits, |bits, _| bits & (bits - 1));
-        }
-        while self.bits == 0 {
-            self.word += 1;
-            self.bits = words[self.word].0;
-        }
-        let first = 64 * self.word as u32 + self.bits.trailing_zeros();
-        self.bits &= self.bits - 1;
-        self.next = edge + 1;
-        first
-    }
-}
-
 /// What pairing finds at some vertices.
 #[derive(Default)]
 struct Pairs {
@@ -951,31 +875,6 @@ mod tests {
                     .any(|e| e.is_misoriented() && e.is_loop())
             );
             assert!(t.boundary_half_edges().is_empty());
-        }
-    }
-
-    #[test]
-    fn edges_are_numbered_by_their_first_half_edges() {
-        // Several words, several tasks, and a word without any first half-edge.
-        for name in [
-            "tetrahedron",
-            "irregular-poly:500",
-            "torus:150x130",
-            "tri-torus:80x80",
-        ] {
-            let mesh = crate::mesh::builtin::builtin(name).unwrap();
-            let mut t = Topology::new(&mesh.faces, mesh.len());
-            for _ in 0..2 {
-                let firsts: Vec<u32> = t.edge_sides().collect();
-                let numbers = t.edge_numbers();
-                assert_eq!(numbers.firsts().collect::<Vec<u32>>(), firsts, "{name}");
-                for (e, &c) in (0..).zip(&firsts) {
-                    assert_eq!([numbers.of(c), numbers.of(t.twin[c as usize])], [e; 2]);
-                }
-                // Half-edge c opposite to c + count/2: all first ones before all others.
-                let half = t.twin.len() as u32 / 2;
-                t.twin = (half..2 * half).chain(0..half).collect();
-            }
         }
     }
 

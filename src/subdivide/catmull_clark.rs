@@ -12,7 +12,8 @@ use super::star::{
     Circle, Tangents, centroid, for_each_star, numbers, require_closed, require_room, sides, twin,
 };
 use crate::Result;
-use crate::mesh::topology::{EdgeNumbers, next_in, prev_in};
+use crate::mesh::edge_numbers::EdgeNumbers;
+use crate::mesh::topology::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
 
 /// One step.

@@ -11,7 +11,7 @@ use super::star::{
     ring_tangents, twin,
 };
 use crate::Result;
-use crate::mesh::topology::EdgeNumbers;
+use crate::mesh::edge_numbers::EdgeNumbers;
 use crate::mesh::{Faces, Mesh, Topology};
 
 /// The mask of the vertex point at valence `n`: the weight of the vertex, 3/8 + (3/8 + ¼cos(2π/n))², and of

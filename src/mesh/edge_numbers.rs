@@ -1,0 +1,116 @@
+//! Numbers for the edges of a closed mesh, without a table.
+
+use rayon::prelude::*;
+
+/// Half-edges of one task.
+const CHUNK: usize = 4096;
+
+/// The edges of a closed mesh, numbered by their first half-edges: the order of [`Topology::edge_sides`](super::Topology::edge_sides). A number
+/// comes from a bit and an eighth of a byte of counts a half-edge, few enough to stay in a cache, instead of from a
+/// table.
+pub(crate) struct EdgeNumbers<'a> {
+    twins: &'a [u32],
+    /// For every 64 half-edges: which are first, and how many before them are.
+    words: Vec<(u64, u32)>,
+}
+
+impl<'a> EdgeNumbers<'a> {
+    /// From the opposite of every half-edge.
+    pub(super) fn new(twins: &'a [u32]) -> Self {
+        let word = |(k, twins): (usize, &[u32])| {
+            let mut bits = 0;
+            for (i, (&t, c)) in twins.iter().zip(64 * k as u32..).enumerate() {
+                bits |= u64::from(c <= t) << i;
+            }
+            (bits, bits.count_ones())
+        };
+        let chunks = twins.par_chunks(64).with_min_len(CHUNK / 64);
+        let mut words: Vec<(u64, u32)> = chunks.enumerate().map(word).collect();
+        let mut before = 0;
+        for (_, count) in &mut words {
+            before += std::mem::replace(count, before);
+        }
+        EdgeNumbers { twins, words }
+    }
+
+    /// The edge of half-edge `c`.
+    #[inline]
+    pub(crate) fn of(&self, c: u32) -> u32 {
+        let first = c.min(self.twins[c as usize]);
+        let (bits, before) = self.words[first as usize / 64];
+        before + (bits & !(u64::MAX << (first % 64))).count_ones()
+    }
+
+    /// The first half-edges, ascending.
+    pub(crate) fn firsts(&self) -> impl IndexedParallelIterator<Item = u32> + '_ {
+        let start = || Cursor {
+            next: u32::MAX,
+            word: 0,
+            bits: 0,
+        };
+        (0..self.twins.len() as u32 / 2)
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map_init(start, |cursor, edge| cursor.first_of(edge, &self.words))
+    }
+}
+
+/// Where a walk over the edges is.
+struct Cursor {
+    /// The edge that comes next.
+    next: u32,
+    word: usize,
+    /// The first half-edges of the word that are still to come.
+    bits: u64,
+}
+
+impl Cursor {
+    #[inline]
+    fn first_of(&mut self, edge: u32, words: &[(u64, u32)]) -> u32 {
+        if edge != self.next {
+            self.word = words.partition_point(|&(_, before)| before <= edge) - 1;
+            let (bits, before) = words[self.word];
+            self.bits = (before..edge).fold(bits, |bits, _| bits & (bits - 1));
+        }
+        while self.bits == 0 {
+            self.word += 1;
+            self.bits = words[self.word].0;
+        }
+        let first = 64 * self.word as u32 + self.bits.trailing_zeros();
+        self.bits &= self.bits - 1;
+        self.next = edge + 1;
+        first
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Topology;
+
+    #[test]
+    fn edges_are_numbered_by_their_first_half_edges() {
+        // Several words, several tasks, and a word without any first half-edge.
+        for name in [
+            "tetrahedron",
+            "irregular-poly:500",
+            "torus:150x130",
+            "tri-torus:80x80",
+        ] {
+            let mesh = crate::mesh::builtin::builtin(name).unwrap();
+            let topology = Topology::new(&mesh.faces, mesh.len());
+            let twins = topology.twins().to_vec();
+            let half = twins.len() as u32 / 2;
+            // Half-edge c opposite to c + count/2: all first ones before all others.
+            let apart: Vec<u32> = (half..2 * half).chain(0..half).collect();
+            for twins in [twins, apart] {
+                let firsts: Vec<u32> = (0..2 * half).filter(|&c| c <= twins[c as usize]).collect();
+                let numbers = EdgeNumbers::new(&twins);
+                assert_eq!(numbers.firsts().collect::<Vec<u32>>(), firsts, "{name}");
+                for (e, &c) in (0..).zip(&firsts) {
+                    assert_eq!([numbers.of(c), numbers.of(twins[c as usize])], [e; 2]);
+                }
+            }
+        }
+    }
+}
