@@ -821,4 +821,37 @@ mod tests {
         assert_eq!(o[mesh.len() - 2..], [9, 10]);
         assert!(o[9..mesh.len() - 2].is_sorted());
     }
+
+    #[test]
+    fn rows_of_one_kind_come_together_and_stay_near() {
+        for name in ["irregular-tri:1000", "irregular-poly:1000"] {
+            let mesh = builtin::builtin(name).unwrap();
+            let incidence = Incidence::new(&mesh.faces, mesh.len());
+            let numbering = in_kinds(&mesh.faces, &incidence).unwrap();
+            // Neighbours by face: every face adds its corners but for the vertex and one end of an edge.
+            let length = |v: &u32| -> usize {
+                let at = incidence.corners_at(*v as usize).iter();
+                at.map(|&c| mesh.faces.face(incidence.face_of(c)).len() - 2)
+                    .sum()
+            };
+            let changes = |order: &[u32]| {
+                let pairs = order.windows(2);
+                pairs.filter(|w| length(&w[0]) != length(&w[1])).count()
+            };
+            let file: Vec<u32> = (0..mesh.len() as u32).collect();
+            assert!(4 * changes(numbering.order()) < changes(&file), "{name}");
+            for (block, from) in numbering.order().chunks(256).zip(file.chunks(256)) {
+                let mut block = block.to_vec();
+                block.sort_unstable();
+                assert_eq!(block, from, "{name}: the same vertices");
+            }
+            let values: Vec<u32> = numbering.there(&file);
+            let mut back = vec![0; file.len()];
+            numbering.back_into(&values, &mut back);
+            assert_eq!(back, file);
+        }
+        let regular = builtin::builtin("torus:20x20").unwrap();
+        let incidence = Incidence::new(&regular.faces, regular.len());
+        assert!(in_kinds(&regular.faces, &incidence).is_none());
+    }
 }
