@@ -265,8 +265,9 @@ impl Context {
             "Reports",
             "What `reproduce` wrote: results on the papers' own models here, results on built-in stand-ins in \
              `built-in/`. Each table is a Markdown file for people and a CSV file for programs; `cargo run --release \
-             -- --only ID` makes one again. [scaling.md](scaling.md), with its profile, threads, steps, edits and decay, is by the program \
-             `scaling`: time and memory over growing meshes, on one machine.",
+             -- --only ID` makes one again. [scaling.md](scaling.md), with its profile, threads, steps, edits and decay, \
+             is by the program `scaling`: time and memory over growing meshes, on one machine; ten million vertices \
+             in `ten-million/`.",
             &entries,
         )
     }
