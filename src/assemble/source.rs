@@ -283,8 +283,8 @@ impl<'a> Source<'a> {
     }
 
     /// The entries of the row of vertex `v`, of valence `n`, of M off the diagonal, large faces aside: one for each end
-    /// of an edge, however many faces have it, and one for each other corner of a face. Returns the part of the diagonal
-    /// that is no part of a large face's sum.
+    /// of an edge, however many faces have it, and one for each other corner of a face, by ascending vertices. Returns
+    /// the part of the diagonal that is no part of a large face's sum.
     fn list(&self, v: usize, n: u32, entries: &mut Vec<(u32, f64)>) -> f64 {
         entries.clear();
         let incidence = self.incidence;
@@ -315,6 +315,7 @@ impl<'a> Source<'a> {
                 entries.push((face[corner], weight));
             }
         }
+        entries.sort_unstable_by_key(|e| e.0);
         own
     }
 
