@@ -15,6 +15,7 @@ pub mod error;
 pub mod interpolate;
 pub mod mesh;
 pub mod output;
+mod pages;
 mod prefetch;
 pub mod report;
 pub mod solvers;

@@ -5,6 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::stencil::Point;
+use crate::pages::large;
 use crate::prefetch::prefetch;
 
 /// Rows of one task.
@@ -163,7 +164,7 @@ fn encode<C: Code>(
     fill: &(impl Fn(usize, &mut [u32]) + Sync),
 ) -> Option<(u32, Vec<C>)> {
     let n = offsets.len() - 1;
-    let mut codes = vec![C::default(); offsets[n] as usize];
+    let mut codes = large(vec![C::default(); offsets[n] as usize]);
     let mut tasks = Vec::with_capacity(n.div_ceil(CHUNK));
     let mut rest = codes.as_mut_slice();
     for first in (0..n).step_by(CHUNK) {

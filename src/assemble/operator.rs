@@ -15,6 +15,7 @@ use crate::error::Result;
 use crate::mesh::order::Numbering;
 use crate::mesh::topology::NONE;
 use crate::mesh::{Faces, Incidence, Topology};
+use crate::pages::large;
 
 /// Rows of one task.
 const CHUNK: usize = 4096;
@@ -279,7 +280,10 @@ fn concat<T: Copy + Default + Send + Sync>(
     parts: &[Listed],
     list: impl Fn(&Listed) -> &[T] + Sync,
 ) -> Vec<T> {
-    let mut all = vec![T::default(); parts.iter().map(|part| list(part).len()).sum()];
+    let mut all = large(vec![
+        T::default();
+        parts.iter().map(|part| list(part).len()).sum()
+    ]);
     let mut rest = all.as_mut_slice();
     let mut pairs = Vec::with_capacity(parts.len());
     for part in parts {

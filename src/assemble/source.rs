@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::mesh::order::Numbering;
 use crate::mesh::topology::{NONE, next_in, prev_in};
 use crate::mesh::{Faces, Incidence, Topology};
+use crate::pages::large;
 
 /// Rows of one task.
 const CHUNK: usize = 4096;
@@ -199,7 +200,7 @@ impl<'a> Source<'a> {
     }
 
     pub(super) fn offsets(&self, kinds: &[Kind], listed: &Listed) -> Result<Vec<u32>> {
-        let mut offsets = Vec::with_capacity(kinds.len() + 1);
+        let mut offsets = large(Vec::with_capacity(kinds.len() + 1));
         offsets.push(0);
         let mut end = 0u32;
         for (v, kind) in kinds.iter().enumerate() {

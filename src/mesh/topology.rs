@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::Faces;
 use super::edge_numbers::EdgeNumbers;
+use crate::pages::large;
 use crate::prefetch::prefetch;
 
 /// Marks an absent index in the arrays of this room.
@@ -40,7 +41,7 @@ impl FaceOf {
             Some(4) => return FaceOf::Quads,
             _ => {}
         }
-        let mut table = vec![0; faces.corners().len()];
+        let mut table = large(vec![0; faces.corners().len()]);
         let parts = split_by_face(faces, CHUNK, &mut table);
         parts.into_par_iter().for_each(|(rows, mut part)| {
             for f in rows {
@@ -65,7 +66,7 @@ impl Incidence {
         let corners = faces.corners();
         let parts = rayon::current_num_threads().min(MOST_PARTS);
         let share = vertices.div_ceil(parts).max(CHUNK);
-        let mut offsets = vec![0u32; vertices + 1];
+        let mut offsets = large(vec![0u32; vertices + 1]);
         let counts = offsets[1..].par_chunks_mut(share).enumerate();
         counts.for_each(|(k, counts)| {
             let first = (k * share) as u32;
@@ -82,7 +83,7 @@ impl Incidence {
             offsets[vertices] as usize == corners.len(),
             "every corner names a vertex"
         );
-        let mut sorted = vec![0u32; corners.len()];
+        let mut sorted = large(vec![0u32; corners.len()]);
         let parts = split_rows(&offsets, share, &mut sorted);
         parts.into_par_iter().for_each(|(rows, sorted)| {
             let base = offsets[rows.start];
@@ -277,8 +278,9 @@ pub(crate) struct Scatter(Vec<AtomicU32>);
 impl Scatter {
     /// All places [`NONE`].
     pub(crate) fn new(len: usize) -> Self {
-        let none = |_| AtomicU32::new(NONE);
-        Scatter((0..len).into_par_iter().map(none).collect())
+        let mut places = large(Vec::with_capacity(len));
+        places.par_extend((0..len).into_par_iter().map(|_| AtomicU32::new(NONE)));
+        Scatter(places)
     }
 
     #[inline]

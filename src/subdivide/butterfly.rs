@@ -15,6 +15,7 @@ use super::star::{
 };
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
+use crate::pages::large;
 
 /// The weight of the extraordinary vertex itself.
 pub const CENTER: f64 = 0.75;
@@ -83,7 +84,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     };
     let rings = Rings::new(mesh, topology, rule)?;
     let edges = topology.edge_numbers();
-    let mut positions = Vec::with_capacity(mesh.len() + topology.edges());
+    let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
     positions.par_extend(&mesh.positions);
     positions.par_extend(edges.firsts().map(|c| {
         let t = twin(topology, c);

@@ -15,6 +15,7 @@ use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
 use crate::mesh::topology::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
+use crate::pages::large;
 
 /// One step.
 ///
@@ -35,8 +36,11 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     let corners = mesh.faces.corners();
     let edges = topology.edge_numbers();
     let center = |f| centroid(old, mesh.faces.face(f));
-    let centers: Vec<DVec3> = numbers(mesh.faces.len()).map(center).collect();
-    let mut positions = Vec::with_capacity(mesh.len() + topology.edges() + centers.len());
+    let mut centers = large(Vec::with_capacity(mesh.faces.len()));
+    centers.par_extend(numbers(mesh.faces.len()).map(center));
+    let mut positions = large(Vec::with_capacity(
+        mesh.len() + topology.edges() + centers.len(),
+    ));
     positions.par_extend(numbers(mesh.len()).map(|v| {
         let star = incidence.corners_at(v);
         let mut sum = DVec3::ZERO;
@@ -111,7 +115,7 @@ fn split(mesh: &Mesh, topology: &Topology, edges: &EdgeNumbers) -> Faces {
     let first_face = vertices + topology.edges() as u32;
     let corners = mesh.faces.corners();
     let incidence = &topology.incidence;
-    let mut quads = vec![0; 4 * corners.len()];
+    let mut quads = large(vec![0; 4 * corners.len()]);
     rows(&mut quads).for_each(|(c, quad): (u32, &mut [u32; 4])| {
         *quad = [
             corners[c as usize],

@@ -14,6 +14,7 @@ use super::star::{
 use crate::Result;
 use crate::mesh::topology::{split_by_face, split_rows};
 use crate::mesh::{Faces, Mesh, Topology};
+use crate::pages::large;
 
 /// The rule of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,8 +43,9 @@ impl Rule {
 /// The new point of every corner: the geometry of one step. O(m) for a face of m corners, since the rule is a
 /// circulant of the constant, the first harmonic and the identity.
 pub fn corner_points(mesh: &Mesh, rule: Rule) -> Vec<DVec3> {
-    let corners = (0..mesh.faces.corners().len()).into_par_iter();
-    let mut points: Vec<DVec3> = corners.map(|_| DVec3::ZERO).collect();
+    let corners = mesh.faces.corners();
+    let mut points = large(Vec::with_capacity(corners.len()));
+    points.par_extend(corners.par_iter().map(|_| DVec3::ZERO));
     let parts = split_by_face(&mesh.faces, CHUNK, &mut points);
     parts
         .into_par_iter()
@@ -112,7 +114,7 @@ pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_room(mesh, 4)?;
     let count = mesh.faces.corners().len();
     let incidence = &topology.incidence;
-    let mut corners = vec![0; 4 * count];
+    let mut corners = large(vec![0; 4 * count]);
     let (of_faces, rest) = corners.split_at_mut(count);
     let (of_edges, of_vertices) = rest.split_at_mut(2 * count);
     rows(of_faces).for_each(|(c, corner): (u32, &mut [u32; 1])| corner[0] = c);
@@ -133,7 +135,9 @@ pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
             }
         });
 
-    let mut offsets = Vec::with_capacity(mesh.faces.len() + count / 2 + mesh.len() + 1);
+    let mut offsets = large(Vec::with_capacity(
+        mesh.faces.len() + count / 2 + mesh.len() + 1,
+    ));
     offsets.push(0);
     let of_faces = (0..mesh.faces.len()).into_par_iter();
     offsets.par_extend(of_faces.map(|f| mesh.faces.range(f).end as u32));

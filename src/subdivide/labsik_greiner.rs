@@ -21,6 +21,7 @@ use super::sqrt3::{flip, refined_topology};
 use super::star::{Tangents, numbers, prev_in_triangle, require_room, require_triangles, twin};
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
+use crate::pages::large;
 
 /// The regular mask: the corners of the triangle, the vertices opposite to its sides, the six next to those.
 pub const REGULAR: [f64; 3] = [32.0 / 81.0, -1.0 / 81.0, -2.0 / 81.0];
@@ -97,7 +98,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
         amplitudes,
     };
     let rings = Rings::new(mesh, topology, rule)?;
-    let mut positions = Vec::with_capacity(mesh.len() + mesh.faces.len());
+    let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
     positions.par_extend(&mesh.positions);
     positions.par_extend(numbers(mesh.faces.len()).map(|f| {
         let own = [0, 1, 2].map(|i| 3 * f as u32 + i);

@@ -13,6 +13,7 @@ use super::star::{
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
 use crate::mesh::{Faces, Mesh, Topology};
+use crate::pages::large;
 
 /// The mask of the vertex point at valence `n`: the weight of the vertex, 3/8 + (3/8 + ¼cos(2π/n))², and of
 /// each neighbour, the rest over n.
@@ -48,7 +49,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_room(mesh, 4)?;
     let (old, corners) = (&mesh.positions, mesh.faces.corners());
     let edges = topology.edge_numbers();
-    let mut positions = Vec::with_capacity(mesh.len() + topology.edges());
+    let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
     positions.par_extend(blends(mesh, topology, vertex_mask));
     positions.par_extend(edges.firsts().map(|c| {
         // 3/8 of the vertex that a side leaves, 1/8 of the vertex opposite to it.
@@ -74,7 +75,7 @@ pub fn refined_topology(topology: &Topology, refined: &Mesh) -> Topology {
 pub(super) fn split_in_four(mesh: &Mesh, edges: &EdgeNumbers) -> Faces {
     let vertices = mesh.len() as u32;
     let old = mesh.faces.corners();
-    let mut corners = vec![0; 4 * old.len()];
+    let mut corners = large(vec![0; 4 * old.len()]);
     rows(&mut corners).for_each(|(f, corners): (u32, &mut [u32; 12])| {
         let own = [0, 1, 2].map(|i| 3 * f + i);
         let [u, v, w] = own.map(|c| old[c as usize]);

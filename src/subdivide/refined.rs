@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::star::{next_in_triangle, prev_in_triangle};
 use crate::mesh::topology::Scatter;
 use crate::mesh::{Incidence, Mesh, Topology};
+use crate::pages::large;
 
 /// New faces, edges or vertices of one task.
 const CHUNK: usize = 4096;
@@ -26,7 +27,7 @@ pub(super) fn of_quads(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
         return Topology::new(&refined.faces, refined.len());
     }
     let (next, prev) = (|c| incidence.next(faces, c), |c| incidence.prev(faces, c));
-    let mut twins = vec![0; 4 * count];
+    let mut twins = large(vec![0; 4 * count]);
     rows(&mut twins).for_each(|(c, quad): (u32, &mut [u32; 4])| {
         let before = prev(c);
         *quad = [
@@ -37,7 +38,7 @@ pub(super) fn of_quads(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
         ];
     });
 
-    let mut corners = vec![0; 4 * count];
+    let mut corners = large(vec![0; 4 * count]);
     let (at_vertices, rest) = corners.split_at_mut(count);
     let (at_edges, at_faces) = rest.split_at_mut(2 * count);
     scale(at_vertices, incidence.corners(), |c| 4 * c);
@@ -49,7 +50,7 @@ pub(super) fn of_quads(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
     });
     rows(at_faces).for_each(|(c, corner): (u32, &mut [u32; 1])| corner[0] = 4 * c + 2);
 
-    let mut offsets = Vec::with_capacity(refined.len() + 1);
+    let mut offsets = large(Vec::with_capacity(refined.len() + 1));
     offsets.par_extend(incidence.offsets());
     offsets.par_extend(ends(count, 4, count / 2));
     let first = 3 * count as u32;
@@ -68,7 +69,7 @@ pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
     let count = twin.len();
     // The first corner of the triangle at corner c.
     let outer = |c: u32| 3 * (c + c / 3);
-    let mut twins = vec![0; 4 * count];
+    let mut twins = large(vec![0; 4 * count]);
     rows(&mut twins).for_each(|(f, twins): (u32, &mut [u32; 12])| {
         let middle = 12 * f + 9;
         for i in 0..3 {
@@ -83,7 +84,7 @@ pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
         }
     });
 
-    let mut corners = vec![0; 4 * count];
+    let mut corners = large(vec![0; 4 * count]);
     let (at_vertices, at_edges) = corners.split_at_mut(count);
     scale(at_vertices, incidence.corners(), outer);
     let three = |c: u32| {
@@ -95,7 +96,7 @@ pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
         [a, b, m, d, e, n]
     });
 
-    let mut offsets = Vec::with_capacity(refined.len() + 1);
+    let mut offsets = large(Vec::with_capacity(refined.len() + 1));
     offsets.par_extend(incidence.offsets());
     offsets.par_extend(ends(count, 6, count / 2));
     closed(refined, offsets, corners, twins)
@@ -109,7 +110,7 @@ pub(super) fn of_flips(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
     }
     let (incidence, twin) = (&topology.incidence, topology.twins());
     let count = twin.len();
-    let mut twins = vec![0; 3 * count];
+    let mut twins = large(vec![0; 3 * count]);
     rows(&mut twins).for_each(|(c, twins): (u32, &mut [u32; 3])| {
         let t = twin[c as usize];
         *twins = [
@@ -119,7 +120,7 @@ pub(super) fn of_flips(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
         ];
     });
 
-    let mut corners = vec![0; 3 * count];
+    let mut corners = large(vec![0; 3 * count]);
     let (at_vertices, at_faces) = corners.split_at_mut(count);
     scale(at_vertices, incidence.corners(), |c| 3 * c);
     rows(at_faces).for_each(|(f, corners): (u32, &mut [u32; 6])| {
@@ -138,7 +139,7 @@ pub(super) fn of_flips(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
         }
     });
 
-    let mut offsets = Vec::with_capacity(refined.len() + 1);
+    let mut offsets = large(Vec::with_capacity(refined.len() + 1));
     offsets.par_extend(incidence.offsets());
     offsets.par_extend(ends(count, 6, mesh.faces.len()));
     closed(refined, offsets, corners, twins)
@@ -171,7 +172,7 @@ pub(super) fn of_corners(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> To
         first_edge + 4 * edges.of(c) + second
     };
 
-    let mut twins = vec![0; 4 * count];
+    let mut twins = large(vec![0; 4 * count]);
     let (of_faces, rest) = twins.split_at_mut(count);
     let (of_edges, of_vertices) = rest.split_at_mut(2 * count);
     rows(of_faces).for_each(|(c, twin): (u32, &mut [u32; 1])| twin[0] = in_edge(c));
@@ -185,7 +186,7 @@ pub(super) fn of_corners(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> To
         twins[0] = in_edge(ahead) + 1;
     });
 
-    let mut corners = vec![0; 4 * count];
+    let mut corners = large(vec![0; 4 * count]);
     rows(&mut corners).for_each(|(c, corners): (u32, &mut [u32; 4])| {
         let (leaving, entering) = (in_edge(c) + 1, in_edge(prev(c)));
         *corners = [

@@ -13,6 +13,7 @@ use super::star::{
 };
 use crate::Result;
 use crate::mesh::{Faces, Mesh, Topology};
+use crate::pages::large;
 
 /// a_n = (4 − 2cos(2π/n))/9: how far an old vertex moves towards the mean of its neighbours (Lin-Luo Eq. 2).
 pub fn relaxation(n: usize) -> f64 {
@@ -47,7 +48,7 @@ pub fn limit_mask(n: usize) -> [f64; 2] {
 pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_triangles(mesh, topology, "sqrt3")?;
     require_room(mesh, 3)?;
-    let mut positions = Vec::with_capacity(mesh.len() + mesh.faces.len());
+    let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
     positions.par_extend(blends(mesh, topology, vertex_mask));
     let center = |f| centroid(&mesh.positions, mesh.faces.face(f));
     positions.par_extend(numbers(mesh.faces.len()).map(center));
@@ -67,7 +68,7 @@ pub fn refined_topology(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Top
 pub(super) fn flip(mesh: &Mesh, topology: &Topology) -> Faces {
     let vertices = mesh.len() as u32;
     let old = mesh.faces.corners();
-    let mut corners = vec![0; 3 * old.len()];
+    let mut corners = large(vec![0; 3 * old.len()]);
     rows(&mut corners).for_each(|(c, corners): (u32, &mut [u32; 3])| {
         let across = twin(topology, c);
         *corners = [old[c as usize], vertices + across / 3, vertices + c / 3];

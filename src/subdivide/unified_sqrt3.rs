@@ -10,6 +10,7 @@ use super::star::{
 };
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
+use crate::pages::large;
 
 /// The parameters that the paper allows.
 pub const ALPHA_RANGE: std::ops::RangeInclusive<f64> = 0.0..=2.0;
@@ -42,9 +43,9 @@ pub fn refine(mesh: &Mesh, topology: &Topology, alpha: &[f64]) -> Result<(Mesh, 
         [-a, a / n as f64]
     });
     let old = &mesh.positions;
-    let mut positions = Vec::with_capacity(mesh.len() + mesh.faces.len());
+    let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
     // What each vertex gives to its triangles.
-    let mut shares = Vec::new();
+    let mut shares = large(Vec::with_capacity(mesh.len()));
     numbers(mesh.len())
         .map(|v| {
             let (n, sum) = neighbor_sum(mesh, topology, v);
@@ -56,7 +57,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology, alpha: &[f64]) -> Result<(Mesh, 
         .unzip_into_vecs(&mut positions, &mut shares);
     let faces = || numbers(mesh.faces.len()).map(|f| mesh.faces.face(f));
     positions.par_extend(faces().map(|face| centroid(&shares, face)));
-    let mut parameters = Vec::with_capacity(positions.len());
+    let mut parameters = large(Vec::with_capacity(positions.len()));
     parameters.par_extend(alpha);
     let sum = |face: &[u32]| face.iter().map(|&v| alpha[v as usize]).sum::<f64>();
     parameters.par_extend(faces().map(|face| sum(face) / 3.0));

@@ -1,0 +1,432 @@
+//! The rows of M and A, gathered from the faces at each vertex, in parallel.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::system::FaceBlocks;
+use crate::error::{Error, Result};
+use crate::mesh::topology::{next_in, prev_in, split_rows};
+use crate::mesh::{Faces, Topology};
+use crate::pages::large;
+
+/// Rows handed to one task: large enough to pay for it, small enough to share out evenly.
+const CHUNK: usize = 8192;
+
+/// What the rows are made from.
+pub(super) struct Rows<'a> {
+    faces: &'a Faces,
+    topology: &'a Topology,
+    blocks: &'a FaceBlocks,
+    /// The entry of H and the vertex weight.
+    by_valence: &'a [[f64; 2]],
+    valence: &'a [u32],
+    /// Every side has a twin.
+    closed: bool,
+}
+
+/// All rows of M and A.
+pub(super) struct Arrays {
+    pub(super) offsets: Vec<u32>,
+    pub(super) columns: Vec<u32>,
+    pub(super) m: Vec<f64>,
+    pub(super) a: Vec<f64>,
+    pub(super) diagonal: Vec<f64>,
+}
+
+/// One row while it is made.
+#[derive(Default)]
+struct Row {
+    /// Column in the upper half; in the lower the place of the contribution, which keeps the contributions to one
+    /// entry in the order of faces.
+    keys: Vec<u64>,
+    contributions: Vec<f64>,
+    columns: Vec<u32>,
+    values: Vec<f64>,
+    /// The place of the diagonal entry.
+    own: usize,
+    short: Short,
+}
+
+impl Row {
+    #[inline]
+    fn add(&mut self, column: u32, value: f64) {
+        let key = u64::from(column) << 32 | self.contributions.len() as u64;
+        self.keys.push(key);
+        self.contributions.push(value);
+    }
+
+    /// Sums the contributions to each entry.
+    fn sum(&mut self, row: usize) {
+        self.keys.sort_unstable();
+        self.columns.clear();
+        self.values.clear();
+        let mut last = None;
+        for &key in &self.keys {
+            let column = (key >> 32) as u32;
+            let value = self.contributions[key as u32 as usize];
+            if last == Some(column) {
+                if let Some(sum) = self.values.last_mut() {
+                    *sum += value;
+                }
+                continue;
+            }
+            if column as usize == row {
+                self.own = self.columns.len();
+            }
+            self.columns.push(column);
+            self.values.push(value);
+            last = Some(column);
+        }
+    }
+}
+
+/// Entries of a short row, sorted by counting for each how many are smaller: no branch depends on their order, for which
+/// there is no pattern that a processor could foresee.
+#[derive(Default)]
+struct Short {
+    /// Columns, in an order that signed numbers have; beyond the length the greatest.
+    columns: [i32; Self::MOST],
+    values: [f64; Self::MOST],
+    /// Of all entries that were added, also of those that found no room.
+    len: usize,
+}
+
+impl Short {
+    const MOST: usize = 24;
+    /// Compared at once.
+    const LANES: usize = 8;
+    const SIGN: u32 = 1 << 31;
+
+    #[inline]
+    fn add(&mut self, column: u32, value: f64) {
+        if self.len < Self::MOST {
+            self.columns[self.len] = (column ^ Self::SIGN) as i32;
+            self.values[self.len] = value;
+        }
+        self.len += 1;
+    }
+
+    /// Writes the entries in order and returns the place of the one that was added last, unless they are too many or
+    /// two have the same column.
+    #[inline]
+    fn sort_into(&mut self, columns: &mut Vec<u32>, values: &mut Vec<f64>) -> Option<usize> {
+        let n = self.len;
+        if n > Self::MOST {
+            return None;
+        }
+        self.columns[n..].fill(i32::MAX);
+        columns.resize(n, 0);
+        values.resize(n, 0.0);
+        let lanes = n.next_multiple_of(Self::LANES);
+        let (mut met, mut place) = (0u32, 0);
+        for (&column, &value) in self.columns[..n].iter().zip(&self.values) {
+            let mut smaller = [0; Self::LANES];
+            for others in self.columns[..lanes].as_chunks::<{ Self::LANES }>().0 {
+                for (smaller, &other) in smaller.iter_mut().zip(others) {
+                    *smaller += i32::from(other < column);
+                }
+            }
+            place = smaller.iter().sum::<i32>() as usize;
+            columns[place] = column as u32 ^ Self::SIGN;
+            values[place] = value;
+            met |= 1 << place;
+        }
+        (met.count_ones() as usize == n).then_some(place)
+    }
+}
+
+/// Moves rows that are shorter than their place together by `shift(from, to)`, in ascending order, and returns the
+/// new end.
+fn close_gaps(
+    offsets: &mut [u32],
+    lengths: &[u32],
+    mut shift: impl FnMut(Range<usize>, usize),
+) -> usize {
+    let mut end = 0;
+    for (offset, &length) in offsets.iter_mut().zip(lengths) {
+        let start = *offset as usize;
+        if start != end {
+            shift(start..start + length as usize, end);
+        }
+        *offset = end as u32;
+        end += length as usize;
+    }
+    offsets[lengths.len()] = end as u32;
+    end
+}
+
+impl<'a> Rows<'a> {
+    pub(super) fn new(
+        faces: &'a Faces,
+        topology: &'a Topology,
+        blocks: &'a FaceBlocks,
+        by_valence: &'a [[f64; 2]],
+        valence: &'a [u32],
+    ) -> Self {
+        Rows {
+            faces,
+            topology,
+            blocks,
+            by_valence,
+            valence,
+            closed: topology.is_closed(),
+        }
+    }
+
+    /// All rows.
+    ///
+    /// # Errors
+    /// More than 2³² − 1 entries.
+    pub(super) fn arrays(&self) -> Result<Arrays> {
+        Ok(match self.fill(self.greatest_lengths())? {
+            Ok(arrays) => arrays,
+            // Not a manifold.
+            Err(lengths) => match self.fill(lengths)? {
+                Ok(arrays) => arrays,
+                Err(_) => unreachable!("the lengths found are those of the rows"),
+            },
+        })
+    }
+
+    /// The greatest length of every row on a manifold, attained where faces share an edge or a vertex at most.
+    fn greatest_lengths(&self) -> Vec<u32> {
+        let incidence = &self.topology.incidence;
+        let length = |v: usize| {
+            let edges = self.valence[v];
+            if self.blocks.sides_only {
+                return edges + 1;
+            }
+            let at = incidence.corners_at(v);
+            let others = at.iter().map(|&c| {
+                let size = self.faces.range(incidence.face_of(c)).len() as u32;
+                size.saturating_sub(3)
+            });
+            edges + 1 + others.sum::<u32>()
+        };
+        (0..self.valence.len())
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .map(length)
+            .collect()
+    }
+
+    /// All rows, if their lengths are at most these; otherwise their true lengths.
+    fn fill(&self, lengths: Vec<u32>) -> Result<std::result::Result<Arrays, Vec<u32>>> {
+        let total: u64 = lengths.par_iter().map(|&l| u64::from(l)).sum();
+        if u32::try_from(total).is_err() {
+            return Err(Error::Computation(format!(
+                "the matrix would have {total} entries, more than 32-bit indices reach; use a smaller mesh or one \
+                 without very large faces"
+            )));
+        }
+        let mut offsets = large(Vec::with_capacity(lengths.len() + 1));
+        offsets.push(0u32);
+        let mut end = 0u32;
+        for length in &lengths {
+            end += length;
+            offsets.push(end);
+        }
+        let mut columns = large(vec![0u32; end as usize]);
+        let mut m = large(vec![0.0; end as usize]);
+        let mut a = large(vec![0.0; end as usize]);
+        let mut diagonal = large(vec![0.0; lengths.len()]);
+        let mut lengths = lengths;
+        let parts = split_rows(&offsets, CHUNK, &mut columns)
+            .into_par_iter()
+            .zip(split_rows(&offsets, CHUNK, &mut m))
+            .zip(split_rows(&offsets, CHUNK, &mut a))
+            .zip(diagonal.par_chunks_mut(CHUNK))
+            .zip(lengths.par_chunks_mut(CHUNK));
+        let misfits = parts.map_init(Row::default, |row, parts| {
+            let (((((rows, columns), (_, m)), (_, a)), diagonal), lengths) = parts;
+            let first = offsets[rows.start] as usize;
+            let mut fit = true;
+            for ((v, diagonal), length) in rows.zip(diagonal).zip(lengths) {
+                self.row(v, row);
+                let h = self.by_valence[self.valence[v] as usize][0];
+                *diagonal = h * row.values[row.own];
+                let start = offsets[v] as usize - first;
+                let range = start..start + row.columns.len();
+                if row.columns.len() <= *length as usize {
+                    columns[range.clone()].copy_from_slice(&row.columns);
+                    m[range.clone()].copy_from_slice(&row.values);
+                    for (a, m) in a[range].iter_mut().zip(&row.values) {
+                        *a = h * m;
+                    }
+                } else {
+                    fit = false;
+                }
+                *length = row.columns.len() as u32;
+            }
+            usize::from(!fit)
+        });
+        let fit = misfits.sum::<usize>() == 0;
+        if fit {
+            let filled = close_gaps(&mut offsets, &lengths, |from, to| {
+                columns.copy_within(from.clone(), to);
+                m.copy_within(from.clone(), to);
+                a.copy_within(from, to);
+            });
+            columns.truncate(filled);
+            m.truncate(filled);
+            a.truncate(filled);
+        }
+        Ok(if fit {
+            Ok(Arrays {
+                offsets,
+                columns,
+                m,
+                a,
+                diagonal,
+            })
+        } else {
+            Err(lengths)
+        })
+    }
+
+    /// Row `v` of M on a closed mesh, if it is short and no vertex occurs twice in the faces at `v` but by their common
+    /// edges: the same entries to the last bit, with half the contributions. Otherwise `false`.
+    fn usual_row(&self, v: usize, row: &mut Row) -> bool {
+        let (faces, incidence, blocks) = (self.faces, &self.topology.incidence, self.blocks);
+        let (corners, twins) = (faces.corners(), self.topology.twins());
+        let block_at = |c: u32| {
+            let range = faces.range(incidence.face_of(c));
+            (&blocks.by_size[range.len()], range)
+        };
+        let short = &mut row.short;
+        short.len = 0;
+        let [_, mut own] = self.by_valence[self.valence[v] as usize];
+        for &c in incidence.corners_at(v) {
+            let (block, range) = block_at(c);
+            own += block[0];
+            // Both halves of the edge that leaves; the one that enters leaves in another face.
+            let (across, _) = block_at(twins[c as usize]);
+            let mut other = next_in(&range, c);
+            short.add(corners[other as usize], block[1] + across[across.len() - 1]);
+            if !blocks.sides_only {
+                for &weight in &block[2..block.len() - 1] {
+                    other = next_in(&range, other);
+                    short.add(corners[other as usize], weight);
+                }
+            }
+        }
+        short.add(v as u32, own);
+        let sorted = short.sort_into(&mut row.columns, &mut row.values);
+        row.own = sorted.unwrap_or(0);
+        sorted.is_some()
+    }
+
+    /// Row `v` of M.
+    fn row(&self, v: usize, row: &mut Row) {
+        if self.closed && self.usual_row(v, row) {
+            return;
+        }
+        let (faces, topology, blocks) = (self.faces, self.topology, self.blocks);
+        let corners = faces.corners();
+        let has_boundary = topology.boundary_edges() > 0;
+        row.keys.clear();
+        row.contributions.clear();
+        let [_, mut own] = self.by_valence[self.valence[v] as usize];
+        for &c in topology.incidence.corners_at(v) {
+            let range = faces.range(topology.incidence.face_of(c));
+            let block = &blocks.by_size[range.len()];
+            own += block[0];
+            let (next, prev) = (next_in(&range, c), prev_in(&range, c));
+            if blocks.sides_only {
+                row.add(corners[next as usize], block[1]);
+                row.add(corners[prev as usize], block[range.len() - 1]);
+            } else {
+                let place = c as usize - range.start;
+                let face = &corners[range];
+                for (&w, &weight) in face[place + 1..].iter().zip(&block[1..]) {
+                    row.add(w, weight);
+                }
+                for (&w, &weight) in face[..place].iter().zip(&block[block.len() - place..]) {
+                    row.add(w, weight);
+                }
+            }
+            if has_boundary {
+                // A side without a face across it brings the edge's other half itself.
+                for (side, end) in [(c, next), (prev, prev)] {
+                    if topology.twin(side).is_none() {
+                        row.add(corners[end as usize], blocks.half_edge);
+                    }
+                }
+            }
+        }
+        row.add(v as u32, own);
+        row.sum(v);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::system::valences;
+    use crate::assemble::{Masks, Scheme};
+    use crate::mesh::Mesh;
+    use crate::mesh::builtin::builtin;
+    use crate::mesh::generate::{random_polygons, random_triangulation};
+
+    /// How many rows of M are made the usual way, after comparing them with those made the general way.
+    fn usual_rows(mesh: &Mesh, scheme: Scheme) -> usize {
+        let topology = Topology::new(&mesh.faces, mesh.len());
+        assert!(topology.is_closed());
+        let valence = valences(&mesh.faces, &topology);
+        let most = valence.iter().max().map_or(0, |&n| n as usize);
+        let by_valence: Vec<[f64; 2]> = (0..=most)
+            .map(|n| [scheme.h(n), scheme.vertex_weight(n)])
+            .collect();
+        let blocks = FaceBlocks::new(&mesh.faces, &scheme);
+        let mut rows = Rows::new(&mesh.faces, &topology, &blocks, &by_valence, &valence);
+        rows.closed = false;
+        let (mut usual, mut general) = (Row::default(), Row::default());
+        let same = |v: &usize| {
+            let taken = rows.usual_row(*v, &mut usual);
+            if taken {
+                rows.row(*v, &mut general);
+                assert_eq!(usual.columns, general.columns, "{scheme}, row {v}");
+                let bits = |row: &Row| row.values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+                assert_eq!(bits(&usual), bits(&general), "{scheme}, row {v}");
+                assert_eq!(usual.own, general.own);
+            }
+            taken
+        };
+        (0..mesh.len()).filter(same).count()
+    }
+
+    #[test]
+    fn usual_rows_are_the_general_ones_to_the_last_bit() {
+        let quads = builtin("irregular-quad:2000").unwrap();
+        let polygons = builtin("irregular-poly:2000").unwrap();
+        let triangles = builtin("irregular-tri:2000").unwrap();
+        for scheme in Scheme::ALL {
+            if scheme.needs_triangles() {
+                assert!(usual_rows(&triangles, scheme) > triangles.len() * 9 / 10);
+            } else {
+                assert!(usual_rows(&quads, scheme) > quads.len() * 9 / 10);
+                assert!(usual_rows(&polygons, scheme) > polygons.len() / 2);
+            }
+            // Several components, large faces, large valences.
+            for seed in 0..20 {
+                let triangles = random_triangulation(seed);
+                assert!(usual_rows(&triangles, scheme) > triangles.len() / 2);
+                if !scheme.needs_triangles() {
+                    assert!(usual_rows(&random_polygons(seed), scheme) > 0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rows_with_a_vertex_in_two_places_are_left_to_the_general_way() {
+        // A square and its back: all vertices have valence 2 and meet the opposite one in both faces.
+        let faces = Faces::from_lists([[0, 1, 2, 3], [3, 2, 1, 0]]);
+        let mesh = Mesh::new(vec![glam::DVec3::ZERO; 4], faces);
+        assert_eq!(usual_rows(&mesh, Scheme::CatmullClark), 0);
+        // The two apexes have too long rows, the others meet both apexes and their neighbours on the rim.
+        let bipyramid = builtin("bipyramid:40").unwrap();
+        assert_eq!(usual_rows(&bipyramid, Scheme::Loop), 40);
+    }
+}
