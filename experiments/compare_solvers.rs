@@ -77,7 +77,7 @@ fn compare(input: &Input, arguments: &Arguments) -> Result<Vec<Row>> {
     let system = input.system()?;
     let order = arguments
         .order
-        .order(&input.mesh, &input.topology.incidence);
+        .order(&input.mesh, &input.topology().incidence);
     let methods = match &arguments.method {
         Some(list) => list.0.clone(),
         None => Method::ALL.to_vec(),

@@ -369,7 +369,7 @@ fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result
     let start = Instant::now();
     let order = arguments
         .order
-        .order(&input.mesh, &input.topology.incidence);
+        .order(&input.mesh, &input.topology().incidence);
     let order = part
         .as_ref()
         .map_or_else(|| order.clone(), |p| p.order(&order));
@@ -431,9 +431,11 @@ fn no_progress(outcome: Outcome) -> bool {
 fn fastest(arguments: &Arguments, input: &Input) -> Result<Option<Control>> {
     let stop = arguments.stop.stop(&input.mesh);
     let progress = Progress::open("solving", arguments.common.quiet);
-    let (mesh, topology) = (&input.mesh, &input.topology);
-    let found = control_points(mesh, Some(topology), input.scheme, &stop)
-        .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
+    let found = match input.renumbered() {
+        Some((moved, topology)) => moved.control_points(Some(topology), input.scheme, &stop),
+        None => control_points(&input.mesh, Some(input.topology()), input.scheme, &stop),
+    }
+    .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
     drop(progress);
     if no_progress(found.report.outcome) {
         return Ok(None);
@@ -459,7 +461,7 @@ fn by_colour(arguments: &Arguments, input: &Input, method: Method) -> Result<Con
     let start = Instant::now();
     let stop = arguments.stop.stop(&input.mesh);
     let progress = Progress::open("solving", arguments.common.quiet);
-    let (mesh, topology) = (&input.mesh, &input.topology);
+    let (mesh, topology) = (&input.mesh, input.topology());
     let numbering = in_colours(&mesh.faces, &topology.incidence);
     let operator = Operator::in_order(&mesh.faces, topology, input.scheme, Some(&numbering))
         .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
@@ -494,13 +496,13 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
     let start = Instant::now();
     let order = arguments
         .order
-        .order(&input.mesh, &input.topology.incidence);
+        .order(&input.mesh, &input.topology().incidence);
     let phase = PhaseOne {
         sweep: Sweep::GaussSeidel(Some(&order)),
         max_iterations: arguments.shape.ite_max,
         eps: arguments.shape.eps,
     };
-    let (mesh, topology) = (&input.mesh, &input.topology);
+    let (mesh, topology) = (&input.mesh, input.topology());
     let marks = wishes.interpolated.as_deref();
     let found = zheng_cai::auxiliary(mesh, topology, marks, &phase)?;
     Ok(Control {
@@ -524,7 +526,7 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
 
 /// How far the limit points of an auxiliary mesh are from those interpolated.
 fn auxiliary_errors(input: &Input, marks: Option<&[bool]>, auxiliary: &Mesh) -> Result<Errors> {
-    let limits = limit_positions(Rule::ZhengCai, auxiliary, &input.topology)?;
+    let limits = limit_positions(Rule::ZhengCai, auxiliary, input.topology())?;
     let pairs = input.mesh.positions.iter().zip(&limits).enumerate();
     let distances: Vec<f64> = pairs
         .filter(|(v, _)| marks.is_none_or(|m| m[*v]))
@@ -557,7 +559,7 @@ fn refine(
         },
     };
     let points = &input.mesh.positions;
-    let surface = surface(mesh, &input.topology, input.scheme, points, &request)?;
+    let surface = surface(mesh, || input.topology(), input.scheme, points, &request)?;
     let mut seconds = control.seconds;
     seconds.subdivide = start.elapsed().as_secs_f64();
     Ok(Finished {
@@ -593,7 +595,13 @@ fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Fini
         normals: flags.write_normals,
         ..Request::default()
     };
-    let surface = surface(found.mesh, &fairness.topology, input.scheme, &[], &request)?;
+    let surface = surface(
+        found.mesh,
+        || &fairness.topology,
+        input.scheme,
+        &[],
+        &request,
+    )?;
     Ok(Finished {
         method: "halstead",
         surface,

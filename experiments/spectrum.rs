@@ -174,10 +174,10 @@ fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
         arguments.full || !arguments.no_sweeps || arguments.modes > 0 || arguments.certify;
     let system = explicit.then(|| input.system()).transpose()?;
     let operator =
-        limitlab::assemble::Operator::new(&input.mesh.faces, &input.topology, input.scheme)
+        limitlab::assemble::Operator::new(&input.mesh.faces, input.topology(), input.scheme)
             .map_err(with_name)?;
     let progress = Progress::new(&input.name, 5, arguments.common.quiet);
-    let verdict = Singularity::detect(&input.mesh, &input.topology, input.scheme);
+    let verdict = Singularity::detect(&input.mesh, input.topology(), input.scheme);
     let promise = Promise::new(&operator.bounds());
     let tolerance = arguments.stop.stop(&input.mesh).tolerance;
     let counts = promise.counts(&operator, &input.mesh.positions, tolerance);
@@ -186,7 +186,7 @@ fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
         _ => None,
     };
     progress.step();
-    let ends = mesh_ends(&input.mesh, &input.topology, input.scheme).map_err(with_name)?;
+    let ends = mesh_ends(&input.mesh, input.topology(), input.scheme).map_err(with_name)?;
     if !ends.converged() {
         arguments.common.remark(format_args!(
             "{}: an end of the spectrum is the edge of a dense band; its error is in the table",

@@ -106,7 +106,7 @@ fn sweep_one(input: &Input, arguments: &Arguments) -> Result<Sweep> {
     let system = input.system()?;
     let order = arguments
         .order
-        .order(&input.mesh, &input.topology.incidence);
+        .order(&input.mesh, &input.topology().incidence);
     let grids: Vec<(Method, Vec<f64>)> = arguments
         .method
         .0

@@ -1,6 +1,7 @@
 //! MESH arguments: files or built-in names, noise, scheme, validation.
 
 use std::path::Path;
+use std::sync::OnceLock;
 use std::time::Instant;
 
 use clap::Args;
@@ -9,10 +10,9 @@ use serde_json::{Value, json};
 use super::CommonFlags;
 use crate::assemble::{LimitSystem, Scheme};
 use crate::error::{Error, Result};
-use crate::interpolate::automatic::SCATTERED;
+use crate::interpolate::automatic::{Renumbered, renumbered};
 use crate::mesh::io::{self, Loaded};
 use crate::mesh::noise::{Noise, add_noise};
-use crate::mesh::order::{along_curve, is_scattered};
 use crate::mesh::validate::{Boundary, Validation, validate};
 use crate::mesh::{Mesh, Topology, builtin};
 
@@ -33,14 +33,15 @@ pub struct MeshFlags {
     pub defects: bool,
 }
 
-/// A valid mesh with its topology and the scheme that is meant.
+/// A valid mesh and the scheme that is meant.
 pub struct Input {
     /// As the user named it.
     pub name: String,
     /// The name, with the noise if there is any: for tables and plots.
     pub label: String,
     pub mesh: Mesh,
-    pub topology: Topology,
+    topology: OnceLock<Topology>,
+    renumbered: Option<(Renumbered, Topology)>,
     pub scheme: Scheme,
     /// Reading the file or making the built-in mesh.
     pub read_seconds: f64,
@@ -103,7 +104,7 @@ impl MeshFlags {
         if let Some(noise) = self.noise {
             add_noise(&mut loaded.mesh, noise.amplitude, noise.seed);
         }
-        let report = self.report(&loaded);
+        let (report, renumbered) = self.report(&loaded);
         if self.defects {
             let json = serde_json::to_string_pretty(&report)
                 .map_err(|e| Error::Computation(format!("{name}: {e}")))?;
@@ -113,7 +114,11 @@ impl MeshFlags {
         for remark in &report.remarks {
             common.remark(format_args!("{name}: {remark}"));
         }
-        let topology = report.into_topology(name)?;
+        let found = report.into_topology(name)?;
+        let (topology, renumbered) = match renumbered {
+            Some(renumbered) => (OnceLock::new(), Some((renumbered, found))),
+            None => (OnceLock::from(found), None),
+        };
         let mesh = loaded.mesh;
         let scheme = self.scheme.unwrap_or_else(|| {
             let scheme = Scheme::default_for(&mesh.faces);
@@ -131,35 +136,46 @@ impl MeshFlags {
             label,
             mesh,
             topology,
+            renumbered,
             scheme,
             read_seconds,
             check_seconds: start.elapsed().as_secs_f64(),
         }))
     }
 
-    /// The validator's report on a loaded mesh.
-    pub fn report(&self, loaded: &Loaded) -> Validation {
+    /// The validator's report on a loaded mesh, or on this mesh renumbered.
+    fn report(&self, loaded: &Loaded) -> (Validation, Option<Renumbered>) {
+        let mesh = &loaded.mesh;
+        if let Some(moved) = renumbered(mesh) {
+            // Looking for what is not there is many times faster on a renumbered copy. What is there needs the
+            // file's own numbers.
+            let report = validate(&moved.mesh, None, self.boundary);
+            if report.is_valid() && report.remarks.is_empty() {
+                return (report, Some(moved));
+            }
+        }
         let lines = loaded
             .lines
             .as_ref()
             .map(|l| (l.vertices.as_slice(), l.faces.as_slice()));
-        let mesh = &loaded.mesh;
-        if mesh.len() >= SCATTERED && is_scattered(&mesh.faces) {
-            // Looking for what is not there is many times faster on a renumbered copy. What is there needs the
-            // file's own numbers.
-            if let Some((moved, _)) = along_curve(mesh) {
-                let mut report = validate(&moved, None, self.boundary);
-                if report.is_valid() && report.remarks.is_empty() {
-                    report.topology = Some(Topology::new(&mesh.faces, mesh.len()));
-                    return report;
-                }
-            }
-        }
-        validate(mesh, lines, self.boundary)
+        (validate(mesh, lines, self.boundary), None)
     }
 }
 
 impl Input {
+    /// The topology of the mesh; found when it is first asked for, if the validator looked at a renumbered mesh.
+    pub fn topology(&self) -> &Topology {
+        self.topology
+            .get_or_init(|| Topology::new(&self.mesh.faces, self.mesh.len()))
+    }
+
+    /// The mesh along a space-filling curve and the topology of that, where the file is scattered.
+    pub fn renumbered(&self) -> Option<(&Renumbered, &Topology)> {
+        self.renumbered
+            .as_ref()
+            .map(|(mesh, topology)| (mesh, topology))
+    }
+
     /// A stem for file names: the program's `prefix`, the mesh's own name without folder and ending, the scheme.
     pub fn stem(&self, prefix: &str) -> String {
         let path = Path::new(&self.name);
@@ -205,7 +221,7 @@ impl Input {
     /// # Errors
     /// As [`LimitSystem::new`], with the mesh's name.
     pub fn system(&self) -> Result<LimitSystem> {
-        LimitSystem::new(&self.mesh, &self.topology, self.scheme)
+        LimitSystem::new(&self.mesh, self.topology(), self.scheme)
             .map_err(|e| Error::mesh(&self.name, e.to_string()))
     }
 }

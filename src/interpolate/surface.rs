@@ -48,7 +48,8 @@ pub fn refinement(scheme: Scheme) -> Refinement {
     }
 }
 
-/// Makes the surface of a control mesh found for `scheme`. `points` are the given points.
+/// Makes the surface of a control mesh found for `scheme`. `points` are the given points; `topology` gives that of
+/// `control`, where it is needed.
 ///
 /// Catmull-Clark, Loop and √3: original vertices keep their numbers; given normals are met by turned rings
 /// ([`rotate_rings`]), which need two levels or more. Nasri and Zheng-Cai: the first level is the scheme's own first
@@ -60,10 +61,10 @@ pub fn refinement(scheme: Scheme) -> Refinement {
 /// [`FirstRefinement::new`] and the refinement.
 ///
 /// # Panics
-/// If a list has not one entry a vertex, or `topology` is not that of `control`.
-pub fn surface(
+/// If a list has not one entry a vertex, or `topology` gives another than that of `control`.
+pub fn surface<'a>(
     control: Mesh,
-    topology: &Topology,
+    topology: impl Fn() -> &'a Topology,
     scheme: Scheme,
     points: &[DVec3],
     request: &Request,
@@ -86,7 +87,7 @@ pub fn surface(
             let corrected =
                 rule == Rule::ZhengCai || given.normals.is_some() || given.handles.is_some();
             if corrected {
-                let first = FirstRefinement::new(&control, topology, rule, points, given)?;
+                let first = FirstRefinement::new(&control, topology(), rule, points, given)?;
                 Surface {
                     mesh: first.surface(request.levels)?,
                     normals: None,
@@ -101,7 +102,7 @@ pub fn surface(
     if request.limit || request.normals {
         let own;
         let at = if request.levels == 0 {
-            topology
+            topology()
         } else {
             own = Topology::new(&surface.mesh.faces, surface.mesh.len());
             &own

@@ -7,6 +7,8 @@ use rayon::prelude::*;
 
 use super::validate::counted;
 use super::{Faces, Mesh};
+use crate::pages::large;
+use crate::prefetch::prefetch;
 
 /// A remark for each kind of oddity that occurs, with its count and first place.
 ///
@@ -85,29 +87,46 @@ fn copies<T: Ord>(
     value: impl Fn(u32) -> T,
 ) -> Vec<(u32, u32)> {
     const BITS_PER_ITEM: usize = 16;
+    const BLOCK: usize = 64;
     let bits = (BITS_PER_ITEM * count as usize).next_power_of_two().max(64);
     let table = || -> Vec<AtomicU64> {
-        let words = (0..bits / 64).into_par_iter();
-        words.map(|_| AtomicU64::new(0)).collect()
+        let mut words = large(Vec::with_capacity(bits / 64));
+        words.par_extend((0..bits / 64).into_par_iter().map(|_| AtomicU64::new(0)));
+        words
     };
     let (met, met_again) = (table(), table());
     let place = |key: u64| {
         let bit = key as usize & (bits - 1);
         (bit / 64, 1u64 << (bit % 64))
     };
-    let items = || (0..count).into_par_iter().with_min_len(4096);
-    items().filter_map(&key).for_each(|key| {
-        let (word, bit) = place(key);
-        if met[word].fetch_or(bit, Ordering::Relaxed) & bit != 0 {
-            met_again[word].fetch_or(bit, Ordering::Relaxed);
+    // Each look into a table is a wait for memory, unless it is asked for some items before.
+    let block = |k: u32, table: &[AtomicU64]| {
+        let items = k * BLOCK as u32..count.min((k + 1) * BLOCK as u32);
+        let mut keys = [None; BLOCK];
+        for (slot, item) in keys.iter_mut().zip(items.clone()) {
+            *slot = key(item);
+            if let Some(key) = *slot {
+                prefetch(table, place(key).0);
+            }
+        }
+        items.zip(keys).filter_map(|(item, key)| Some((key?, item)))
+    };
+    let blocks = || (0..count.div_ceil(BLOCK as u32)).into_par_iter();
+    blocks().with_min_len(BLOCK).for_each(|k| {
+        for (key, _) in block(k, &met) {
+            let (word, bit) = place(key);
+            if met[word].fetch_or(bit, Ordering::Relaxed) & bit != 0 {
+                met_again[word].fetch_or(bit, Ordering::Relaxed);
+            }
         }
     });
-    let mut keys: Vec<(u64, u32)> = items()
-        .filter_map(|item| {
-            let key = key(item)?;
-            let (word, bit) = place(key);
-            (met_again[word].load(Ordering::Relaxed) & bit != 0).then_some((key, item))
-        })
+    let shares_a_bit = |&(key, _): &(u64, u32)| {
+        let (word, bit) = place(key);
+        met_again[word].load(Ordering::Relaxed) & bit != 0
+    };
+    let mut keys: Vec<(u64, u32)> = blocks()
+        .with_min_len(BLOCK)
+        .flat_map_iter(|k| block(k, &met_again).filter(shares_a_bit))
         .collect();
     keys.par_sort_unstable();
     let mut copies = Vec::new();
