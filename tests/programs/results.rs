@@ -4,7 +4,9 @@ use std::path::Path;
 
 use glam::DVec3;
 use limitlab::assemble::Scheme;
-use limitlab::mesh::{Mesh, io};
+use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
+use limitlab::mesh::order::{Order, is_scattered};
+use limitlab::mesh::{Mesh, Topology, io};
 use nalgebra_sparse::CsrMatrix;
 use sprs::io::read_matrix_market;
 use tempfile::tempdir;
@@ -15,7 +17,7 @@ use crate::common::matrix_market::read_array;
 use crate::common::meshes::*;
 use crate::*;
 
-/// What the issue of these files promises: entries within 1e-13 of the formulas (in A's scale, where rows sum to 1).
+/// What is promised of these files: entries within 1e-13 of the formulas (in A's scale, where rows sum to 1).
 const ENTRIES: f64 = 1e-13;
 
 fn largest_difference(read: &sprs::CsMat<f64>, plain: &CsrMatrix<f64>, h: &[f64]) -> f64 {
@@ -162,6 +164,32 @@ fn the_control_mesh_satisfies_the_equation_and_keeps_the_faces() {
             }
         }
     }
+}
+
+#[test]
+fn a_file_in_random_order_is_solved_and_written_in_its_own_order() {
+    let folder = tempdir().unwrap();
+    // Enough vertices that the program renumbers them.
+    let mesh = noisy("irregular-poly:60000");
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    let order = Order::Random(3).order(&mesh, &topology.incidence);
+    let mesh = shuffle_faces(&permute_vertices(&mesh, &order), 3);
+    assert!(is_scattered(&mesh.faces));
+    io::write(&folder.path().join("p.ply"), &mesh, None).unwrap();
+    let solve = |arguments: &[&str]| {
+        let arguments = [&["p.ply", "-o", "v.ply", "--quiet"], arguments].concat();
+        assert_done(&run(INTERPOLATE, folder.path(), &arguments), "random order");
+        let written = io::read(&folder.path().join("v.ply")).unwrap().mesh;
+        (written.faces == mesh.faces, written)
+    };
+    let (same_faces, control) = solve(&["--tol-absolute", "1e-9"]);
+    assert!(same_faces);
+    assert!(residual(Scheme::CatmullClark, &mesh, &control) <= 1.0001e-9);
+    // What comes after the solve has the file's order too.
+    let (same_faces, limit) = solve(&["--tol-absolute", "1e-9", "--limit"]);
+    assert!(same_faces);
+    let pairs = limit.positions.iter().zip(&mesh.positions);
+    assert!(pairs.map(|(p, q)| p.distance(*q)).fold(0.0, f64::max) <= 1.0001e-9);
 }
 
 #[test]
