@@ -7,8 +7,10 @@ use glam::{DVec3, Vec3A};
 use limitlab::assemble::{LimitSystem, Operator, Scheme};
 use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::colours::in_colours;
+use limitlab::mesh::curve::{along_curve, is_scattered};
+use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::generate::{dual, permute_vertices, random_polygons, shuffle_faces, union};
-use limitlab::mesh::order::{Numbering, Order, along_curve, colouring, in_fronts, is_scattered};
+use limitlab::mesh::order::{Numbering, Order, colouring};
 use limitlab::mesh::{Faces, Mesh, Topology, builtin::builtin, noise::add_noise};
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
 use limitlab::solvers::coloured::Coloured;
@@ -505,15 +507,21 @@ fn gauss_seidel_by_colours_solves_and_knows_when_it_cannot() {
     }
 }
 
-#[test]
-fn gauss_seidel_in_waves_solves_large_meshes() {
+/// 163 842 vertices, above the size from which iterations are grouped, and what they are solved to.
+fn large() -> (Both, Operator, Numbering, Stop) {
     let case = both("icosphere:7", mesh("icosphere:7"), Scheme::Loop);
     let (operator, numbering) = in_front_order(&case);
-    let points = numbering.there(&case.mesh.positions);
     let stop = Stop {
         tolerance: 1e-10 * case.mesh.diagonal(),
         max_iterations: 1000,
     };
+    (case, operator, numbering, stop)
+}
+
+#[test]
+fn gauss_seidel_in_waves_solves_large_meshes() {
+    let (case, operator, numbering, stop) = large();
+    let points = numbering.there(&case.mesh.positions);
     let (control, report) = in_waves(&operator, &points, 1.0, &stop);
     assert_eq!(report.outcome, Outcome::Converged);
     let mut sor = Sor::new(&operator, &points, 1.0, None);
@@ -536,14 +544,8 @@ fn gauss_seidel_in_waves_solves_large_meshes() {
 
 #[test]
 fn large_meshes_take_the_banded_way_with_the_same_result_as_the_explicit_method() {
-    // 163 842 vertices: above the size from which iterations are grouped.
-    let case = both("icosphere:7", mesh("icosphere:7"), Scheme::Loop);
-    let (operator, numbering) = in_front_order(&case);
+    let (case, operator, numbering, stop) = large();
     let points = numbering.there(&case.mesh.positions);
-    let stop = Stop {
-        tolerance: 1e-10 * case.mesh.diagonal(),
-        max_iterations: 1000,
-    };
     let bound = operator.bounds().lambda_min;
     let solve = || mixed::solve(&operator, &points, &stop);
     let one = in_threads(1, solve);

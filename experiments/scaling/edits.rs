@@ -7,7 +7,7 @@ use limitlab::Result;
 use limitlab::analysis::interval::interval;
 use limitlab::analysis::spectrum::Operator as Which;
 use limitlab::assemble::{Operator, Scheme};
-use limitlab::mesh::order::in_fronts;
+use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::{Mesh, Topology};
 use limitlab::report::{Column, Table};
 use limitlab::solvers::local::{Editor, decay};

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3A};
 use limitlab::Result;
 use limitlab::assemble::{LimitSystem, Operator, Scheme};
 use limitlab::mesh::colours::in_colours;
-use limitlab::mesh::order::in_fronts;
+use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::{Mesh, Topology};
 use limitlab::report::{Column, Table};
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};

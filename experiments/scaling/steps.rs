@@ -14,6 +14,7 @@ use limitlab::subdivide::{Refinement, sqrt3, unified_sqrt3};
 use limitlab::{Result, cli};
 
 use super::noisy;
+use super::threads::on_threads;
 
 /// Runs of which the fastest counts.
 const RUNS: usize = 3;
@@ -53,12 +54,6 @@ pub fn steps(n: usize, folder: &Path) -> Result<()> {
         let random = shuffle_faces(&permute_vertices(&good, &order), 7);
         for (order, mesh) in [("good", &good), ("random", &random)] {
             for &threads in &threads {
-                let pool = rayon::ThreadPoolBuilder::new()
-                    .num_threads(threads)
-                    .build()
-                    .map_err(|e| {
-                        Error::Computation(format!("cannot start {threads} threads: {e}"))
-                    })?;
                 let mut rows = Rows {
                     table: &mut table,
                     mesh,
@@ -68,7 +63,7 @@ pub fn steps(n: usize, folder: &Path) -> Result<()> {
                         threads.to_string(),
                     ],
                 };
-                pool.install(|| rows.measure(folder))?;
+                on_threads(threads, || rows.measure(folder))??;
             }
         }
     }

@@ -5,7 +5,7 @@ use std::time::Instant;
 use limitlab::assemble::{Operator, Scheme};
 use limitlab::error::Error;
 use limitlab::mesh::colours::in_colours;
-use limitlab::mesh::order::in_fronts;
+use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::{Mesh, Topology};
 use limitlab::report::{Column, Table};
 use limitlab::solvers::Method;

@@ -14,7 +14,7 @@ use super::spectrum::{Operator, scales, symmetric};
 use super::{dense, eigen::Eigenvalue};
 use crate::assemble::{LimitSystem, Scheme};
 use crate::error::Result;
-use crate::mesh::topology::{next_in, prev_in};
+use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Mesh, Topology};
 use crate::solvers::Method;
 

@@ -14,7 +14,7 @@ use super::{dense, lanczos};
 use crate::assemble::bounds::SpectralBounds;
 use crate::assemble::{Csr, LimitSystem, Scheme};
 use crate::error::Result;
-use crate::mesh::order::in_fronts;
+use crate::mesh::fronts::in_fronts;
 use crate::mesh::{Mesh, Topology};
 use crate::solvers::System;
 use crate::solvers::system::Rows;

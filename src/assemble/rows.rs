@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::system::FaceBlocks;
 use crate::error::{Error, Result};
-use crate::mesh::topology::{next_in, prev_in, split_rows};
+use crate::mesh::incidence::{next_in, prev_in, split_rows};
 use crate::mesh::{Faces, Topology};
 use crate::pages::large;
 

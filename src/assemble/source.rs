@@ -9,8 +9,9 @@ use super::scheme::{Masks, Scheme};
 use super::stencil::{Kind, LargeFaces, Listed, Ring, Rings};
 use super::system::FaceBlocks;
 use crate::error::{Error, Result};
+use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::order::Numbering;
-use crate::mesh::topology::{NONE, next_in, prev_in};
+use crate::mesh::topology::NONE;
 use crate::mesh::{Faces, Incidence, Topology};
 use crate::pages::large;
 

@@ -22,7 +22,9 @@ use glam::DVec3;
 
 use crate::assemble::{Operator, Scheme};
 use crate::error::Result;
-use crate::mesh::order::{Numbering, along_curve, in_fronts, in_kinds, is_scattered};
+use crate::mesh::curve::{along_curve, is_scattered};
+use crate::mesh::fronts::{in_fronts, in_kinds};
+use crate::mesh::order::Numbering;
 use crate::mesh::{Incidence, Mesh, Topology};
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::{Iterate, Method, Outcome, Report, Stop, mixed, solve};

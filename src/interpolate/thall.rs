@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::Result;
-use crate::mesh::topology::{next_in, prev_in};
+use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Mesh, Topology, generate};
 use crate::solvers::iteration::{Errors, Failure, Iterate};
 use crate::solvers::jacobi::THALL_OMEGA;

@@ -9,7 +9,8 @@ use glam::DVec3;
 use super::generate::{
     dual, flip_edges, merge_faces, midpoint_split, quad_split, ring_sphere, union,
 };
-use super::topology::{Topology, next_in};
+use super::incidence::next_in;
+use super::topology::Topology;
 use super::{Faces, Mesh};
 use crate::{Error, Result};
 

@@ -1,6 +1,7 @@
 //! Vertices colour by colour, for sweeps that relax all of a colour at once.
 
-use super::order::{Numbering, breadth_first, colouring};
+use super::fronts::breadth_first;
+use super::order::{Numbering, colouring};
 use super::{Faces, Incidence};
 
 /// The colours of [`Order::Multicolour`](super::order::Order::Multicolour), one after the other, each [breadth

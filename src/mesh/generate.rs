@@ -9,7 +9,8 @@ use glam::DVec3;
 use rand::{Rng, RngExt, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
-use super::topology::{NONE, Topology, next_in, prev_in};
+use super::incidence::{next_in, prev_in};
+use super::topology::{NONE, Topology};
 use super::{Faces, Mesh, builtin};
 
 /// For every half-edge the number of its edge, and the two ends of every edge, numbered by

@@ -3,10 +3,14 @@
 
 pub mod builtin;
 pub mod colours;
+pub mod curve;
+mod cuthill_mckee;
 mod defect;
 mod degenerate;
 pub(crate) mod edge_numbers;
+pub mod fronts;
 pub mod generate;
+pub mod incidence;
 pub mod io;
 pub mod noise;
 pub mod obj;
@@ -23,7 +27,8 @@ use std::sync::OnceLock;
 use glam::DVec3;
 use rayon::prelude::*;
 
-pub use topology::{Incidence, Topology};
+pub use incidence::Incidence;
+pub use topology::Topology;
 
 /// Faces of one task.
 const CHUNK: usize = 1 << 16;

@@ -9,7 +9,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::Mesh;
-use super::topology::{Topology, next_in};
+use super::incidence::next_in;
+use super::topology::Topology;
 use crate::{Error, Result};
 
 /// A Gaussian displacement of all vertices: `--noise A[:SEED]`, seed 1 unless told.

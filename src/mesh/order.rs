@@ -1,16 +1,17 @@
 //! Vertex orders, for sweeps in place and for renumbering: order `o` puts vertex `o[k]` at the k-th place.
 
 use std::fmt;
-use std::ops::Range;
 use std::str::FromStr;
 
-use glam::DVec3;
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::topology::Incidence;
-use super::{Faces, Mesh, bounding_box};
+use super::curve::morton;
+use super::cuthill_mckee::reverse_cuthill_mckee;
+use super::fronts::breadth_first;
+use super::incidence::Incidence;
+use super::{Faces, Mesh};
 use crate::{Error, Result};
 
 /// `--order file|reverse|bfs|rcm|morton|valence|multicolour|random[:SEED]`.
@@ -91,7 +92,7 @@ impl Order {
             Order::File => file.collect(),
             Order::Reverse => file.rev().collect(),
             Order::Bfs => breadth_first(&mesh.faces, incidence),
-            Order::Rcm => Search::new(&mesh.faces, incidence).reverse_cuthill_mckee(),
+            Order::Rcm => reverse_cuthill_mckee(&mesh.faces, incidence),
             Order::Morton => morton(&mesh.positions),
             Order::Valence => {
                 let mut order: Vec<u32> = file.collect();
@@ -253,377 +254,10 @@ pub fn locality(faces: &Faces, order: &[u32]) -> Locality {
     }
 }
 
-/// Whether vertices that faces bring together lie scattered through memory: of the vertices that a face does not
-/// share with the face before it, fewer than a quarter are within 128 places of one of that face's. Looks
-/// at 65 536 faces at the most.
-pub fn is_scattered(faces: &Faces) -> bool {
-    const NEAR: u32 = 128;
-    const NEAR_SHARE: f64 = 0.25;
-    const SAMPLE: usize = 1 << 16;
-    let (mut fresh, mut near) = (0u32, 0u32);
-    for f in (1..faces.len()).step_by(faces.len() / SAMPLE + 1) {
-        let before = faces.face(f - 1);
-        for &v in faces.face(f).iter().filter(|v| !before.contains(v)) {
-            fresh += 1;
-            near += u32::from(before.iter().any(|&w| v.abs_diff(w) <= NEAR));
-        }
-    }
-    f64::from(near) < NEAR_SHARE * f64::from(fresh)
-}
-
-/// The mesh with its vertices along Morton's curve through the cells of a grid of 64³, its faces by smallest vertex, and
-/// that numbering. Every later pass over the mesh then runs through memory almost in order.
-/// `None` if a face names a vertex that does not exist. Two counting sorts, of vertices and of faces.
-pub fn along_curve(mesh: &Mesh) -> Option<(Mesh, Numbering)> {
-    let n = mesh.len();
-    let numbering = Numbering::new(morton_cells(&mesh.positions));
-    let place = numbering.place();
-    let corners: Option<Vec<u32>> = mesh
-        .faces
-        .corners()
-        .par_iter()
-        .with_min_len(8192)
-        .map(|&v| place.get(v as usize).copied())
-        .collect();
-    let moved = Faces::from_parts(mesh.faces.offsets().to_vec(), corners?);
-    let smallest: Vec<u32> = (0..moved.len())
-        .into_par_iter()
-        .with_min_len(8192)
-        .map(|f| moved.face(f).iter().copied().min().unwrap_or(0))
-        .collect();
-    let by_smallest = counting_sort(&smallest, n);
-    let faces = match moved.uniform_size() {
-        // Each face has its place: all threads can work.
-        Some(size) => {
-            let mut corners = vec![0; moved.corners().len()];
-            corners
-                .par_chunks_mut(size)
-                .with_min_len(8192)
-                .zip(&by_smallest)
-                .for_each(|(face, &f)| face.copy_from_slice(moved.face(f as usize)));
-            Faces::from_parts(moved.offsets().to_vec(), corners)
-        }
-        None => {
-            let mut faces = Faces::with_capacity(moved.corners().len());
-            for &f in &by_smallest {
-                faces.push(moved.face(f as usize));
-            }
-            faces
-        }
-    };
-    let positions = numbering.there(&mesh.positions);
-    Some((Mesh::new(positions, faces), numbering))
-}
-
-/// The numbers of the keys in ascending order of the keys, all below `end`; equal keys as they come. O(keys + end).
-fn counting_sort(keys: &[u32], end: usize) -> Vec<u32> {
-    let mut starts = vec![0u32; end + 1];
-    for &key in keys {
-        starts[key as usize + 1] += 1;
-    }
-    for k in 0..end {
-        starts[k + 1] += starts[k];
-    }
-    let mut sorted = vec![0u32; keys.len()];
-    for (k, &key) in (0..).zip(keys) {
-        let slot = &mut starts[key as usize];
-        sorted[*slot as usize] = k;
-        *slot += 1;
-    }
-    sorted
-}
-
-/// One counting sort by the highest bits of the codes, and a sort of each of the short lists that this gives.
-fn morton(positions: &[DVec3]) -> Vec<u32> {
-    /// Bits of a coordinate that the counting sort looks at.
-    const FIRST: u32 = 5;
-    let codes = morton_codes(positions, |code| code);
-    let highest = morton_codes(positions, |code| (code >> (3 * (21 - FIRST))) as u32);
-    let mut order = counting_sort(&highest, 1 << (3 * FIRST));
-    let mut lists: Vec<&mut [u32]> = order
-        .chunk_by_mut(|&v, &w| highest[v as usize] == highest[w as usize])
-        .collect();
-    lists.par_iter_mut().for_each(|list| {
-        list.sort_unstable_by_key(|&v| (codes[v as usize], v));
-    });
-    order
-}
-
-/// The positions by the cells of a grid of 64³ along the curve, within a cell as they come: near enough for memory.
-fn morton_cells(positions: &[DVec3]) -> Vec<u32> {
-    const BITS: u32 = 6;
-    let cells = morton_codes(positions, |code| (code >> (3 * (21 - BITS))) as u32);
-    counting_sort(&cells, 1 << (3 * BITS))
-}
-
-/// `take` of the place of every position along the curve, 21 bits a coordinate.
-fn morton_codes<T: Send>(positions: &[DVec3], take: impl Fn(u64) -> T + Send + Sync) -> Vec<T> {
-    const CELLS: f64 = ((1u64 << 21) - 1) as f64;
-    let (low, high) = bounding_box(positions).unwrap_or((DVec3::ZERO, DVec3::ZERO));
-    let scale = CELLS / (high - low).max_element().max(f64::MIN_POSITIVE);
-    positions
-        .par_iter()
-        .with_min_len(8192)
-        .map(|&p| {
-            // A coordinate that is not a number becomes 0.
-            let cell = ((p - low) * scale).to_array().map(|x| spread(x as u64));
-            take(cell[0] | cell[1] << 1 | cell[2] << 2)
-        })
-        .collect()
-}
-
-/// Puts two zeros between the lowest 21 bits.
-fn spread(x: u64) -> u64 {
-    let mut x = x & 0x1f_ffff;
-    for (shift, mask) in [
-        (32, 0x001f_0000_0000_ffff),
-        (16, 0x001f_0000_ff00_00ff),
-        (8, 0x100f_00f0_0f00_f00f),
-        (4, 0x10c3_0c30_c30c_30c3),
-        (2, 0x1249_2492_4924_9249),
-    ] {
-        x = (x | x << shift) & mask;
-    }
-    x
-}
-
-/// One bit for each of some things: whether it was met.
-struct Met(Vec<u64>);
-
-impl Met {
-    fn new(count: usize) -> Self {
-        Met(vec![0; count.div_ceil(64)])
-    }
-
-    /// Whether this is the first time.
-    #[inline]
-    fn meet(&mut self, k: usize) -> bool {
-        let bit = 1u64 << (k % 64);
-        let word = &mut self.0[k / 64];
-        let first = *word & bit == 0;
-        *word |= bit;
-        first
-    }
-}
-
-/// The vertices breadth first from the first of every component, over faces. Each face is opened once: O(corners).
-pub fn breadth_first(faces: &Faces, incidence: &Incidence) -> Vec<u32> {
-    // Among triangles, and among quads, a corner's face takes no look-up.
-    match faces.uniform_size() {
-        Some(3) => search(faces, incidence, |c| (c / 3, c / 3 * 3..c / 3 * 3 + 3)),
-        Some(4) => search(faces, incidence, |c| (c / 4, c / 4 * 4..c / 4 * 4 + 4)),
-        _ => search(faces, incidence, |c| {
-            let f = incidence.face_of(c as u32);
-            (f, faces.range(f))
-        }),
-    }
-}
-
-fn search(
-    faces: &Faces,
-    incidence: &Incidence,
-    face_at: impl Fn(usize) -> (usize, Range<usize>),
-) -> Vec<u32> {
-    let n = incidence.vertices();
-    let (mut vertices, mut opened) = (Met::new(n), Met::new(faces.len()));
-    // One place more, for what is written there and not kept.
-    let mut order = vec![0u32; n + 1];
-    let (mut next, mut end) = (0, 0);
-    for seed in 0..n {
-        order[end] = seed as u32;
-        end += usize::from(vertices.meet(seed));
-        while next < end {
-            let v = order[next];
-            // Places of the queue that are not taken yet hold a vertex too.
-            incidence.fetch_ahead(faces, &order, next);
-            next += 1;
-            for &c in incidence.corners_at(v as usize) {
-                let (f, range) = face_at(c as usize);
-                if opened.meet(f) {
-                    // No branch on what was met: there is no pattern that a processor could predict.
-                    for &w in &faces.corners()[range] {
-                        order[end] = w;
-                        end += usize::from(vertices.meet(w as usize));
-                    }
-                }
-            }
-        }
-    }
-    order.truncate(n);
-    order
-}
-
-/// An order for sweeps that share passes over memory: [breadth first](breadth_first), so that neighbours lie within
-/// a narrow band, and [rows of one kind](in_kinds) together.
-pub fn in_fronts(faces: &Faces, incidence: &Incidence) -> Numbering {
-    let mut order = breadth_first(faces, incidence);
-    group_kinds(faces, incidence, &mut order);
-    Numbering::new(order)
-}
-
-/// The file's order, but with rows of one kind together: each 256 consecutive vertices by their number of faces and the
-/// kind of these. Few enough to leave neighbours near, enough for a branch predictor (tuned). `None` where the file is
-/// like this already. O(corners), in parallel.
-pub fn in_kinds(faces: &Faces, incidence: &Incidence) -> Option<Numbering> {
-    let mut order: Vec<u32> = (0..incidence.vertices() as u32).collect();
-    group_kinds(faces, incidence, &mut order);
-    (!order.is_sorted()).then(|| Numbering::new(order))
-}
-
-/// Sorts each 256 consecutive vertices by kind: rows of one length, with weights known by valence or listed. Those of one
-/// kind are left as they come.
-fn group_kinds(faces: &Faces, incidence: &Incidence, order: &mut [u32]) {
-    const GROUP: usize = 256;
-    /// Larger numbers, of faces or of neighbours, count as one.
-    const MOST: usize = 63;
-    let uniform = faces.uniform_size();
-    // Triangles only; quads only, as a rule; others by the number of neighbours.
-    let key = |v: u32| {
-        let at = incidence.corners_at(v as usize);
-        let n = at.len();
-        let sizes = at.iter().map(|&c| faces.range(incidence.face_of(c)).len());
-        let corners = uniform.map_or_else(|| sizes.sum(), |size| size * n);
-        match corners {
-            c if c == 3 * n => n.min(MOST),
-            c if c == 4 * n => MOST + 1 + n.min(MOST),
-            c => 2 * (MOST + 1) + c.saturating_sub(2 * n).min(MOST),
-        }
-    };
-    order.par_chunks_mut(GROUP).for_each(|group| {
-        let mut vertices = [(0, 0); GROUP];
-        let vertices = &mut vertices[..group.len()];
-        let mut starts = [0; 3 * (MOST + 1) + 1];
-        for (slot, &v) in vertices.iter_mut().zip(&*group) {
-            *slot = (v, key(v));
-            starts[slot.1 + 1] += 1;
-        }
-        for k in 1..starts.len() {
-            starts[k] += starts[k - 1];
-        }
-        for &(v, key) in &*vertices {
-            group[starts[key]] = v;
-            starts[key] += 1;
-        }
-    });
-}
-
-/// Searches over vertices that share a face. Every face is opened once, so large faces cost no more than their
-/// corners. (The reverse Cuthill-McKee of sprs looks for each component's start among all vertices,
-/// which is quadratic for many components, and needs an assembled matrix.)
-struct Search<'a> {
-    faces: &'a Faces,
-    incidence: &'a Incidence,
-    /// The last search that met the vertex or face.
-    vertex_seen: Vec<u32>,
-    face_seen: Vec<u32>,
-    round: u32,
-}
-
-impl<'a> Search<'a> {
-    fn new(faces: &'a Faces, incidence: &'a Incidence) -> Self {
-        Search {
-            faces,
-            incidence,
-            vertex_seen: vec![0; incidence.vertices()],
-            face_seen: vec![0; faces.len()],
-            round: 0,
-        }
-    }
-
-    /// Appends the unseen neighbours of `v`.
-    fn visit(&mut self, v: u32, queue: &mut Vec<u32>) {
-        for &c in self.incidence.corners_at(v as usize) {
-            let f = self.incidence.face_of(c);
-            if self.face_seen[f] == self.round {
-                continue;
-            }
-            self.face_seen[f] = self.round;
-            for &w in self.faces.face(f) {
-                if self.vertex_seen[w as usize] != self.round {
-                    self.vertex_seen[w as usize] = self.round;
-                    queue.push(w);
-                }
-            }
-        }
-    }
-
-    fn reverse_cuthill_mckee(mut self) -> Vec<u32> {
-        let n = self.incidence.vertices();
-        // On a closed mesh whose faces share an edge or a vertex at most: the number of neighbours.
-        let degree: Vec<u32> = (0..n)
-            .map(|v| {
-                let faces = self.incidence.corners_at(v).iter();
-                faces
-                    .map(|&c| self.faces.range(self.incidence.face_of(c)).len() as u32)
-                    .map(|size| size.saturating_sub(2))
-                    .sum()
-            })
-            .collect();
-        let mut order: Vec<u32> = Vec::with_capacity(n);
-        let mut placed = vec![false; n];
-        let mut levels = Vec::new();
-        for seed in 0..n as u32 {
-            if placed[seed as usize] {
-                continue;
-            }
-            let start = self.pseudo_peripheral(seed, &degree, &mut levels);
-            self.round += 1;
-            self.vertex_seen[start as usize] = self.round;
-            let mut next = order.len();
-            order.push(start);
-            while next < order.len() {
-                let v = order[next];
-                placed[v as usize] = true;
-                let new = order.len();
-                self.visit(v, &mut order);
-                order[new..].sort_unstable_by_key(|&w| (degree[w as usize], w));
-                next += 1;
-            }
-        }
-        order.reverse();
-        order
-    }
-
-    /// A vertex far from others: from `seed`, moves to a vertex of least degree in the last level of the search
-    /// as long as that gives more levels.
-    fn pseudo_peripheral(&mut self, seed: u32, degree: &[u32], level: &mut Vec<u32>) -> u32 {
-        // The number of levels grows with each round; two or three are usual, and this bounds the time.
-        const ROUNDS: usize = 8;
-        let mut start = seed;
-        let mut height = 0;
-        for _ in 0..ROUNDS {
-            self.round += 1;
-            self.vertex_seen[start as usize] = self.round;
-            level.clear();
-            level.push(start);
-            let (mut first, mut levels) = (0, 1);
-            loop {
-                let end = level.len();
-                for k in first..end {
-                    self.visit(level[k], level);
-                }
-                if level.len() == end {
-                    break;
-                }
-                first = end;
-                levels += 1;
-            }
-            if levels <= height {
-                break;
-            }
-            height = levels;
-            let last = level[first..].iter().copied();
-            let Some(far) = last.min_by_key(|&v| (degree[v as usize], v)) else {
-                break;
-            };
-            start = far;
-        }
-        start
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::mesh::builtin;
     use crate::mesh::generate::{permute_vertices, random_polygons, union};
@@ -792,11 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn morton_interleaves_the_bits() {
-        for x in [0, 1, 2, 0x15_5555, 0x1f_ffff, 0x12_3456] {
-            let plain: u64 = (0..21).map(|bit| (x >> bit & 1) << (3 * bit)).sum();
-            assert_eq!(spread(x), plain);
-        }
+    fn morton_follows_the_curve() {
         // The corners of a cube, by their signs as bits: z is the highest.
         assert_eq!(
             ordered(Order::Morton, &builtin::cube()),
@@ -820,38 +450,5 @@ mod tests {
         assert_eq!(o[..9], four);
         assert_eq!(o[mesh.len() - 2..], [9, 10]);
         assert!(o[9..mesh.len() - 2].is_sorted());
-    }
-
-    #[test]
-    fn rows_of_one_kind_come_together_and_stay_near() {
-        for name in ["irregular-tri:1000", "irregular-poly:1000"] {
-            let mesh = builtin::builtin(name).unwrap();
-            let incidence = Incidence::new(&mesh.faces, mesh.len());
-            let numbering = in_kinds(&mesh.faces, &incidence).unwrap();
-            // Neighbours by face: every face adds its corners but for the vertex and one end of an edge.
-            let length = |v: &u32| -> usize {
-                let at = incidence.corners_at(*v as usize).iter();
-                at.map(|&c| mesh.faces.face(incidence.face_of(c)).len() - 2)
-                    .sum()
-            };
-            let changes = |order: &[u32]| {
-                let pairs = order.windows(2);
-                pairs.filter(|w| length(&w[0]) != length(&w[1])).count()
-            };
-            let file: Vec<u32> = (0..mesh.len() as u32).collect();
-            assert!(4 * changes(numbering.order()) < changes(&file), "{name}");
-            for (block, from) in numbering.order().chunks(256).zip(file.chunks(256)) {
-                let mut block = block.to_vec();
-                block.sort_unstable();
-                assert_eq!(block, from, "{name}: the same vertices");
-            }
-            let values: Vec<u32> = numbering.there(&file);
-            let mut back = vec![0; file.len()];
-            numbering.back_into(&values, &mut back);
-            assert_eq!(back, file);
-        }
-        let regular = builtin::builtin("torus:20x20").unwrap();
-        let incidence = Incidence::new(&regular.faces, regular.len());
-        assert!(in_kinds(&regular.faces, &incidence).is_none());
     }
 }

@@ -1,7 +1,6 @@
 //! Who meets whom: corners at each vertex, opposite half-edges, edges, ordered stars, components, boundary
 //! loops, Euler characteristic. Built in linear time by a counting sort, in parallel; no hashing.
 
-use std::ops::Range;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -9,268 +8,13 @@ use rayon::prelude::*;
 
 use super::Faces;
 use super::edge_numbers::EdgeNumbers;
+use super::incidence::{FEW, Incidence};
 use crate::pages::large;
-use crate::prefetch::prefetch;
 
 /// Marks an absent index in the arrays of this room.
 pub const NONE: u32 = u32::MAX;
 /// Vertices of one task.
 const CHUNK: usize = 4096;
-
-/// The corners at every vertex, in ascending order, and the face of every corner. This is all that the
-/// assembly of a limit matrix needs.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Incidence {
-    offsets: Vec<u32>,
-    corners: Vec<u32>,
-    face: FaceOf,
-}
-
-/// The face of a corner: a division among triangles, and among quads.
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum FaceOf {
-    Triangles,
-    Quads,
-    Table(Vec<u32>),
-}
-
-impl FaceOf {
-    fn new(faces: &Faces) -> Self {
-        match faces.uniform_size() {
-            Some(3) => return FaceOf::Triangles,
-            Some(4) => return FaceOf::Quads,
-            _ => {}
-        }
-        let mut table = large(vec![0; faces.corners().len()]);
-        let parts = split_by_face(faces, CHUNK, &mut table);
-        parts.into_par_iter().for_each(|(rows, mut part)| {
-            for f in rows {
-                let (face, rest) = part.split_at_mut(faces.range(f).len());
-                face.fill(f as u32);
-                part = rest;
-            }
-        });
-        FaceOf::Table(table)
-    }
-}
-
-impl Incidence {
-    /// A counting sort of the corners by vertex, in parallel: O(corners), stable. Each thread reads all corners and
-    /// sorts those of its own vertices.
-    ///
-    /// # Panics
-    /// If a corner names a vertex ≥ `vertices` (the validator reports such faces before).
-    pub fn new(faces: &Faces, vertices: usize) -> Self {
-        /// Beyond these many threads, reading the corners outweighs sorting them.
-        const MOST_PARTS: usize = 8;
-        let corners = faces.corners();
-        let parts = rayon::current_num_threads().min(MOST_PARTS);
-        let share = vertices.div_ceil(parts).max(CHUNK);
-        let mut offsets = large(vec![0u32; vertices + 1]);
-        let counts = offsets[1..].par_chunks_mut(share).enumerate();
-        counts.for_each(|(k, counts)| {
-            let first = (k * share) as u32;
-            for &v in corners {
-                if let Some(count) = counts.get_mut(v.wrapping_sub(first) as usize) {
-                    *count += 1;
-                }
-            }
-        });
-        for v in 0..vertices {
-            offsets[v + 1] += offsets[v];
-        }
-        assert!(
-            offsets[vertices] as usize == corners.len(),
-            "every corner names a vertex"
-        );
-        let mut sorted = large(vec![0u32; corners.len()]);
-        let parts = split_rows(&offsets, share, &mut sorted);
-        parts.into_par_iter().for_each(|(rows, sorted)| {
-            let base = offsets[rows.start];
-            let mut next: Vec<u32> = offsets[rows.clone()].iter().map(|&o| o - base).collect();
-            let first = rows.start as u32;
-            for (&v, c) in corners.iter().zip(0..) {
-                if let Some(slot) = next.get_mut(v.wrapping_sub(first) as usize) {
-                    sorted[*slot as usize] = c;
-                    *slot += 1;
-                }
-            }
-        });
-        Incidence::from_parts(offsets, sorted, faces)
-    }
-
-    /// From its arrays.
-    pub(crate) fn from_parts(offsets: Vec<u32>, corners: Vec<u32>, faces: &Faces) -> Self {
-        Incidence {
-            offsets,
-            corners,
-            face: FaceOf::new(faces),
-        }
-    }
-
-    /// The number of vertices N.
-    pub fn vertices(&self) -> usize {
-        self.offsets.len() - 1
-    }
-
-    /// The corners at vertex `v`, ascending, so ordered by face.
-    pub fn corners_at(&self, v: usize) -> &[u32] {
-        &self.corners[self.offsets[v] as usize..self.offsets[v + 1] as usize]
-    }
-
-    /// The corners at all vertices, those of vertex `v` from [`offsets`](Self::offsets)`[v]` on.
-    pub fn corners(&self) -> &[u32] {
-        &self.corners
-    }
-
-    /// Where the corners at each vertex start in [`corners`](Self::corners), and the end.
-    pub fn offsets(&self) -> &[u32] {
-        &self.offsets
-    }
-
-    /// The number of faces at vertex `v`: its valence n on a closed mesh.
-    pub fn face_count(&self, v: usize) -> usize {
-        (self.offsets[v + 1] - self.offsets[v]) as usize
-    }
-
-    /// The face of corner `c`.
-    #[inline]
-    pub fn face_of(&self, c: u32) -> usize {
-        match &self.face {
-            FaceOf::Triangles => (c / 3) as usize,
-            FaceOf::Quads => (c / 4) as usize,
-            FaceOf::Table(table) => table[c as usize] as usize,
-        }
-    }
-
-    /// Fetches what a walk over the faces at the vertices of `order`, now at place `k`, will soon read, in the
-    /// order in which one look-up needs the other.
-    #[inline(always)]
-    pub(crate) fn fetch_ahead(&self, faces: &Faces, order: &[u32], k: usize) {
-        /// Vertices between one look-up and the next. Tuned.
-        const AHEAD: usize = 8;
-        if let Some(&v) = order.get(k + 3 * AHEAD) {
-            prefetch(&self.offsets, v as usize);
-        }
-        if let Some(&v) = order.get(k + 2 * AHEAD) {
-            prefetch(&self.corners, self.offsets[v as usize] as usize);
-        }
-        if let Some(&v) = order.get(k + AHEAD) {
-            for &c in self.corners_at(v as usize) {
-                prefetch(faces.corners(), c as usize);
-                if let FaceOf::Table(table) = &self.face {
-                    prefetch(table, c as usize);
-                }
-            }
-        }
-    }
-
-    /// The corner after `c` in its face.
-    #[inline]
-    pub fn next(&self, faces: &Faces, c: u32) -> u32 {
-        match &self.face {
-            FaceOf::Triangles if c % 3 == 2 => c - 2,
-            FaceOf::Triangles => c + 1,
-            FaceOf::Quads => (c & !3) | ((c + 1) & 3),
-            FaceOf::Table(table) => next_in(&faces.range(table[c as usize] as usize), c),
-        }
-    }
-
-    /// The corner before `c` in its face.
-    #[inline]
-    pub fn prev(&self, faces: &Faces, c: u32) -> u32 {
-        match &self.face {
-            FaceOf::Triangles if c.is_multiple_of(3) => c + 2,
-            FaceOf::Triangles => c - 1,
-            FaceOf::Quads => (c & !3) | (c.wrapping_sub(1) & 3),
-            FaceOf::Table(table) => prev_in(&faces.range(table[c as usize] as usize), c),
-        }
-    }
-
-    /// Whether every side of a face has exactly one opposite: one other side between its vertices, in the other
-    /// direction. In parallel, O(Σ n²) over the valences n up to 16, with sorts beyond.
-    ///
-    /// ```
-    /// use limitlab::mesh::{Faces, Incidence};
-    /// let closed = |faces: &Faces| Incidence::new(faces, 4).is_closed(faces);
-    /// let tetrahedron = [[0u32, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]];
-    /// assert!(closed(&Faces::from_lists(tetrahedron)));
-    /// assert!(!closed(&Faces::from_lists(&tetrahedron[1..])));
-    /// ```
-    pub fn is_closed(&self, faces: &Faces) -> bool {
-        let corners = faces.corners();
-        (0..self.vertices())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .all(|v| {
-                let at = self.corners_at(v);
-                let sides = |c: u32| {
-                    let (after, before) = (self.next(faces, c), self.prev(faces, c));
-                    (corners[after as usize], corners[before as usize])
-                };
-                if at.len() > FEW {
-                    let (mut out, mut into): (Vec<u32>, Vec<u32>) =
-                        at.iter().map(|&c| sides(c)).unzip();
-                    out.sort_unstable();
-                    into.sort_unstable();
-                    return out == into
-                        && out.windows(2).all(|w| w[0] != w[1])
-                        && out.binary_search(&(v as u32)).is_err();
-                }
-                let mut ends = [(0, 0); FEW];
-                let ends = &mut ends[..at.len()];
-                for (end, &c) in ends.iter_mut().zip(at) {
-                    *end = sides(c);
-                }
-                ends.iter().all(|&(out, _)| {
-                    let count = |same: fn(&(u32, u32)) -> u32| {
-                        ends.iter().filter(|e| same(e) == out).count()
-                    };
-                    out as usize != v && count(|e| e.0) == 1 && count(|e| e.1) == 1
-                })
-            })
-    }
-}
-
-/// Cuts `values`, of which row i is `offsets[i]..offsets[i + 1]`, after every `chunk` rows.
-pub(crate) fn split_rows<'a, T>(
-    offsets: &[u32],
-    chunk: usize,
-    values: &'a mut [T],
-) -> Vec<(Range<usize>, &'a mut [T])> {
-    split(offsets.len() - 1, chunk, values, |rows| {
-        (offsets[rows.end] - offsets[rows.start]) as usize
-    })
-}
-
-/// Cuts `values`, one a corner, after the corners of every `chunk` faces.
-pub(crate) fn split_by_face<'a, T>(
-    faces: &Faces,
-    chunk: usize,
-    values: &'a mut [T],
-) -> Vec<(Range<usize>, &'a mut [T])> {
-    split(faces.len(), chunk, values, |rows| {
-        faces.range(rows.end - 1).end - faces.range(rows.start).start
-    })
-}
-
-fn split<T>(
-    rows: usize,
-    chunk: usize,
-    values: &mut [T],
-    length: impl Fn(&Range<usize>) -> usize,
-) -> Vec<(Range<usize>, &mut [T])> {
-    let mut rest = values;
-    (0..rows)
-        .step_by(chunk)
-        .map(|first| {
-            let range = first..(first + chunk).min(rows);
-            let (part, after) = std::mem::take(&mut rest).split_at_mut(length(&range));
-            rest = after;
-            (range, part)
-        })
-        .collect()
-}
 
 /// An array that many threads fill, each place once, so that the result does not depend on their order.
 pub(crate) struct Scatter(Vec<AtomicU32>);
@@ -622,9 +366,6 @@ struct Pairs {
     sides: Vec<(u32, u32)>,
 }
 
-/// Up to this many faces at a vertex, its sides are compared each with each; beyond, sorted.
-const FEW: usize = 16;
-
 impl Pairs {
     /// Pairs the sides of the edges whose smaller vertex is `v`.
     fn at(&mut self, v: usize, faces: &Faces, incidence: &Incidence, twin: &Scatter) {
@@ -740,27 +481,10 @@ pub(super) fn join(parent: &mut [u32], a: u32, b: u32) -> bool {
     a != b
 }
 
-/// The corner after `c` in its face, whose corners are `range`.
-pub fn next_in(range: &Range<usize>, c: u32) -> u32 {
-    if c as usize + 1 == range.end {
-        range.start as u32
-    } else {
-        c + 1
-    }
-}
-
-/// The corner before `c` in its face, whose corners are `range`.
-pub fn prev_in(range: &Range<usize>, c: u32) -> u32 {
-    if c as usize == range.start {
-        range.end as u32 - 1
-    } else {
-        c - 1
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::incidence::{next_in, prev_in};
 
     fn topology(vertices: usize, faces: &[&[u32]]) -> (Faces, Topology) {
         let faces = Faces::from_lists(faces);

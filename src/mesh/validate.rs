@@ -8,7 +8,8 @@ use rayon::prelude::*;
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
 pub use super::defect::{Defect, DefectKind};
-use super::topology::{Incidence, NONE, Topology, join, next_in, prev_in};
+use super::incidence::{Incidence, next_in, prev_in};
+use super::topology::{NONE, Topology, join};
 use super::{Faces, Mesh, degenerate};
 use crate::{Error, Result};
 

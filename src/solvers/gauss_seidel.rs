@@ -141,14 +141,8 @@ fn in_looks(
         let errors = rows.errors(operator, points, &x);
         let before = history.last().map(|e| e.max);
         history.push(errors);
-        if errors.max <= stop.tolerance {
-            break Outcome::Converged;
-        }
-        if !errors.max.is_finite() {
-            break Outcome::Diverged;
-        }
-        if iterations >= stop.max_iterations {
-            break Outcome::MaxIterations;
+        if let Some(outcome) = stop.verdict(errors.max, iterations) {
+            break outcome;
         }
         if errors.max < (1.0 - PROGRESS) * progress.0 {
             progress = (errors.max, iterations);

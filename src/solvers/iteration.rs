@@ -22,6 +22,19 @@ pub struct Stop {
     pub max_iterations: usize,
 }
 
+impl Stop {
+    /// How a run ends that has got to an error after so many iterations, if it does whatever the method is.
+    pub(super) fn verdict(&self, error: f64, iterations: usize) -> Option<Outcome> {
+        if error <= self.tolerance {
+            Some(Outcome::Converged)
+        } else if !error.is_finite() {
+            Some(Outcome::Diverged)
+        } else {
+            (iterations >= self.max_iterations).then_some(Outcome::MaxIterations)
+        }
+    }
+}
+
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {

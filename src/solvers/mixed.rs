@@ -102,14 +102,8 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
             .errors;
         let before = history.last().map(|e| e.max);
         history.push(errors);
-        if errors.max <= stop.tolerance {
-            break Outcome::Converged;
-        }
-        if !errors.max.is_finite() {
-            break Outcome::Diverged;
-        }
-        if iterations >= stop.max_iterations {
-            break Outcome::MaxIterations;
+        if let Some(outcome) = stop.verdict(errors.max, iterations) {
+            break outcome;
         }
         if let Some(before) = before {
             let gain = errors.max / before;

@@ -13,7 +13,7 @@ use super::star::{
 };
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
-use crate::mesh::topology::{next_in, prev_in};
+use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::pages::large;
 

@@ -12,7 +12,7 @@ use super::star::{
     CHUNK, Circle, Tangents, centroid, for_each_star, require_closed, require_room, twin,
 };
 use crate::Result;
-use crate::mesh::topology::{split_by_face, split_rows};
+use crate::mesh::incidence::{split_by_face, split_rows};
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::pages::large;
 

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use glam::DVec3;
 use limitlab::assemble::Scheme;
+use limitlab::mesh::curve::is_scattered;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
-use limitlab::mesh::order::{Order, is_scattered};
+use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, Topology, io};
 use nalgebra_sparse::CsrMatrix;
 use sprs::io::read_matrix_market;

@@ -134,7 +134,7 @@ fn discrete_normal(mesh: &Mesh, v: usize) -> DVec3 {
         .iter()
         .map(|&c| {
             let range = mesh.faces.range(topology.incidence.face_of(c));
-            let next = limitlab::mesh::topology::next_in(&range, c);
+            let next = limitlab::mesh::incidence::next_in(&range, c);
             mesh.positions[mesh.faces.corners()[next as usize] as usize] - center
         })
         .collect();

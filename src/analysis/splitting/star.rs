@@ -2,7 +2,7 @@
 //! mesh that the refinement rules are applied to, and the walk that finds the same positions after refinement.
 
 use crate::error::{Error, Result};
-use crate::mesh::topology::{next_in, prev_in};
+use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Faces, Topology};
 
 /// How the n sectors of a star are filled. A position is (sector, i, j): i steps along the sector's first axis,

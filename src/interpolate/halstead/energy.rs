@@ -17,7 +17,7 @@ use super::LEVELS;
 use crate::Result;
 use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
-use crate::mesh::topology::{next_in, prev_in};
+use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::subdivide::Refinement;
 

@@ -10,7 +10,7 @@ use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
 use crate::interpolate::normals::unit_normals;
 use crate::interpolate::zheng_cai::Constraints;
-use crate::mesh::topology::{next_in, prev_in};
+use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::solvers::Errors;
 use crate::solvers::direct::{Cholesky, Factorization, Kind};

@@ -1,5 +1,5 @@
 use super::*;
-use crate::mesh::topology::Incidence;
+use crate::mesh::incidence::Incidence;
 use crate::mesh::validate::{Boundary, Counts, validate};
 
 /// The counts of a mesh without defects.

@@ -262,7 +262,7 @@ impl Scene {
         let corners = faces.corners();
         for c in topology.edge_sides() {
             let range = faces.range(topology.incidence.face_of(c));
-            let next = crate::mesh::topology::next_in(&range, c);
+            let next = crate::mesh::incidence::next_in(&range, c);
             let ends = [c, next].map(|c| projected[corners[c as usize] as usize]);
             let weight = ends[0].w.max(ends[1].w);
             self.segments.push(Segment {

@@ -1,0 +1,154 @@
+//! Along a space-filling curve: which meshes lie scattered through memory, and the way to bring them together.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::order::Numbering;
+use super::{Faces, Mesh, bounding_box};
+
+/// Whether vertices that faces bring together lie scattered through memory: of the vertices that a face does not
+/// share with the face before it, fewer than a quarter are within 128 places of one of that face's. Looks
+/// at 65 536 faces at the most.
+pub fn is_scattered(faces: &Faces) -> bool {
+    const NEAR: u32 = 128;
+    const NEAR_SHARE: f64 = 0.25;
+    const SAMPLE: usize = 1 << 16;
+    let (mut fresh, mut near) = (0u32, 0u32);
+    for f in (1..faces.len()).step_by(faces.len() / SAMPLE + 1) {
+        let before = faces.face(f - 1);
+        for &v in faces.face(f).iter().filter(|v| !before.contains(v)) {
+            fresh += 1;
+            near += u32::from(before.iter().any(|&w| v.abs_diff(w) <= NEAR));
+        }
+    }
+    f64::from(near) < NEAR_SHARE * f64::from(fresh)
+}
+
+/// The mesh with its vertices along Morton's curve through the cells of a grid of 64³, its faces by smallest vertex, and
+/// that numbering. Every later pass over the mesh then runs through memory almost in order.
+/// `None` if a face names a vertex that does not exist. Two counting sorts, of vertices and of faces.
+pub fn along_curve(mesh: &Mesh) -> Option<(Mesh, Numbering)> {
+    let n = mesh.len();
+    let numbering = Numbering::new(morton_cells(&mesh.positions));
+    let place = numbering.place();
+    let corners: Option<Vec<u32>> = mesh
+        .faces
+        .corners()
+        .par_iter()
+        .with_min_len(8192)
+        .map(|&v| place.get(v as usize).copied())
+        .collect();
+    let moved = Faces::from_parts(mesh.faces.offsets().to_vec(), corners?);
+    let smallest: Vec<u32> = (0..moved.len())
+        .into_par_iter()
+        .with_min_len(8192)
+        .map(|f| moved.face(f).iter().copied().min().unwrap_or(0))
+        .collect();
+    let by_smallest = counting_sort(&smallest, n);
+    let faces = match moved.uniform_size() {
+        // Each face has its place: all threads can work.
+        Some(size) => {
+            let mut corners = vec![0; moved.corners().len()];
+            corners
+                .par_chunks_mut(size)
+                .with_min_len(8192)
+                .zip(&by_smallest)
+                .for_each(|(face, &f)| face.copy_from_slice(moved.face(f as usize)));
+            Faces::from_parts(moved.offsets().to_vec(), corners)
+        }
+        None => {
+            let mut faces = Faces::with_capacity(moved.corners().len());
+            for &f in &by_smallest {
+                faces.push(moved.face(f as usize));
+            }
+            faces
+        }
+    };
+    let positions = numbering.there(&mesh.positions);
+    Some((Mesh::new(positions, faces), numbering))
+}
+
+/// The numbers of the keys in ascending order of the keys, all below `end`; equal keys as they come. O(keys + end).
+fn counting_sort(keys: &[u32], end: usize) -> Vec<u32> {
+    let mut starts = vec![0u32; end + 1];
+    for &key in keys {
+        starts[key as usize + 1] += 1;
+    }
+    for k in 0..end {
+        starts[k + 1] += starts[k];
+    }
+    let mut sorted = vec![0u32; keys.len()];
+    for (k, &key) in (0..).zip(keys) {
+        let slot = &mut starts[key as usize];
+        sorted[*slot as usize] = k;
+        *slot += 1;
+    }
+    sorted
+}
+
+/// One counting sort by the highest bits of the codes, and a sort of each of the short lists that this gives.
+pub(super) fn morton(positions: &[DVec3]) -> Vec<u32> {
+    /// Bits of a coordinate that the counting sort looks at.
+    const FIRST: u32 = 5;
+    let codes = morton_codes(positions, |code| code);
+    let highest = morton_codes(positions, |code| (code >> (3 * (21 - FIRST))) as u32);
+    let mut order = counting_sort(&highest, 1 << (3 * FIRST));
+    let mut lists: Vec<&mut [u32]> = order
+        .chunk_by_mut(|&v, &w| highest[v as usize] == highest[w as usize])
+        .collect();
+    lists.par_iter_mut().for_each(|list| {
+        list.sort_unstable_by_key(|&v| (codes[v as usize], v));
+    });
+    order
+}
+
+/// The positions by the cells of a grid of 64³ along the curve, within a cell as they come: near enough for memory.
+fn morton_cells(positions: &[DVec3]) -> Vec<u32> {
+    const BITS: u32 = 6;
+    let cells = morton_codes(positions, |code| (code >> (3 * (21 - BITS))) as u32);
+    counting_sort(&cells, 1 << (3 * BITS))
+}
+
+/// `take` of the place of every position along the curve, 21 bits a coordinate.
+fn morton_codes<T: Send>(positions: &[DVec3], take: impl Fn(u64) -> T + Send + Sync) -> Vec<T> {
+    const CELLS: f64 = ((1u64 << 21) - 1) as f64;
+    let (low, high) = bounding_box(positions).unwrap_or((DVec3::ZERO, DVec3::ZERO));
+    let scale = CELLS / (high - low).max_element().max(f64::MIN_POSITIVE);
+    positions
+        .par_iter()
+        .with_min_len(8192)
+        .map(|&p| {
+            // A coordinate that is not a number becomes 0.
+            let cell = ((p - low) * scale).to_array().map(|x| spread(x as u64));
+            take(cell[0] | cell[1] << 1 | cell[2] << 2)
+        })
+        .collect()
+}
+
+/// Puts two zeros between the lowest 21 bits.
+fn spread(x: u64) -> u64 {
+    let mut x = x & 0x1f_ffff;
+    for (shift, mask) in [
+        (32, 0x001f_0000_0000_ffff),
+        (16, 0x001f_0000_ff00_00ff),
+        (8, 0x100f_00f0_0f00_f00f),
+        (4, 0x10c3_0c30_c30c_30c3),
+        (2, 0x1249_2492_4924_9249),
+    ] {
+        x = (x | x << shift) & mask;
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_are_spread_by_threes() {
+        for x in [0, 1, 2, 0x15_5555, 0x1f_ffff, 0x12_3456] {
+            let plain: u64 = (0..21).map(|bit| (x >> bit & 1) << (3 * bit)).sum();
+            assert_eq!(spread(x), plain);
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Orders for sweeps over many rows: breadth first, and rows of one kind together.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::order::Numbering;
+use super::{Faces, Incidence};
+
+/// One bit for each of some things: whether it was met.
+struct Met(Vec<u64>);
+
+impl Met {
+    fn new(count: usize) -> Self {
+        Met(vec![0; count.div_ceil(64)])
+    }
+
+    /// Whether this is the first time.
+    #[inline]
+    fn meet(&mut self, k: usize) -> bool {
+        let bit = 1u64 << (k % 64);
+        let word = &mut self.0[k / 64];
+        let first = *word & bit == 0;
+        *word |= bit;
+        first
+    }
+}
+
+/// The vertices breadth first from the first of every component, over faces. Each face is opened once: O(corners).
+pub fn breadth_first(faces: &Faces, incidence: &Incidence) -> Vec<u32> {
+    // Among triangles, and among quads, a corner's face takes no look-up.
+    match faces.uniform_size() {
+        Some(3) => search(faces, incidence, |c| (c / 3, c / 3 * 3..c / 3 * 3 + 3)),
+        Some(4) => search(faces, incidence, |c| (c / 4, c / 4 * 4..c / 4 * 4 + 4)),
+        _ => search(faces, incidence, |c| {
+            let f = incidence.face_of(c as u32);
+            (f, faces.range(f))
+        }),
+    }
+}
+
+fn search(
+    faces: &Faces,
+    incidence: &Incidence,
+    face_at: impl Fn(usize) -> (usize, Range<usize>),
+) -> Vec<u32> {
+    let n = incidence.vertices();
+    let (mut vertices, mut opened) = (Met::new(n), Met::new(faces.len()));
+    // One place more, for what is written there and not kept.
+    let mut order = vec![0u32; n + 1];
+    let (mut next, mut end) = (0, 0);
+    for seed in 0..n {
+        order[end] = seed as u32;
+        end += usize::from(vertices.meet(seed));
+        while next < end {
+            let v = order[next];
+            // Places of the queue that are not taken yet hold a vertex too.
+            incidence.fetch_ahead(faces, &order, next);
+            next += 1;
+            for &c in incidence.corners_at(v as usize) {
+                let (f, range) = face_at(c as usize);
+                if opened.meet(f) {
+                    // No branch on what was met: there is no pattern that a processor could predict.
+                    for &w in &faces.corners()[range] {
+                        order[end] = w;
+                        end += usize::from(vertices.meet(w as usize));
+                    }
+                }
+            }
+        }
+    }
+    order.truncate(n);
+    order
+}
+
+/// An order for sweeps that share passes over memory: [breadth first](breadth_first), so that neighbours lie within
+/// a narrow band, and [rows of one kind](in_kinds) together.
+pub fn in_fronts(faces: &Faces, incidence: &Incidence) -> Numbering {
+    let mut order = breadth_first(faces, incidence);
+    group_kinds(faces, incidence, &mut order);
+    Numbering::new(order)
+}
+
+/// The file's order, but with rows of one kind together: each 256 consecutive vertices by their number of faces and the
+/// kind of these. Few enough to leave neighbours near, enough for a branch predictor (tuned). `None` where the file is
+/// like this already. O(corners), in parallel.
+pub fn in_kinds(faces: &Faces, incidence: &Incidence) -> Option<Numbering> {
+    let mut order: Vec<u32> = (0..incidence.vertices() as u32).collect();
+    group_kinds(faces, incidence, &mut order);
+    (!order.is_sorted()).then(|| Numbering::new(order))
+}
+
+/// Sorts each 256 consecutive vertices by kind: rows of one length, with weights known by valence or listed. Those of one
+/// kind are left as they come.
+fn group_kinds(faces: &Faces, incidence: &Incidence, order: &mut [u32]) {
+    const GROUP: usize = 256;
+    /// Larger numbers, of faces or of neighbours, count as one.
+    const MOST: usize = 63;
+    let uniform = faces.uniform_size();
+    // Triangles only; quads only, as a rule; others by the number of neighbours.
+    let key = |v: u32| {
+        let at = incidence.corners_at(v as usize);
+        let n = at.len();
+        let sizes = at.iter().map(|&c| faces.range(incidence.face_of(c)).len());
+        let corners = uniform.map_or_else(|| sizes.sum(), |size| size * n);
+        match corners {
+            c if c == 3 * n => n.min(MOST),
+            c if c == 4 * n => MOST + 1 + n.min(MOST),
+            c => 2 * (MOST + 1) + c.saturating_sub(2 * n).min(MOST),
+        }
+    };
+    order.par_chunks_mut(GROUP).for_each(|group| {
+        let mut vertices = [(0, 0); GROUP];
+        let vertices = &mut vertices[..group.len()];
+        let mut starts = [0; 3 * (MOST + 1) + 1];
+        for (slot, &v) in vertices.iter_mut().zip(&*group) {
+            *slot = (v, key(v));
+            starts[slot.1 + 1] += 1;
+        }
+        for k in 1..starts.len() {
+            starts[k] += starts[k - 1];
+        }
+        for &(v, key) in &*vertices {
+            group[starts[key]] = v;
+            starts[key] += 1;
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::builtin;
+
+    #[test]
+    fn rows_of_one_kind_come_together_and_stay_near() {
+        for name in ["irregular-tri:1000", "irregular-poly:1000"] {
+            let mesh = builtin::builtin(name).unwrap();
+            let incidence = Incidence::new(&mesh.faces, mesh.len());
+            let numbering = in_kinds(&mesh.faces, &incidence).unwrap();
+            // Neighbours by face: every face adds its corners but for the vertex and one end of an edge.
+            let length = |v: &u32| -> usize {
+                let at = incidence.corners_at(*v as usize).iter();
+                at.map(|&c| mesh.faces.face(incidence.face_of(c)).len() - 2)
+                    .sum()
+            };
+            let changes = |order: &[u32]| {
+                let pairs = order.windows(2);
+                pairs.filter(|w| length(&w[0]) != length(&w[1])).count()
+            };
+            let file: Vec<u32> = (0..mesh.len() as u32).collect();
+            assert!(4 * changes(numbering.order()) < changes(&file), "{name}");
+            for (block, from) in numbering.order().chunks(256).zip(file.chunks(256)) {
+                let mut block = block.to_vec();
+                block.sort_unstable();
+                assert_eq!(block, from, "{name}: the same vertices");
+            }
+            let values: Vec<u32> = numbering.there(&file);
+            let mut back = vec![0; file.len()];
+            numbering.back_into(&values, &mut back);
+            assert_eq!(back, file);
+        }
+        let regular = builtin::builtin("torus:20x20").unwrap();
+        let incidence = Incidence::new(&regular.faces, regular.len());
+        assert!(in_kinds(&regular.faces, &incidence).is_none());
+    }
+}
