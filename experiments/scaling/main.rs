@@ -14,17 +14,18 @@ use std::time::Instant;
 
 use clap::Parser;
 use glam::DVec3;
-use limitlab::Result;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::{LimitSystem, Operator, Scheme};
 use limitlab::cli::{self, CommonFlags, List, Progress};
-use limitlab::interpolate::automatic::control_points;
+use limitlab::error::{Error, Result};
+use limitlab::interpolate::automatic::{control_points, renumbered};
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::order::{Numbering, Order};
-use limitlab::mesh::{Faces, Incidence, Mesh, Topology, builtin::builtin};
+use limitlab::mesh::validate::{Boundary, validate};
+use limitlab::mesh::{Faces, Incidence, Mesh, Topology, builtin::builtin, io};
 use limitlab::report::{
     Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette,
 };
@@ -130,7 +131,8 @@ fn measure(arguments: &Arguments) -> Result<()> {
     ));
     table.note(
         "plain-chebyshev is the yardstick: index-only, double precision, one pass over the arrays an operation, no \
-         renumbering.",
+         renumbering. \"File to file\" is auto with all that `interpolate` does beside: reading, validation, writing, of \
+         binary PLY.",
     );
     let mut panels = Vec::new();
     for &scheme in &arguments.scheme.0 {
@@ -210,6 +212,8 @@ fn noisy(name: &str) -> Result<Mesh> {
 #[derive(Clone, Copy, PartialEq)]
 enum Way {
     Auto,
+    /// As `interpolate` does: read, validate, solve, write.
+    Files,
     Plain,
     Free(Method),
     /// Gauss-Seidel on the operator in fronts.
@@ -220,8 +224,9 @@ enum Way {
 }
 
 impl Way {
-    const ALL: [Way; 11] = [
+    const ALL: [Way; 12] = [
         Way::Auto,
+        Way::Files,
         Way::Plain,
         Way::Free(Method::Chebyshev),
         Way::Free(Method::Cg),
@@ -237,6 +242,7 @@ impl Way {
     fn name(self) -> String {
         match self {
             Way::Auto => "auto".into(),
+            Way::Files => "auto (file to file)".into(),
             Way::Plain => "plain-chebyshev".into(),
             Way::Free(method) => format!("{method} (matrix-free)"),
             Way::Waves => format!("{} (in waves)", Method::GaussSeidel),
@@ -351,6 +357,7 @@ fn of_scheme(
 fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) -> LinePlot {
     let look = |way: Way| match way {
         Way::Auto => (palette(0), Marker::Circle),
+        Way::Files => (palette(0), Marker::Triangle),
         Way::Plain => (palette(1), Marker::Square),
         Way::Free(Method::Chebyshev) => (palette(2), Marker::Circle),
         Way::Free(_) => (palette(3), Marker::Diamond),
@@ -405,10 +412,17 @@ fn timed(
     way: Way,
     estimate: f64,
 ) -> Result<Option<(f64, Outcome, Option<u64>)>> {
+    let paths = ["points", "control"].map(|name| arguments.out.join(format!("scaling-{name}.ply")));
+    if way == Way::Files {
+        io::write(&paths[0], mesh, None)?;
+    }
     let once = || {
         let start = Instant::now();
-        let outcome = go(mesh, scheme, way, estimate, arguments.tol)?;
-        Ok::<_, limitlab::Error>(outcome.map(|o| (start.elapsed().as_secs_f64(), o)))
+        let outcome = match way {
+            Way::Files => Some(file_to_file(&paths, scheme, arguments.tol)?),
+            _ => go(mesh, scheme, way, estimate, arguments.tol)?,
+        };
+        Ok::<_, Error>(outcome.map(|o| (start.elapsed().as_secs_f64(), o)))
     };
     let (first, memory) = machine::peak_memory(once);
     let Some((mut seconds, mut outcome)) = first? else {
@@ -426,7 +440,39 @@ fn timed(
             (seconds, outcome) = (again, o);
         }
     }
+    if way == Way::Files {
+        for path in &paths {
+            std::fs::remove_file(path).map_err(|e| Error::io(path, "remove", e))?;
+        }
+    }
     Ok(Some((seconds, outcome, memory)))
+}
+
+/// From the points in one file to the control points in another.
+fn file_to_file([from, to]: &[PathBuf; 2], scheme: Scheme, tol: f64) -> Result<Outcome> {
+    let mesh = io::read(from)?.mesh;
+    let name = from.display().to_string();
+    let stop = Stop {
+        tolerance: tol * mesh.diagonal(),
+        max_iterations: 10_000,
+    };
+    let found = match renumbered(&mesh) {
+        Some(moved) => {
+            let report = validate(&moved.mesh, None, Boundary::Refuse);
+            moved.control_points(Some(&report.into_topology(&name)?), scheme, &stop)?
+        }
+        None => {
+            let topology = validate(&mesh, None, Boundary::Refuse).into_topology(&name)?;
+            control_points(&mesh, Some(&topology), scheme, &stop)?
+        }
+    };
+    let (iterations, status) = (found.report.iterations, found.report.outcome.name());
+    io::write(to, &Mesh::new(found.points, mesh.faces), None)?;
+    Ok(Outcome {
+        iterations,
+        status,
+        solve_seconds: found.solve_seconds,
+    })
 }
 
 type Number = fn(&Faces, &Incidence) -> Numbering;
@@ -442,6 +488,8 @@ fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<
     let start = |seconds: &mut f64, since: Instant| *seconds = since.elapsed().as_secs_f64();
     let mut solve_seconds = 0.0;
     let outcome = match way {
+        // Not from faces in memory.
+        Way::Files => return Ok(None),
         Way::Auto => {
             let found = control_points(mesh, None, scheme, &stop)?;
             Outcome {

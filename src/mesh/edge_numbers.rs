@@ -5,9 +5,9 @@ use rayon::prelude::*;
 /// Half-edges of one task.
 const CHUNK: usize = 4096;
 
-/// The edges of a closed mesh, numbered by their first half-edges: the order of [`Topology::edge_sides`](super::Topology::edge_sides). A number
-/// comes from a bit and an eighth of a byte of counts a half-edge, few enough to stay in a cache, instead of from a
-/// table.
+/// The edges of a closed mesh, numbered by their first half-edges: the order of
+/// [`Topology::edge_sides`](super::Topology::edge_sides). A number comes from a bit and half a bit of counts a half-edge,
+/// few enough to stay in a cache, instead of from a table.
 pub(crate) struct EdgeNumbers<'a> {
     twins: &'a [u32],
     /// For every 64 half-edges: which are first, and how many before them are.
