@@ -70,7 +70,7 @@ struct Arguments {
     #[arg(long, value_name = "T", default_value_t = 1e-10, value_parser = cli::positive)]
     tol: f64,
     /// Runs of which the fastest counts, where a run takes less than a second; more where it takes milliseconds
-    #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
     runs: u16,
     /// Vertices of the profile's mesh; 0 for no profile
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
