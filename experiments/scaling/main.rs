@@ -357,7 +357,7 @@ fn of_scheme(
 fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) -> LinePlot {
     let look = |way: Way| match way {
         Way::Auto => (palette(0), Marker::Circle),
-        Way::Files => (palette(0), Marker::Triangle),
+        Way::Files => (Colour(0, 0, 110), Marker::Triangle),
         Way::Plain => (palette(1), Marker::Square),
         Way::Free(Method::Chebyshev) => (palette(2), Marker::Circle),
         Way::Free(_) => (palette(3), Marker::Diamond),

@@ -300,9 +300,9 @@ fn concat<T: Copy + Default + Send + Sync>(
 impl Listed {
     /// Puts together the listed rows of these kinds, in their order: `fill(i, …)` adds those of row `i`, but for its
     /// starts. In parallel.
-    pub(super) fn collect(
+    pub(super) fn collect<T: Default>(
         kinds: &[Kind],
-        fill: impl Fn(usize, &mut Listed, &mut Vec<(u32, f64)>) + Sync,
+        fill: impl Fn(usize, &mut Listed, &mut T) + Sync,
     ) -> Listed {
         let mut all = Listed::default();
         if !kinds.contains(&Kind::Listed) {
@@ -310,7 +310,7 @@ impl Listed {
         }
         let mut parts: Vec<Listed> = (0..kinds.len().div_ceil(CHUNK))
             .into_par_iter()
-            .map_init(Vec::new, |scratch, k| {
+            .map_init(T::default, |scratch, k| {
                 let mut part = Listed {
                     weights: Vec::with_capacity(USUAL * CHUNK),
                     neighbours: Vec::with_capacity(USUAL * CHUNK),

@@ -84,7 +84,7 @@ impl Row {
 /// Entries of a short row, sorted by counting for each how many are smaller: no branch depends on their order, for which
 /// there is no pattern that a processor could foresee.
 #[derive(Default)]
-struct Short {
+pub(super) struct Short {
     /// Columns, in an order that signed numbers have; beyond the length the greatest.
     columns: [i32; Self::MOST],
     values: [f64; Self::MOST],
@@ -98,8 +98,12 @@ impl Short {
     const LANES: usize = 8;
     const SIGN: u32 = 1 << 31;
 
+    pub(super) fn clear(&mut self) {
+        self.len = 0;
+    }
+
     #[inline]
-    fn add(&mut self, column: u32, value: f64) {
+    pub(super) fn add(&mut self, column: u32, value: f64) {
         if self.len < Self::MOST {
             self.columns[self.len] = (column ^ Self::SIGN) as i32;
             self.values[self.len] = value;
@@ -110,7 +114,11 @@ impl Short {
     /// Writes the entries in order and returns the place of the one that was added last, unless they are too many or
     /// two have the same column.
     #[inline]
-    fn sort_into(&mut self, columns: &mut Vec<u32>, values: &mut Vec<f64>) -> Option<usize> {
+    pub(super) fn sort_into(
+        &mut self,
+        columns: &mut Vec<u32>,
+        values: &mut Vec<f64>,
+    ) -> Option<usize> {
         let n = self.len;
         if n > Self::MOST {
             return None;
@@ -295,7 +303,7 @@ impl<'a> Rows<'a> {
             (&blocks.by_size[range.len()], range)
         };
         let short = &mut row.short;
-        short.len = 0;
+        short.clear();
         let [_, mut own] = self.by_valence[self.valence[v] as usize];
         for &c in incidence.corners_at(v) {
             let (block, range) = block_at(c);
