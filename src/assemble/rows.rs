@@ -307,6 +307,9 @@ impl<'a> Rows<'a> {
         let [_, mut own] = self.by_valence[self.valence[v] as usize];
         for &c in incidence.corners_at(v) {
             let (block, range) = block_at(c);
+            if block.len() < 3 {
+                return false;
+            }
             own += block[0];
             // Both halves of the edge that leaves; the one that enters leaves in another face.
             let (across, _) = block_at(twins[c as usize]);
@@ -433,6 +436,9 @@ mod tests {
         let faces = Faces::from_lists([[0, 1, 2, 3], [3, 2, 1, 0]]);
         let mesh = Mesh::new(vec![glam::DVec3::ZERO; 4], faces);
         assert_eq!(usual_rows(&mesh, Scheme::CatmullClark), 0);
+        // A face of two corners, which the validator refuses.
+        let digon = Mesh::new(mesh.positions[..2].to_vec(), Faces::from_lists([[0, 1]]));
+        assert_eq!(usual_rows(&digon, Scheme::CatmullClark), 0);
         // The two apexes have too long rows, the others meet both apexes and their neighbours on the rim.
         let bipyramid = builtin("bipyramid:40").unwrap();
         assert_eq!(usual_rows(&bipyramid, Scheme::Loop), 40);

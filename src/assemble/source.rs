@@ -354,7 +354,7 @@ impl<'a> Source<'a> {
         let mut own = self.scheme.vertex_weight(n as usize);
         for ((out, into), &c) in leaving.iter_mut().zip(entering.iter_mut()).zip(at) {
             let range = self.faces.range(self.incidence.face_of(c));
-            if self.modes(range.len()).is_some() {
+            if range.len() < 3 || self.modes(range.len()).is_some() {
                 return None;
             }
             let block = &self.blocks.by_size[range.len()];
