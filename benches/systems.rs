@@ -218,12 +218,12 @@ fn methods(c: &mut Criterion) {
     });
     let singles: Vec<glam::Vec3A> = moved.iter().map(|p| p.as_vec3a()).collect();
     let mut current = singles.clone();
-    let mut other = singles.clone();
     let wavefront = Wavefront::new(&front);
+    let mut scratch = wavefront.scratch();
     group.bench_function("16 iterations in single precision, in groups", |b| {
         b.iter(|| {
             let recurrence = Recurrence::new(INTERVAL);
-            wavefront.iterate(recurrence, 17, &singles, &mut current, &mut other);
+            wavefront.iterate(recurrence, 17, &singles, &mut current, &mut scratch);
         });
     });
     let setups = [

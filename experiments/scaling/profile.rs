@@ -220,9 +220,9 @@ fn iterations<S: System>(system: &S, points: &[DVec3]) -> f64 {
 fn waves<P: limitlab::assemble::stencil::Point>(wavefront: &Wavefront, r: &[P]) -> f64 {
     let recurrence = Recurrence::new((0.1, 1.0));
     let mut x = r.to_vec();
-    let mut other = r.to_vec();
+    let mut scratch = wavefront.scratch();
     best(|| {
-        rayon::scope(|_| wavefront.iterate(recurrence, ITERATIONS, r, &mut x, &mut other));
+        rayon::scope(|_| wavefront.iterate(recurrence, ITERATIONS, r, &mut x, &mut scratch));
         ITERATIONS - 1
     })
 }

@@ -77,16 +77,10 @@ pub trait SelfAdjoint: Sync {
     fn weight(&self, i: usize) -> f64;
 
     /// Sums over x that the rows of one whole product share; none unless the matrix has some.
-    fn prepare(&self, _x: &[f64], _shared: &mut Vec<[f64; 3]>) {}
+    fn prepare(&self, _x: &[f64], _shared: &mut Vec<f64>) {}
 
     /// Calls `visit(k, (B x)_i)` for the k-th row i of `rows`; `shared` comes from [`prepare`](Self::prepare).
-    fn rows(
-        &self,
-        rows: Range<usize>,
-        x: &[f64],
-        shared: &[[f64; 3]],
-        visit: impl FnMut(usize, f64),
-    );
+    fn rows(&self, rows: Range<usize>, x: &[f64], shared: &[f64], visit: impl FnMut(usize, f64));
 }
 
 /// A symmetric matrix: all weights are 1.
@@ -103,7 +97,7 @@ impl SelfAdjoint for Csr {
         &self,
         rows: Range<usize>,
         x: &[f64],
-        _shared: &[[f64; 3]],
+        _shared: &[f64],
         mut visit: impl FnMut(usize, f64),
     ) {
         for (k, i) in rows.enumerate() {
@@ -120,16 +114,10 @@ pub trait Scalar: Sync {
     /// The diagonal of A.
     fn diagonal(&self) -> &[f64];
 
-    fn prepare(&self, _x: &[f64], _shared: &mut Vec<[f64; 3]>) {}
+    fn prepare(&self, _x: &[f64], _shared: &mut Vec<f64>) {}
 
     /// Calls `visit(k, (A x)_i)` for the k-th row i of `rows`.
-    fn rows(
-        &self,
-        rows: Range<usize>,
-        x: &[f64],
-        shared: &[[f64; 3]],
-        visit: impl FnMut(usize, f64),
-    );
+    fn rows(&self, rows: Range<usize>, x: &[f64], shared: &[f64], visit: impl FnMut(usize, f64));
 }
 
 impl Scalar for LimitSystem {
@@ -141,13 +129,7 @@ impl Scalar for LimitSystem {
         &self.diagonal
     }
 
-    fn rows(
-        &self,
-        rows: Range<usize>,
-        x: &[f64],
-        shared: &[[f64; 3]],
-        visit: impl FnMut(usize, f64),
-    ) {
+    fn rows(&self, rows: Range<usize>, x: &[f64], shared: &[f64], visit: impl FnMut(usize, f64)) {
         SelfAdjoint::rows(&self.a, rows, x, shared, visit);
     }
 }
@@ -161,15 +143,15 @@ impl Scalar for Operator {
         Operator::diagonal(self)
     }
 
-    fn prepare(&self, x: &[f64], shared: &mut Vec<[f64; 3]>) {
-        self.moments(x, shared);
+    fn prepare(&self, x: &[f64], shared: &mut Vec<f64>) {
+        self.all_sums(x, shared);
     }
 
     fn rows(
         &self,
         rows: Range<usize>,
         x: &[f64],
-        shared: &[[f64; 3]],
+        shared: &[f64],
         mut visit: impl FnMut(usize, f64),
     ) {
         let mut end = 0;
@@ -177,7 +159,9 @@ impl Scalar for Operator {
             end += count;
             end - count..end
         };
-        Operator::rows(self, rows, (x, 0), shared, next, |k, _, ax| visit(k, ax));
+        Operator::rows(self, rows, (x, 0), (shared, 0), next, |k, _, ax| {
+            visit(k, ax)
+        });
     }
 }
 
@@ -202,7 +186,7 @@ impl<T: Scalar> SelfAdjoint for Matrix<'_, T> {
         }
     }
 
-    fn prepare(&self, x: &[f64], shared: &mut Vec<[f64; 3]>) {
+    fn prepare(&self, x: &[f64], shared: &mut Vec<f64>) {
         self.system.prepare(x, shared);
     }
 
@@ -210,7 +194,7 @@ impl<T: Scalar> SelfAdjoint for Matrix<'_, T> {
         &self,
         rows: Range<usize>,
         x: &[f64],
-        shared: &[[f64; 3]],
+        shared: &[f64],
         mut visit: impl FnMut(usize, f64),
     ) {
         match self.which {
@@ -334,7 +318,7 @@ fn product(
     s: &impl SelfAdjoint,
     (v, norm): (&[f64], f64),
     (w, norm_before): (&mut [f64], f64),
-    shared: &[[f64; 3]],
+    shared: &[f64],
 ) -> f64 {
     // In the first step there is no vector before, and its norm is infinite.
     let (unit, back) = (1.0 / norm, norm / norm_before);

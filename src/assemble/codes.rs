@@ -268,6 +268,18 @@ impl<'a, P: Point, C: Code> Window<'a, P, C> {
         });
     }
 
+    /// `visit(slot, own)` for rows of which no neighbour is asked for.
+    #[inline(always)]
+    pub(super) fn alone<T>(
+        &self,
+        rows: Range<usize>,
+        slots: impl Iterator<Item = T>,
+        mut visit: impl FnMut(T, P),
+    ) {
+        let own = &self.points[rows.start - self.start..][..rows.len()];
+        slots.zip(own).for_each(|(slot, &own)| visit(slot, own));
+    }
+
     /// `visit(slot, own, place, codes)` for rows of `length` neighbours.
     #[inline(always)]
     fn each<T>(

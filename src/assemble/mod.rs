@@ -7,6 +7,7 @@ mod codes;
 pub mod csr;
 pub mod matrix_market;
 pub mod operator;
+pub mod polygons;
 mod rows;
 pub mod scheme;
 mod source;

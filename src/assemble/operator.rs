@@ -1,5 +1,6 @@
 //! The matrix-free twin of [`LimitSystem`](super::LimitSystem): A, M and D⁻¹A from connectivity alone.
 
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use glam::DVec3;
@@ -7,28 +8,26 @@ use rayon::prelude::*;
 
 use super::bounds::{SpectralBounds, usual_lambda_min};
 use super::codes::Neighbours;
+pub use super::polygons::BLOCK;
 use super::scheme::{Masks, Scheme};
 use super::source::Source;
-use super::stencil::{Kind, LargeFaces, Listed, Point, Stencil, runs};
+use super::stencil::{Point, Stencil, runs};
 use super::system::{check_boundary, check_faces};
 use crate::error::Result;
 use crate::mesh::order::Numbering;
-use crate::mesh::topology::NONE;
 use crate::mesh::{Faces, Incidence, Topology};
-use crate::pages::large;
 
 /// Rows of one task.
 const CHUNK: usize = 4096;
-/// Room for so many neighbours of a listed row.
-const USUAL: usize = 12;
 
 /// A = H·M without stored entries: a row knows its neighbours, and its weights follow from valence and face size.
 ///
 /// Per vertex of valence 4 among quads, a sweep over A reads 8 neighbours of 2 bytes (as distances from the row,
 /// where the vertex order keeps them below 2¹⁵; else 4 bytes), 4 bytes for where they start and 1 for the kind of
 /// row: 21 bytes (37) against the 9·(8 + 4) + 4 = 112 of the explicit matrix. To this come the arrays of points:
-/// 24 bytes a vertex each, 16 in single precision. Weights are stored for rows with mixed face sizes only, and
-/// faces of more than 8 corners are summed once a sweep: O(|F|), not O(|F|²).
+/// 24 bytes a vertex each, 16 in single precision. Among faces of several sizes, or of more than 4 corners, each face is
+/// summed once a sweep: a row reads the sums of its n faces, 4 bytes for which face each, and the sweep the 4 bytes of
+/// every corner beside. No weight is stored; a face of m corners costs O(m), not O(m²).
 #[derive(Clone, Debug)]
 pub struct Operator {
     pub(super) stencil: Stencil,
@@ -105,11 +104,10 @@ impl Operator {
         let h: Vec<f64> = (0..=greatest)
             .map(|n| scheme.h(n.max(1) as usize))
             .collect();
-        let (mut listed, large) = source.listed(&kinds, &h);
-        let offsets = source.offsets(&kinds, &listed)?;
-        let runs = runs(&kinds, &offsets);
-        let codes = source.codes(&kinds, offsets, &listed);
-        listed.neighbours = Vec::new();
+        let polygons = source.polygons(&kinds);
+        let offsets = source.offsets(&kinds)?;
+        let runs = runs(&kinds, &source.valences);
+        let codes = source.codes(&kinds, offsets);
         let double = source.rings();
         let stencil = Stencil {
             runs,
@@ -117,20 +115,17 @@ impl Operator {
             kinds,
             single: double.single(),
             double,
-            listed,
-            large,
+            polygons,
         };
-        // Rows of a run that is not listed are alike.
+        // The rows of a run are alike, but for the sizes of faces that are summed: there the extremes tell all.
         let (valences, diagonal): (Vec<u32>, Vec<f64>) = (0..stencil.runs.len())
             .into_par_iter()
             .flat_map_iter(|k| {
                 let run = stencil.run(k);
-                match stencil.kinds[run.start] {
-                    Kind::Listed => run,
-                    _ => run.start..run.start + 1,
-                }
+                let n = source.valences[run.start];
+                let [least, greatest] = stencil.extremes(run);
+                [(n, least), (n, greatest)]
             })
-            .map(|i| (source.valences[i], stencil.diagonal(i)))
             .unzip();
         let triangles = faces.uniform_size() == Some(3);
         let bounds = if closed {
@@ -175,10 +170,7 @@ impl Operator {
 
     /// h_i.
     fn weight(&self, i: usize) -> f64 {
-        match self.stencil.valence(i) {
-            Some(n) => self.h[n],
-            None => self.stencil.listed.weight(i),
-        }
+        self.h[self.stencil.valence(i)]
     }
 
     /// What valences and face sizes prove about the spectrum of A.
@@ -191,20 +183,19 @@ impl Operator {
         self.usual_lambda_min
     }
 
-    /// (A x)_i.
+    /// (A x)_i. O(neighbours), and O(corners of the faces at `i`) where faces are summed.
     #[inline]
     pub fn row(&self, i: usize, x: &[DVec3]) -> DVec3 {
-        self.stencil.row(i, x)
+        self.stencil.row(i, (x, 0))
     }
 
     /// (A x)_i, where `points` holds x from vertex `start` on, as far as the row [reaches](Self::reach).
     ///
     /// # Panics
-    /// If the row reaches beyond the points; with large faces.
+    /// If the row reaches beyond the points.
     #[inline]
     pub fn row_within<P: Point>(&self, i: usize, points: (&[P], usize)) -> P {
-        assert!(self.stencil.large.constant.is_empty(), "no large faces");
-        self.stencil.row_within(i, points)
+        self.stencil.row(i, points)
     }
 
     /// (M x)_i = (A x)_i / h_i.
@@ -218,39 +209,54 @@ impl Operator {
     }
 
     /// Calls `visit(j, a_ij)` for every neighbour j ≠ i of vertex `i`; a vertex that is joined to `i` more than once
-    /// comes as often, with a part of the entry each time. O(neighbours + corners of large faces at `i`).
+    /// comes as often, with a part of the entry each time. As [`row`](Self::row) in cost.
     pub fn neighbours(&self, i: usize, visit: impl FnMut(usize, f64)) {
         self.stencil.entries(i, visit);
     }
 
-    /// Sums over the large faces that the rows of one sweep share; empty without such faces.
-    pub fn moments<P: Point>(&self, x: &[P], moments: &mut Vec<[P; 3]>) {
-        self.stencil.moments(x, moments);
+    /// The sums over faces that the rows of one sweep share; none where all faces are triangles, or quads.
+    pub fn all_sums<P: Point>(&self, x: &[P], sums: &mut Vec<P>) {
+        self.stencil.polygons.all_sums(x, sums);
+    }
+
+    /// Which of all sums are those of faces whose first corner is in `rows`, from a multiple of [`BLOCK`] on and up to
+    /// one, or to the last row. A row needs those of rows no further before it than it [reaches](Self::reach), and none of
+    /// later rows.
+    pub fn sums_of(&self, rows: Range<usize>) -> Range<usize> {
+        self.stencil.polygons.sums_of(rows)
+    }
+
+    /// The sums from number `first` on, of whole faces. `window` holds x from vertex `start` on, as far as these
+    /// [reach](Self::reach).
+    ///
+    /// # Panics
+    /// If a face reaches beyond the window.
+    pub fn sums<P: Point>(&self, first: usize, window: (&[P], usize), sums: &mut [P]) {
+        self.stencil.polygons.sum(first, window, sums);
     }
 
     /// Calls `visit(slot, x_i, (A x)_i)` for every row i of `rows`, in ascending order. `slots(m)` gives what the next
     /// m rows are visited with. `window` holds x from vertex `start` on, as far as the rows [reach](Self::reach),
-    /// and `moments` comes from [`moments`](Self::moments) of the whole x.
+    /// and `sums` those of [all faces](Self::all_sums), or from a number on [those of the rows](Self::sums_of).
     ///
     /// # Panics
     /// If a row reaches beyond the window.
     #[inline(always)]
     pub fn rows<P: Point, I: Iterator>(
         &self,
-        rows: std::ops::Range<usize>,
+        rows: Range<usize>,
         window: (&[P], usize),
-        moments: &[[P; 3]],
+        sums: (&[P], usize),
         slots: impl FnMut(usize) -> I,
         visit: impl FnMut(I::Item, P, P),
     ) {
-        self.stencil.rows(rows, window, moments, slots, visit);
+        self.stencil.rows(rows, window, sums, slots, visit);
     }
 
-    /// The greatest distance in the vertex order between a row and its neighbours; `None` with large faces, whose
-    /// corners may be anywhere.
-    pub fn reach(&self) -> Option<usize> {
-        let large = !self.stencil.large.constant.is_empty();
-        (!large).then_some(self.stencil.codes.reach())
+    /// The greatest distance in the vertex order between a row and its neighbours.
+    pub fn reach(&self) -> usize {
+        let s = &self.stencil;
+        s.codes.reach().max(s.polygons.reach())
     }
 
     /// Bytes of the operator itself that one sweep over A reads.
@@ -260,127 +266,15 @@ impl Operator {
             Neighbours::Near(_) => 2,
             Neighbours::Far(_) => 4,
         };
-        let listed = 8 * s.listed.weights.len() + 40 * s.listed.own.len();
-        let large = 4 * s.large.corners.len() + 8 * s.listed.corners.len();
-        5 * self.len() + code * self.entries() + listed + large
+        5 * self.len() + code * self.entries() + s.polygons.bytes()
     }
 
-    /// Neighbours of all rows together.
+    /// Neighbours of all rows together, but for those by faces that are summed.
     pub fn entries(&self) -> usize {
         self.stencil
             .codes
             .offsets()
             .last()
             .map_or(0, |&end| end as usize)
-    }
-}
-
-/// One list of all parts, one after the other. In parallel.
-fn concat<T: Copy + Default + Send + Sync>(
-    parts: &[Listed],
-    list: impl Fn(&Listed) -> &[T] + Sync,
-) -> Vec<T> {
-    let mut all = large(vec![
-        T::default();
-        parts.iter().map(|part| list(part).len()).sum()
-    ]);
-    let mut rest = all.as_mut_slice();
-    let mut pairs = Vec::with_capacity(parts.len());
-    for part in parts {
-        let (place, after) = rest.split_at_mut(list(part).len());
-        pairs.push((place, part));
-        rest = after;
-    }
-    pairs
-        .into_par_iter()
-        .for_each(|(place, part)| place.copy_from_slice(list(part)));
-    all
-}
-
-impl Listed {
-    /// Puts together the listed rows of these kinds, in their order: `fill(i, …)` adds those of row `i`, but for its
-    /// starts. In parallel.
-    pub(super) fn collect<T: Default>(
-        kinds: &[Kind],
-        fill: impl Fn(usize, &mut Listed, &mut T) + Sync,
-    ) -> Listed {
-        let mut all = Listed::default();
-        if !kinds.contains(&Kind::Listed) {
-            return all;
-        }
-        let mut parts: Vec<Listed> = (0..kinds.len().div_ceil(CHUNK))
-            .into_par_iter()
-            .map_init(T::default, |scratch, k| {
-                let mut part = Listed {
-                    weights: Vec::with_capacity(USUAL * CHUNK),
-                    neighbours: Vec::with_capacity(USUAL * CHUNK),
-                    ..Listed::default()
-                };
-                let rows = k * CHUNK..((k + 1) * CHUNK).min(kinds.len());
-                for i in rows.filter(|&i| kinds[i] == Kind::Listed) {
-                    part.slots.push(i as u32);
-                    part.starts.push(part.weights.len() as u32);
-                    part.large_starts.push(part.corners.len() as u32);
-                    fill(i, &mut part, scratch);
-                }
-                part
-            })
-            .collect();
-        let (mut weights, mut corners) = (0, 0);
-        for part in &mut parts {
-            part.starts.iter_mut().for_each(|s| *s += weights);
-            part.large_starts.iter_mut().for_each(|s| *s += corners);
-            weights += part.weights.len() as u32;
-            corners += part.corners.len() as u32;
-        }
-        all.slots = vec![NONE; kinds.len()];
-        let listed = parts.iter().flat_map(|part| &part.slots);
-        for (slot, &i) in (0..).zip(listed) {
-            all.slots[i as usize] = slot;
-        }
-        all.own = concat(&parts, |part| &part.own);
-        all.h = concat(&parts, |part| &part.h);
-        all.starts = concat(&parts, |part| &part.starts);
-        all.starts.push(weights);
-        all.weights = concat(&parts, |part| &part.weights);
-        all.neighbours = concat(&parts, |part| &part.neighbours);
-        all.large_starts = concat(&parts, |part| &part.large_starts);
-        all.large_starts.push(corners);
-        all.corners = concat(&parts, |part| &part.corners);
-        all
-    }
-
-    /// The weights of listed row `i`.
-    pub(super) fn entries(&self, i: usize) -> std::ops::Range<usize> {
-        let slot = self.slots[i] as usize;
-        self.starts[slot] as usize..self.starts[slot + 1] as usize
-    }
-
-    /// The large faces at vertex `i`, each with the place of `i` in it.
-    pub(super) fn large_at(&self, i: usize) -> &[(u32, u32)] {
-        match self.slots.get(i) {
-            Some(&slot) if slot != NONE => {
-                let slot = slot as usize;
-                &self.corners
-                    [self.large_starts[slot] as usize..self.large_starts[slot + 1] as usize]
-            }
-            _ => &[],
-        }
-    }
-
-    /// h of listed row `i`.
-    fn weight(&self, i: usize) -> f64 {
-        self.h[self.slots[i] as usize]
-    }
-
-    /// a_ii of listed row `i`.
-    pub(super) fn diagonal(&self, i: usize, large: &LargeFaces) -> f64 {
-        let slot = self.slots[i] as usize;
-        let faces: f64 = self
-            .large_at(i)
-            .iter()
-            .map(|&(f, _)| large.constant[f as usize] + large.cosine[f as usize])
-            .sum();
-        self.own[slot] + self.h[slot] * faces
     }
 }

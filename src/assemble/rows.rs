@@ -84,7 +84,7 @@ impl Row {
 /// Entries of a short row, sorted by counting for each how many are smaller: no branch depends on their order, for which
 /// there is no pattern that a processor could foresee.
 #[derive(Default)]
-pub(super) struct Short {
+struct Short {
     /// Columns, in an order that signed numbers have; beyond the length the greatest.
     columns: [i32; Self::MOST],
     values: [f64; Self::MOST],
@@ -98,12 +98,12 @@ impl Short {
     const LANES: usize = 8;
     const SIGN: u32 = 1 << 31;
 
-    pub(super) fn clear(&mut self) {
+    fn clear(&mut self) {
         self.len = 0;
     }
 
     #[inline]
-    pub(super) fn add(&mut self, column: u32, value: f64) {
+    fn add(&mut self, column: u32, value: f64) {
         if self.len < Self::MOST {
             self.columns[self.len] = (column ^ Self::SIGN) as i32;
             self.values[self.len] = value;
@@ -114,11 +114,7 @@ impl Short {
     /// Writes the entries in order and returns the place of the one that was added last, unless they are too many or
     /// two have the same column.
     #[inline]
-    pub(super) fn sort_into(
-        &mut self,
-        columns: &mut Vec<u32>,
-        values: &mut Vec<f64>,
-    ) -> Option<usize> {
+    fn sort_into(&mut self, columns: &mut Vec<u32>, values: &mut Vec<f64>) -> Option<usize> {
         let n = self.len;
         if n > Self::MOST {
             return None;

@@ -25,6 +25,16 @@ pub trait Masks: Sync {
     }
 }
 
+/// The circulant of a face of m corners: `identity·δ + constant + cosine·cos(2π(s−t)/m)` between the places s and t.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Modes {
+    /// The same for all sizes.
+    pub(super) identity: f64,
+    pub(super) constant: f64,
+    /// Zero for all sizes or for none.
+    pub(super) cosine: f64,
+}
+
 /// A subdivision scheme whose limit points the control mesh is asked to interpolate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Scheme {
@@ -79,6 +89,22 @@ impl Scheme {
             system,
             diagonal,
             symmetric,
+        }
+    }
+
+    /// What a face of `size` corners adds to M.
+    pub(super) fn modes(self, size: usize) -> Modes {
+        let m = size as f64;
+        let (identity, constant, cosine) = match self {
+            Scheme::CatmullClark => (0.0, 4.0 / m, 0.0),
+            Scheme::Loop | Scheme::Sqrt3 => (0.0, 0.0, 0.0),
+            Scheme::Nasri => (0.25, 0.75 / m, 0.5 / m),
+            Scheme::ZhengCai => (0.0, 1.0 / m, 0.0),
+        };
+        Modes {
+            identity,
+            constant,
+            cosine,
         }
     }
 
@@ -171,18 +197,14 @@ impl Masks for Scheme {
     }
 
     fn face_weight(&self, size: usize, steps: usize) -> f64 {
-        let m = size as f64;
-        match self {
-            Scheme::CatmullClark => 4.0 / m,
-            Scheme::Loop | Scheme::Sqrt3 => 0.0,
-            Scheme::Nasri => {
-                // Symmetric in steps ↔ size − steps to the last bit: the angle is taken the short way round.
-                let k = steps.min(size - steps) as f64;
-                let own = if steps == 0 { 0.25 } else { 0.0 };
-                own + (3.0 + 2.0 * (TAU * k / m).cos()) / (4.0 * m)
-            }
-            Scheme::ZhengCai => 1.0 / m,
+        let modes = self.modes(size);
+        let own = if steps == 0 { modes.identity } else { 0.0 };
+        if modes.cosine == 0.0 {
+            return own + modes.constant;
         }
+        // Symmetric in steps ↔ size − steps to the last bit: the angle is taken the short way round.
+        let turn = TAU * steps.min(size - steps) as f64 / size as f64;
+        own + modes.constant + modes.cosine * turn.cos()
     }
 
     fn edges_only(&self) -> bool {

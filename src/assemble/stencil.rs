@@ -1,13 +1,12 @@
 //! Rows of A from connectivity alone: which neighbours, with weights that follow from valence and face size. The
 //! kernel of the matrix-free [`Operator`](super::Operator), for double and for single precision.
 
-use std::f64::consts::TAU;
 use std::ops::{Add, AddAssign, Range, Sub};
 
 use glam::{DVec3, Vec3A};
 
 use super::codes::{Code, Codes, Row, Window, Windows};
-use crate::prefetch::prefetch;
+use super::polygons::Polygons;
 
 /// What an operator acts on: three right-hand sides of one vertex, interleaved, in doubles (24 bytes) or singles
 /// (16 bytes, one vector register); or a single one, for eigenvectors.
@@ -20,6 +19,8 @@ pub trait Point: Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + 
     fn times(self, w: Self::Weight) -> Self;
     /// The weights by valence in this precision.
     fn rings(stencil: &Stencil) -> &Rings<Self::Weight>;
+    /// The turns of the corners of faces in this precision.
+    fn turns(polygons: &Polygons) -> &[[Self::Weight; 2]];
 }
 
 impl Point for DVec3 {
@@ -38,6 +39,10 @@ impl Point for DVec3 {
     fn rings(stencil: &Stencil) -> &Rings<f64> {
         &stencil.double
     }
+    #[inline(always)]
+    fn turns(polygons: &Polygons) -> &[[f64; 2]] {
+        polygons.double()
+    }
 }
 
 impl Point for f64 {
@@ -55,6 +60,10 @@ impl Point for f64 {
     #[inline(always)]
     fn rings(stencil: &Stencil) -> &Rings<f64> {
         &stencil.double
+    }
+    #[inline(always)]
+    fn turns(polygons: &Polygons) -> &[[f64; 2]] {
+        polygons.double()
     }
 }
 
@@ -75,6 +84,10 @@ impl Point for Vec3A {
     fn rings(stencil: &Stencil) -> &Rings<Vec3A> {
         &stencil.single
     }
+    #[inline(always)]
+    fn turns(polygons: &Polygons) -> &[[Vec3A; 2]] {
+        polygons.single()
+    }
 }
 
 /// The weights of a row around a vertex of valence n whose faces are all of one kind, times h(n).
@@ -84,31 +97,33 @@ pub struct Ring<W> {
     own: W,
     /// At each edge neighbour.
     edge: W,
-    /// At the opposite corner of each quad.
-    opposite: W,
+    /// At the opposite corner of each quad; at what the faces add to the row of M, where these are summed.
+    across: W,
 }
 
-/// [`Ring`]s by valence, where all faces are quads and where all are triangles.
+/// [`Ring`]s by valence, for the three [`Kind`]s of rows.
 #[derive(Clone, Debug, Default)]
 pub struct Rings<W> {
     pub(super) quads: Vec<Ring<W>>,
     pub(super) edges: Vec<Ring<W>>,
+    pub(super) polygons: Vec<Ring<W>>,
 }
 
 impl<W> Ring<W> {
-    pub(super) fn new(own: W, edge: W, opposite: W) -> Self {
-        Ring {
-            own,
-            edge,
-            opposite,
-        }
+    pub(super) fn new(own: W, edge: W, across: W) -> Self {
+        Ring { own, edge, across }
     }
 }
 
 impl<W: Copy> Ring<W> {
     #[inline(always)]
-    fn value<P: Point<Weight = W>>(&self, own: P, edge: P, opposite: P) -> P {
-        own.times(self.own) + edge.times(self.edge) + opposite.times(self.opposite)
+    fn value<P: Point<Weight = W>>(&self, own: P, edge: P, across: P) -> P {
+        own.times(self.own) + edge.times(self.edge) + across.times(self.across)
+    }
+
+    #[inline(always)]
+    fn value_alone<P: Point<Weight = W>>(&self, own: P, across: P) -> P {
+        own.times(self.own) + across.times(self.across)
     }
 
     #[inline(always)]
@@ -126,7 +141,7 @@ impl Rings<f64> {
                     Ring::new(
                         Vec3A::weight(r.own),
                         Vec3A::weight(r.edge),
-                        Vec3A::weight(r.opposite),
+                        Vec3A::weight(r.across),
                     )
                 })
                 .collect()
@@ -134,11 +149,12 @@ impl Rings<f64> {
         Rings {
             quads: single(&self.quads),
             edges: single(&self.edges),
+            polygons: single(&self.polygons),
         }
     }
 }
 
-/// How the weights of a row are known.
+/// What a row is made of; its weights follow from the valence n.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
@@ -146,94 +162,8 @@ pub enum Kind {
     Quads,
     /// Triangles only, or a scheme that knows edges only: n edge neighbours.
     Edges,
-    /// Anything else: a weight stored with every neighbour.
-    Listed,
-}
-
-/// What rows with stored weights need besides their neighbours.
-#[derive(Clone, Debug, Default)]
-pub struct Listed {
-    /// The slot of every row; of use for listed rows only, and empty where there are none.
-    pub(super) slots: Vec<u32>,
-    /// By slot: the weight of the vertex itself.
-    pub(super) own: Vec<f64>,
-    /// By slot, with one more at the end: where the weights of its neighbours start.
-    pub(super) starts: Vec<u32>,
-    pub(super) weights: Vec<f64>,
-    /// The neighbours to these weights, until they are encoded; then empty.
-    pub(super) neighbours: Vec<u32>,
-    /// By slot, with one more at the end: where the large faces at the vertex start in `corners`.
-    pub(super) large_starts: Vec<u32>,
-    /// A large face and the place of the vertex in it.
-    pub(super) corners: Vec<(u32, u32)>,
-    /// h of the vertex of each slot.
-    pub(super) h: Vec<f64>,
-}
-
-/// The faces whose corners are summed rather than coupled one by one: a block of rank one, or three,
-/// `constant + cosine·cos(2π(s−t)/m)` between places s and t.
-#[derive(Clone, Debug, Default)]
-pub struct LargeFaces {
-    /// Where each face's corners start in `corners`, and the end.
-    pub(super) offsets: Vec<u32>,
-    pub(super) corners: Vec<u32>,
-    /// By face: the weights of the two parts.
-    pub(super) constant: Vec<f64>,
-    pub(super) cosine: Vec<f64>,
-}
-
-impl LargeFaces {
-    pub(super) fn corners_of(&self, f: usize) -> &[u32] {
-        &self.corners[self.offsets[f] as usize..self.offsets[f + 1] as usize]
-    }
-
-    fn len(&self) -> usize {
-        self.constant.len()
-    }
-
-    /// Σ x, Σ cos·x, Σ sin·x over the corners of face `f`.
-    fn moments<P: Point>(&self, f: usize, x: &[P]) -> [P; 3] {
-        let corners = self.corners_of(f);
-        let mut moments = [P::ZERO; 3];
-        if self.cosine[f] == 0.0 {
-            for &v in corners {
-                moments[0] += x[v as usize];
-            }
-        } else {
-            for (t, &v) in corners.iter().enumerate() {
-                let (sin, cos) = angle(t, corners.len());
-                let p = x[v as usize];
-                moments[0] += p;
-                moments[1] += p.times(P::weight(cos));
-                moments[2] += p.times(P::weight(sin));
-            }
-        }
-        moments
-    }
-
-    /// Calls `visit(j, m)` for what face `f` adds to the row of M at its corner `t`, at each other corner j.
-    fn entries(&self, f: usize, t: usize, mut visit: impl FnMut(usize, f64)) {
-        let corners = self.corners_of(f);
-        for (s, &v) in corners.iter().enumerate().filter(|&(s, _)| s != t) {
-            let (_, turn) = angle(s.abs_diff(t), corners.len());
-            visit(v as usize, self.constant[f] + self.cosine[f] * turn);
-        }
-    }
-
-    /// What face `f` adds to the row of M at its corner `t`, its own part aside.
-    fn row<P: Point>(&self, f: usize, t: usize, moments: [P; 3]) -> P {
-        let sum = moments[0].times(P::weight(self.constant[f]));
-        if self.cosine[f] == 0.0 {
-            return sum;
-        }
-        let (sin, cos) = angle(t, self.corners_of(f).len());
-        sum + (moments[1].times(P::weight(cos)) + moments[2].times(P::weight(sin)))
-            .times(P::weight(self.cosine[f]))
-    }
-}
-
-fn angle(t: usize, size: usize) -> (f64, f64) {
-    (TAU * t as f64 / size as f64).sin_cos()
+    /// Anything else: n edge neighbours, if edges have a weight, and the sums over n faces.
+    Polygons,
 }
 
 /// The rows of A.
@@ -241,17 +171,16 @@ fn angle(t: usize, size: usize) -> (f64, f64) {
 pub struct Stencil {
     pub(super) codes: Codes,
     pub(super) kinds: Vec<Kind>,
-    /// The first rows of the runs of equal kind and length.
+    /// The first rows of the runs of equal kind and valence.
     pub(super) runs: Vec<u32>,
     pub(super) double: Rings<f64>,
     pub(super) single: Rings<Vec3A>,
-    pub(super) listed: Listed,
-    pub(super) large: LargeFaces,
+    pub(super) polygons: Polygons,
 }
 
-/// The first rows of the runs of rows of equal kind and length.
-pub(super) fn runs(kinds: &[Kind], offsets: &[u32]) -> Vec<u32> {
-    let key = |i: usize| (kinds[i], offsets[i + 1] - offsets[i]);
+/// The first rows of the runs of rows of equal kind and valence.
+pub(super) fn runs(kinds: &[Kind], valences: &[u32]) -> Vec<u32> {
+    let key = |i: usize| (kinds[i], valences[i]);
     (0..kinds.len())
         .filter(|&i| i == 0 || key(i) != key(i - 1))
         .map(|i| i as u32)
@@ -268,35 +197,52 @@ impl Stencil {
         self.runs[k] as usize..end
     }
 
-    /// The valence of row `i`, unless it is listed.
-    pub(super) fn valence(&self, i: usize) -> Option<usize> {
+    /// The weights of row `i`.
+    fn ring(&self, i: usize) -> &Ring<f64> {
+        let n = self.valence(i);
+        match self.kinds[i] {
+            Kind::Quads => &self.double.quads[n],
+            Kind::Edges => &self.double.edges[n],
+            Kind::Polygons => &self.double.polygons[n],
+        }
+    }
+
+    /// The valence of row `i`.
+    #[inline]
+    pub(super) fn valence(&self, i: usize) -> usize {
         let offsets = self.codes.offsets();
         let length = (offsets[i + 1] - offsets[i]) as usize;
         match self.kinds[i] {
-            Kind::Quads => Some(length / 2),
-            Kind::Edges => Some(length),
-            Kind::Listed => None,
+            Kind::Quads => length / 2,
+            Kind::Edges => length,
+            Kind::Polygons => self.polygons.valence(i),
         }
     }
 
     /// a_ii.
     pub(super) fn diagonal(&self, i: usize) -> f64 {
-        match (self.kinds[i], self.valence(i)) {
-            (Kind::Quads, Some(n)) => self.double.quads[n].own,
-            (_, Some(n)) => self.double.edges[n].own,
-            (_, None) => self.listed.diagonal(i, &self.large),
+        let ring = self.ring(i);
+        match self.kinds[i] {
+            Kind::Polygons => ring.own + ring.across * self.polygons.diagonal(i),
+            _ => ring.own,
         }
     }
 
-    /// The moments of all large faces, for the passes over rows that follow; empty without large faces.
-    pub(super) fn moments<P: Point>(&self, x: &[P], moments: &mut Vec<[P; 3]>) {
-        moments.clear();
-        moments.extend((0..self.large.len()).map(|f| self.large.moments(f, x)));
+    /// The least and the greatest a_ii of some rows of one run.
+    pub(super) fn extremes(&self, rows: Range<usize>) -> [f64; 2] {
+        let rows = match self.kinds[rows.start] {
+            Kind::Polygons => rows,
+            _ => rows.start..rows.start + 1,
+        };
+        rows.fold([f64::INFINITY, 0.0], |[least, greatest], i| {
+            let d = self.diagonal(i);
+            [least.min(d), greatest.max(d)]
+        })
     }
 
     /// Calls `visit(slot, x_i, (A x)_i)` for every row i of `rows`, the slots from `slots(number of rows)`, which is
     /// asked for one run of rows after the other. `points` holds x from vertex `start` on, as far as these rows
-    /// reach; `moments` is of the whole x.
+    /// reach; `sums` those of their faces, from one of them on.
     ///
     /// # Panics
     /// If a row reaches beyond the points.
@@ -305,13 +251,13 @@ impl Stencil {
         &self,
         rows: Range<usize>,
         (points, start): (&[P], usize),
-        moments: &[[P; 3]],
+        sums: (&[P], usize),
         slots: impl FnMut(usize) -> I,
         visit: impl FnMut(I::Item, P, P),
     ) {
         match self.codes.window(rows, points, start) {
-            Windows::Near(window) => self.coded(&window, (points, start), moments, slots, visit),
-            Windows::Far(window) => self.coded(&window, (points, start), moments, slots, visit),
+            Windows::Near(window) => self.coded(&window, (points, start), sums, slots, visit),
+            Windows::Far(window) => self.coded(&window, (points, start), sums, slots, visit),
         }
     }
 
@@ -320,13 +266,12 @@ impl Stencil {
         &self,
         window: &Window<P, C>,
         (points, start): (&[P], usize),
-        moments: &[[P; 3]],
+        sums: (&[P], usize),
         mut slots: impl FnMut(usize) -> I,
         mut visit: impl FnMut(I::Item, P, P),
     ) {
         let rings = P::rings(self);
         let rows = window.rows();
-        let offsets = self.codes.offsets();
         let mut next = self.runs.partition_point(|&r| r as usize <= rows.start);
         let mut from = rows.start;
         while from < rows.end {
@@ -340,22 +285,25 @@ impl Stencil {
                 rows: from..to,
                 slots: slots(to - from),
             };
-            let length = (offsets[from + 1] - offsets[from]) as usize;
-            match (self.kinds[from], length) {
-                (Kind::Quads, 8) => run.quads::<4>(rings, &mut visit),
-                (Kind::Quads, 6) => run.quads::<3>(rings, &mut visit),
-                (Kind::Quads, 10) => run.quads::<5>(rings, &mut visit),
-                (Kind::Quads, 12) => run.quads::<6>(rings, &mut visit),
+            match (self.kinds[from], self.valence(from)) {
+                (Kind::Quads, 4) => run.quads::<4>(rings, &mut visit),
+                (Kind::Quads, 3) => run.quads::<3>(rings, &mut visit),
+                (Kind::Quads, 5) => run.quads::<5>(rings, &mut visit),
+                (Kind::Quads, 6) => run.quads::<6>(rings, &mut visit),
                 (Kind::Edges, 6) => run.edges::<6>(rings, &mut visit),
                 (Kind::Edges, 5) => run.edges::<5>(rings, &mut visit),
                 (Kind::Edges, 7) => run.edges::<7>(rings, &mut visit),
                 (Kind::Edges, 4) => run.edges::<4>(rings, &mut visit),
                 (Kind::Edges, 3) => run.edges::<3>(rings, &mut visit),
                 (Kind::Edges, 8) => run.edges::<8>(rings, &mut visit),
+                (Kind::Polygons, 3) => run.polygons::<3>(rings, &self.polygons, sums, &mut visit),
+                (Kind::Polygons, 4) => run.polygons::<4>(rings, &self.polygons, sums, &mut visit),
+                (Kind::Polygons, 5) => run.polygons::<5>(rings, &self.polygons, sums, &mut visit),
+                (Kind::Polygons, 6) => run.polygons::<6>(rings, &self.polygons, sums, &mut visit),
                 _ => {
+                    let faces = |i| self.polygons.gather_in(self.polygons.at(i), sums);
                     for (i, slot) in (from..to).zip(run.slots) {
-                        let codes = window.codes(i);
-                        let value = self.coded_row(codes, i, points, start, |f, _| moments[f]);
+                        let value = self.coded_row(window.codes(i), i, points, start, faces);
                         visit(slot, points[i - start], value);
                     }
                 }
@@ -364,16 +312,18 @@ impl Stencil {
         }
     }
 
-    /// (A x)_i, with the sums over large faces taken anew: O(neighbours + corners of large faces at `i`).
+    /// (A x)_i, faces summed for this row alone: O(neighbours + corners of the faces at `i`). `points` holds x from
+    /// vertex `start` on, as far as the row reaches.
     #[inline]
-    pub(super) fn row<P: Point>(&self, i: usize, x: &[P]) -> P {
-        let moments = |f, x: &[P]| self.large.moments(f, x);
+    pub(super) fn row<P: Point>(&self, i: usize, (points, start): (&[P], usize)) -> P {
+        let faces = |i| self.polygons.row(i, (points, start));
         match self.codes.of_row(i) {
-            Row::Near(near) => self.coded_row(near, i, x, 0, moments),
-            Row::Far(far) => self.coded_row(far, i, x, 0, moments),
+            Row::Near(near) => self.coded_row(near, i, points, start, faces),
+            Row::Far(far) => self.coded_row(far, i, points, start, faces),
         }
     }
 
+    /// `faces(i)` is what the faces at row i add up to.
     #[inline(always)]
     fn coded_row<P: Point, C: Code>(
         &self,
@@ -381,7 +331,7 @@ impl Stencil {
         i: usize,
         window: &[P],
         start: usize,
-        moments: impl Fn(usize, &[P]) -> [P; 3],
+        faces: impl Fn(usize) -> P,
     ) -> P {
         let rings = P::rings(self);
         let row = i - start;
@@ -399,18 +349,13 @@ impl Stencil {
                 let edge = sum(codes, window, row, start);
                 rings.edges[codes.len()].value_of_edges(window[row], edge)
             }
-            Kind::Listed => self.listed_row(i, codes, window, row, start, moments),
-        }
-    }
-
-    /// As [`row`](Self::row), for points from vertex `start` on, as far as the row reaches. There must be no large
-    /// faces.
-    #[inline]
-    pub(super) fn row_within<P: Point>(&self, i: usize, (points, start): (&[P], usize)) -> P {
-        let none = |_, _: &[P]| [P::ZERO; 3];
-        match self.codes.of_row(i) {
-            Row::Near(near) => self.coded_row(near, i, points, start, none),
-            Row::Far(far) => self.coded_row(far, i, points, start, none),
+            Kind::Polygons => {
+                let ring = &rings.polygons[self.polygons.valence(i)];
+                if codes.is_empty() {
+                    return ring.value_alone(window[row], faces(i));
+                }
+                ring.value(window[row], sum(codes, window, row, start), faces(i))
+            }
         }
     }
 
@@ -423,76 +368,19 @@ impl Stencil {
     }
 
     fn coded_entries<C: Code>(&self, codes: &[C], i: usize, mut visit: impl FnMut(usize, f64)) {
-        match self.kinds[i] {
-            Kind::Quads => {
-                let n = codes.len() / 2;
-                let ring = self.double.quads[n];
-                for (k, c) in codes.iter().enumerate() {
-                    let a = if k < n { ring.edge } else { ring.opposite };
-                    visit(c.place(i, 0), a);
-                }
-            }
-            Kind::Edges => {
-                let ring = self.double.edges[codes.len()];
-                codes.iter().for_each(|c| visit(c.place(i, 0), ring.edge));
-            }
-            Kind::Listed => {
-                let listed = &self.listed;
-                let slot = listed.slots[i] as usize;
-                let weights = &listed.weights[listed.starts[slot] as usize..];
-                for (c, &a) in codes.iter().zip(weights) {
-                    visit(c.place(i, 0), a);
-                }
-                for &(f, t) in listed.large_at(i) {
-                    self.large.entries(f as usize, t as usize, |j, m| {
-                        visit(j, listed.h[slot] * m);
-                    });
-                }
-            }
+        let ring = self.ring(i);
+        let edges = match self.kinds[i] {
+            Kind::Quads => codes.len() / 2,
+            Kind::Edges | Kind::Polygons => codes.len(),
+        };
+        for (k, c) in codes.iter().enumerate() {
+            let a = if k < edges { ring.edge } else { ring.across };
+            visit(c.place(i, 0), a);
         }
-    }
-
-    #[inline(never)]
-    fn listed_row<P: Point, C: Code>(
-        &self,
-        i: usize,
-        codes: &[C],
-        window: &[P],
-        row: usize,
-        start: usize,
-        moments: impl Fn(usize, &[P]) -> [P; 3],
-    ) -> P {
-        /// Entries between what is read and what is fetched for later rows. Tuned.
-        const AHEAD: usize = 64;
-        let listed = &self.listed;
-        let slot = listed.slots[i] as usize;
-        let weights = &listed.weights[listed.starts[slot] as usize..][..codes.len()];
-        prefetch(weights, AHEAD);
-        prefetch(codes, AHEAD);
-        let term = |c: C, w| window[c.place(row, start)].times(P::weight(w));
-        // Two sums, so that one addition need not wait for the other.
-        let mut sum = window[row].times(P::weight(listed.own[slot]));
-        let mut other = P::ZERO;
-        let (pairs, last) = codes.as_chunks::<2>();
-        let (pairs_of_weights, last_weight) = weights.as_chunks::<2>();
-        for (c, w) in pairs.iter().zip(pairs_of_weights) {
-            sum += term(c[0], w[0]);
-            other += term(c[1], w[1]);
+        if self.kinds[i] == Kind::Polygons {
+            let part = |j, m| visit(j, ring.across * m);
+            self.polygons.entries(i, part);
         }
-        if let (&[c], &[w]) = (last, last_weight) {
-            sum += term(c, w);
-        }
-        sum += other;
-        if listed.corners.is_empty() {
-            return sum;
-        }
-        let large = listed.large_starts[slot] as usize..listed.large_starts[slot + 1] as usize;
-        for &(f, t) in &listed.corners[large] {
-            let f = f as usize;
-            let part = self.large.row(f, t as usize, moments(f, window));
-            sum += part.times(P::weight(listed.h[slot]));
-        }
-        sum
     }
 }
 
@@ -509,7 +397,7 @@ fn sum<P: Point, C: Code>(codes: &[C], window: &[P], row: usize, start: usize) -
     sum
 }
 
-/// Consecutive rows of one kind and length.
+/// Consecutive rows of one kind and valence.
 struct Run<'w, 'a, P, C, I> {
     window: &'w Window<'a, P, C>,
     rows: Range<usize>,
@@ -526,8 +414,8 @@ impl<P: Point, C: Code, I: Iterator> Run<'_, '_, P, C, I> {
     ) {
         let ring = rings.quads[N];
         self.window
-            .halves::<N, _>(self.rows, self.slots, |slot, own, edge, opposite| {
-                visit(slot, own, ring.value(own, edge, opposite));
+            .halves::<N, _>(self.rows, self.slots, |slot, own, edge, across| {
+                visit(slot, own, ring.value(own, edge, across));
             });
     }
 
@@ -543,5 +431,31 @@ impl<P: Point, C: Code, I: Iterator> Run<'_, '_, P, C, I> {
             .wholes::<N, _>(self.rows, self.slots, |slot, own, edge| {
                 visit(slot, own, ring.value_of_edges(own, edge));
             });
+    }
+
+    /// Rows of N faces that are summed.
+    #[inline(always)]
+    fn polygons<const N: usize>(
+        self,
+        rings: &Rings<P::Weight>,
+        polygons: &Polygons,
+        sums: (&[P], usize),
+        visit: &mut impl FnMut(I::Item, P, P),
+    ) {
+        let ring = rings.polygons[N];
+        let listed = (polygons.at(self.rows.start).start..).step_by(N);
+        let slots = self.slots.zip(listed);
+        if self.window.codes(self.rows.start).is_empty() {
+            self.window.alone(self.rows, slots, |(slot, e), own| {
+                let across = polygons.gather::<N, P>(e, sums);
+                visit(slot, own, ring.value_alone(own, across));
+            });
+        } else {
+            self.window
+                .wholes::<N, _>(self.rows, slots, |(slot, e), own, edge| {
+                    let across = polygons.gather::<N, P>(e, sums);
+                    visit(slot, own, ring.value(own, edge, across));
+                });
+        }
     }
 }

@@ -8,7 +8,7 @@
 //!   anything else touches its faces, from [`SCATTERED`] vertices on. From [`ORDERED`] vertices on, the rows of the
 //!   operator are [breadth first](in_fronts), which gives it the narrow band that groups of iterations need. Below, all
 //!   arrays stay in cache in any order, and rows are [grouped by kind](in_kinds) only; so they are for mixed faces under
-//!   Zheng-Cai, where iterations are too few to pay for the search. Results come back in file order.
+//!   Nasri and Zheng-Cai, where iterations are too few to pay for the search. Results come back in file order.
 //! - *Bounds.* The interval starts at what λ_min usually is, or at the proven bound where that is higher; a correction
 //!   that gains less than promised stretches it, down to the proven bound at the most.
 //! - *Hard cases.* If that does not converge (λ_min below 10⁻⁴, a singular matrix), conjugate gradients on the same
@@ -35,8 +35,8 @@ use crate::solvers::{Iterate, Method, Outcome, Report, Stop, mixed, solve};
 pub const SCATTERED: usize = 50_000;
 /// From this many vertices on, the rows of the operator are breadth first. Tuned.
 pub const ORDERED: usize = 200_000;
-/// From this usual λ_min on (Zheng-Cai's), a dozen iterations suffice, and on mixed faces that order does not pay. Tuned.
-const FEW: f64 = 0.3;
+/// From this usual λ_min on (Nasri's), a score of iterations suffice, and on mixed faces that order does not pay. Tuned.
+const FEW: f64 = 0.25;
 
 /// Control points, how they came about and what it cost.
 #[derive(Clone, Debug)]
@@ -169,7 +169,9 @@ fn operator(
         }
     };
     // Among mixed faces the search costs twice as much.
-    let few = usual_lambda_min(scheme) >= FEW && mesh.faces.uniform_size().is_none();
+    let few = usual_lambda_min(scheme)
+        >= std::env::var("LL_FEW").map_or(FEW, |x| x.parse().unwrap())
+        && mesh.faces.uniform_size().is_none();
     let number = || {
         if mesh.len() >= ORDERED && !few {
             Some(in_fronts(&mesh.faces, incidence))

@@ -90,24 +90,23 @@ pub fn in_kinds(faces: &Faces, incidence: &Incidence) -> Option<Numbering> {
     (!order.is_sorted()).then(|| Numbering::new(order))
 }
 
-/// Sorts each 256 consecutive vertices by kind: rows of one length, with weights known by valence or listed. Those of one
-/// kind are left as they come.
+/// Sorts each 256 consecutive vertices by valence, those among triangles, among quads and among others apart. Those of
+/// one kind are left as they come.
 fn group_kinds(faces: &Faces, incidence: &Incidence, order: &mut [u32]) {
     const GROUP: usize = 256;
-    /// Larger numbers, of faces or of neighbours, count as one.
+    /// Larger valences count as one.
     const MOST: usize = 63;
     let uniform = faces.uniform_size();
-    // Triangles only; quads only, as a rule; others by the number of neighbours.
+    // One bit for each size that occurs.
+    let bit = |size: usize| 1u32 << size.min(31);
     let key = |v: u32| {
         let at = incidence.corners_at(v as usize);
-        let n = at.len();
+        let n = at.len().min(MOST);
         let sizes = at.iter().map(|&c| faces.range(incidence.face_of(c)).len());
-        let corners = uniform.map_or_else(|| sizes.sum(), |size| size * n);
-        match corners {
-            c if c == 3 * n => n.min(MOST),
-            c if c == 4 * n => MOST + 1 + n.min(MOST),
-            c => 2 * (MOST + 1) + c.saturating_sub(2 * n).min(MOST),
-        }
+        let met = uniform.map_or_else(|| sizes.fold(0, |met, size| met | bit(size)), bit);
+        // Triangles only, quads only, others.
+        let kinds = u32::from(met != bit(3)) + u32::from(met != bit(3) && met != bit(4));
+        kinds as usize * (MOST + 1) + n
     };
     order.par_chunks_mut(GROUP).for_each(|group| {
         let mut vertices = [(0, 0); GROUP];
@@ -138,15 +137,18 @@ mod tests {
             let mesh = builtin::builtin(name).unwrap();
             let incidence = Incidence::new(&mesh.faces, mesh.len());
             let numbering = in_kinds(&mesh.faces, &incidence).unwrap();
-            // Neighbours by face: every face adds its corners but for the vertex and one end of an edge.
-            let length = |v: &u32| -> usize {
-                let at = incidence.corners_at(*v as usize).iter();
-                at.map(|&c| mesh.faces.face(incidence.face_of(c)).len() - 2)
-                    .sum()
+            // The valence, and the size of the faces where all are triangles or quads.
+            let kind = |v: &u32| {
+                let at = incidence.corners_at(*v as usize);
+                let size = |c: u32| mesh.faces.face(incidence.face_of(c)).len();
+                let alike = [3, 4]
+                    .into_iter()
+                    .find(|&m| at.iter().all(|&c| size(c) == m));
+                (at.len(), alike)
             };
             let changes = |order: &[u32]| {
                 let pairs = order.windows(2);
-                pairs.filter(|w| length(&w[0]) != length(&w[1])).count()
+                pairs.filter(|w| kind(&w[0]) != kind(&w[1])).count()
             };
             let file: Vec<u32> = (0..mesh.len() as u32).collect();
             assert!(4 * changes(numbering.order()) < changes(&file), "{name}");

@@ -13,7 +13,7 @@ use super::iteration::{Errors, Outcome, Report, Stop};
 use super::system::Rows;
 use super::wavefront::Wavefront;
 use crate::assemble::Operator;
-use crate::pages::large;
+use crate::pages::filled;
 use crate::prefetch::{POINTS_AHEAD, prefetch};
 
 /// A correction in single precision is not asked for more than this: half a digit above its rounding.
@@ -55,13 +55,8 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
     let mut rows = Rows::new(n);
     // Empty stands for V = P.
     let mut control: Vec<DVec3> = Vec::new();
-    // By all threads, so that they share the work of the pages' first touch.
-    let zeros = || {
-        let mut zeros = large(Vec::with_capacity(n));
-        zeros.par_extend((0..n).into_par_iter().map(|_| Vec3A::ZERO));
-        zeros
-    };
-    let (mut residual, mut correction, mut other) = (zeros(), zeros(), zeros());
+    let [mut residual, mut correction] = [Vec3A::ZERO; 2].map(|zero| filled(n, zero));
+    let mut scratch = wavefront.scratch();
     // Residuals in units of the tolerance are far from the ends of single precision's range.
     let unit = if stop.tolerance > 0.0 {
         stop.tolerance
@@ -134,7 +129,7 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
             count,
             &residual,
             &mut correction,
-            &mut other,
+            &mut scratch,
         );
         iterations += count;
         if control.is_empty() {

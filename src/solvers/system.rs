@@ -28,7 +28,7 @@ pub trait System: Sync {
     fn row(&self, i: usize, x: &[DVec3]) -> DVec3;
 
     /// Sums over `x` that the rows of one whole product share; none unless the system has some.
-    fn prepare(&self, _x: &[DVec3], shared: &mut Vec<Shared>) {
+    fn prepare(&self, _x: &[DVec3], shared: &mut Vec<DVec3>) {
         shared.clear();
     }
 
@@ -39,7 +39,7 @@ pub trait System: Sync {
         &self,
         rows: Range<usize>,
         x: &[DVec3],
-        _shared: &[Shared],
+        _shared: &[DVec3],
         mut slots: impl FnMut(usize) -> I,
         mut visit: impl FnMut(I::Item, DVec3),
     ) {
@@ -48,9 +48,6 @@ pub trait System: Sync {
         }
     }
 }
-
-/// What rows of one product may share: three points.
-pub type Shared = [DVec3; 3];
 
 impl System for LimitSystem {
     fn len(&self) -> usize {
@@ -89,8 +86,8 @@ impl System for Operator {
         Operator::row(self, i, x)
     }
 
-    fn prepare(&self, x: &[DVec3], shared: &mut Vec<Shared>) {
-        self.moments(x, shared);
+    fn prepare(&self, x: &[DVec3], shared: &mut Vec<DVec3>) {
+        self.all_sums(x, shared);
     }
 
     #[inline(always)]
@@ -98,11 +95,11 @@ impl System for Operator {
         &self,
         rows: Range<usize>,
         x: &[DVec3],
-        shared: &[Shared],
+        shared: &[DVec3],
         slots: impl FnMut(usize) -> I,
         mut visit: impl FnMut(I::Item, DVec3),
     ) {
-        Operator::rows(self, rows, (x, 0), shared, slots, |slot, _, ax| {
+        Operator::rows(self, rows, (x, 0), (shared, 0), slots, |slot, _, ax| {
             visit(slot, ax);
         });
     }
@@ -159,7 +156,7 @@ pub struct Totals {
 pub struct Rows {
     tallies: Vec<Tally>,
     n: usize,
-    shared: Vec<Shared>,
+    shared: Vec<DVec3>,
 }
 
 impl Rows {

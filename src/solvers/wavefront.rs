@@ -4,7 +4,9 @@
 //! narrow band, the vertices are cut into bands as long as a row reaches: band j of iterate k + 1 can be made as
 //! soon as band j + 1 of iterate k is there, long before that iterate is complete. A wave therefore advances band
 //! w − 2k of every iterate k at once; these updates touch disjoint parts of two arrays and run in parallel, and all
-//! that they touch stays in cache from one wave to the next. Every number is computed from the same operands as in
+//! that they touch stays in cache from one wave to the next. Where rows read [sums over
+//! faces](crate::assemble::polygons), the sums of a band are made one wave before its rows, and iterates follow each
+//! other three bands apart. Every number is computed from the same operands as in
 //! iterations one after the other, so results do not depend on the number of threads, nor on the length of a group
 //! of iterations (Wonnacott's time skewing, 2000).
 
@@ -16,7 +18,9 @@ use rayon::prelude::*;
 use super::chebyshev::Recurrence;
 use super::gauss_seidel::sweep;
 use crate::assemble::Operator;
+use crate::assemble::polygons::BLOCK;
 use crate::assemble::stencil::Point;
+use crate::pages::filled;
 use crate::prefetch::{POINTS_AHEAD, prefetch};
 
 /// Iterations of one group, which share a pass over memory, at the most.
@@ -38,12 +42,32 @@ pub struct Wavefront<'a> {
     band: Option<usize>,
 }
 
-/// The part of an iteration on one band.
-struct Task<'b, P> {
+/// What iterations write besides the iterate that they return.
+#[derive(Clone, Debug)]
+pub struct Scratch<P> {
+    other: Vec<P>,
+    sums: Vec<P>,
+}
+
+/// A part of an iteration on one band.
+enum Task<'b, P> {
+    Rows(Update<'b, P>),
+    /// The sums over some faces.
+    Faces {
+        /// The iterate, from a vertex on.
+        window: (&'b [P], usize),
+        /// The first of the sums.
+        first: usize,
+        sums: &'b mut [P],
+    },
+}
+
+struct Update<'b, P> {
     rows: Range<usize>,
-    /// The iterate, from vertex `start` on.
-    window: &'b [P],
-    start: usize,
+    /// The iterate, from a vertex on.
+    window: (&'b [P], usize),
+    /// Those of the faces that the rows need, from a number on.
+    sums: (&'b [P], usize),
     /// The iterate before it, replaced by the one after it.
     out: &'b mut [P],
     coefficients: (f64, f64),
@@ -53,28 +77,42 @@ impl<'a> Wavefront<'a> {
     /// Bands by the reach of the operator's rows: groups of iterations pay where there are many.
     pub fn new(operator: &'a Operator) -> Self {
         let n = operator.len();
-        let band = operator
-            .reach()
-            .map(|reach| reach.max(CHUNK))
-            .filter(|band| n >= SMALL && n / band >= GROUP);
-        Wavefront { operator, band }
+        let band = operator.reach().max(CHUNK);
+        let many = n >= SMALL && n / band >= GROUP;
+        Self::in_bands(operator, many.then_some(band))
     }
 
-    /// Bands of a given length; `None` for iterations one after the other.
+    /// Bands of a given length, or a little more; `None` for iterations one after the other.
     ///
     /// # Panics
     /// If rows reach further than a band.
     pub fn in_bands(operator: &'a Operator, band: Option<usize>) -> Self {
         assert!(
-            band.is_none_or(|band| operator.reach().is_some_and(|reach| reach <= band)),
+            band.is_none_or(|band| operator.reach() <= band),
             "rows reach no further than a band"
+        );
+        // Sums are ordered by blocks of rows.
+        let band = band.map(
+            |band| match operator.sums_of(0..operator.len()).is_empty() {
+                true => band,
+                false => band.next_multiple_of(BLOCK),
+            },
         );
         Wavefront { operator, band }
     }
 
+    /// Arrays for [`iterate`](Self::iterate), to be used again and again.
+    pub fn scratch<P: Point>(&self) -> Scratch<P> {
+        let n = self.operator.len();
+        Scratch {
+            other: filled(n, P::ZERO),
+            sums: filled(self.operator.sums_of(0..n).len(), P::ZERO),
+        }
+    }
+
     /// `count` ≥ 1 iterations for eigenvalues within the interval of `recurrence`, from x = 0. The first of them is
     /// a multiple of `r` and must be in `x` already: `x = τ₀ r` with the recurrence's first coefficient. The last
-    /// iterate is returned in `x`; `other` is overwritten.
+    /// iterate is returned in `x`.
     ///
     /// Reads, for each group of up to 16 iterations, the operator, `r` and both iterates once from memory.
     ///
@@ -86,9 +124,10 @@ impl<'a> Wavefront<'a> {
         count: usize,
         r: &[P],
         x: &mut Vec<P>,
-        other: &mut Vec<P>,
+        scratch: &mut Scratch<P>,
     ) {
         let n = self.operator.len();
+        let Scratch { other, sums } = scratch;
         assert!(
             r.len() == n && x.len() == n && other.len() == n,
             "one point a vertex"
@@ -100,11 +139,14 @@ impl<'a> Wavefront<'a> {
                 recurrence.coefficients()
             })
             .collect();
-        let length = self.band.map_or(1, |band| self.group_length::<P>(2 * band));
+        let lag = if sums.is_empty() { 2 } else { 3 };
+        let length = self
+            .band
+            .map_or(1, |band| self.group_length::<P>(lag * band));
         for group in coefficients.chunks(length) {
             match self.band {
-                Some(band) => self.group(band, group, r, x, other),
-                None => self.plain(group[0], r, x, other),
+                Some(band) => self.group(band, group, r, (x, other), sums),
+                None => self.plain(group[0], r, (x, other), sums),
             }
             if group.len() % 2 == 1 {
                 std::mem::swap(x, other);
@@ -167,21 +209,26 @@ impl<'a> Wavefront<'a> {
     }
 
     /// One iteration: `other` becomes the next one after `x`.
-    fn plain<P: Point>(&self, coefficients: (f64, f64), r: &[P], x: &[P], other: &mut [P]) {
-        let mut moments = Vec::new();
-        self.operator.moments(x, &mut moments);
+    fn plain<P: Point>(
+        &self,
+        coefficients: (f64, f64),
+        r: &[P],
+        (x, other): (&[P], &mut [P]),
+        sums: &mut Vec<P>,
+    ) {
+        self.operator.all_sums(x, sums);
         other
             .par_chunks_mut(CHUNK)
             .enumerate()
             .for_each(|(k, out)| {
-                let task = Task {
+                let update = Update {
                     rows: k * CHUNK..k * CHUNK + out.len(),
-                    window: x,
-                    start: 0,
+                    window: (x, 0),
+                    sums: (sums, 0),
                     out,
                     coefficients,
                 };
-                self.run(task, r, &moments);
+                self.update(update, r);
             });
     }
 
@@ -191,52 +238,81 @@ impl<'a> Wavefront<'a> {
         band: usize,
         group: &[(f64, f64)],
         r: &[P],
-        x: &mut [P],
-        other: &mut [P],
+        (x, other): (&mut [P], &mut [P]),
+        sums: &mut [P],
     ) {
         let n = r.len();
         let bands = n.div_ceil(band);
         let at = |j: usize| (j * band).min(n);
-        for wave in 0..bands + 2 * (group.len() - 1) {
-            let mut tasks = Vec::with_capacity(group.len());
-            // What is left of the two arrays, with its first vertex. The last iteration of the group is at the
+        // Rows come this many waves after the sums of their band.
+        let behind = usize::from(!sums.is_empty());
+        let lag = 2 + behind;
+        for wave in 0..bands + lag * (group.len() - 1) + behind {
+            let mut tasks = Vec::with_capacity(2 * group.len() * band.div_ceil(PIECE));
+            // What is left of the arrays, each with its first number. The last iteration of the group is at the
             // foremost band: later ones come in ascending order of bands.
             let mut rest = [(&mut *x, 0), (&mut *other, 0)];
+            let mut rest_of_sums = (&mut *sums, 0);
             for (k, &coefficients) in group.iter().enumerate().rev() {
-                let Some(j) = wave.checked_sub(2 * k).filter(|&j| j < bands) else {
+                let front = wave.checked_sub(lag * k);
+                let Some(front) = front.filter(|&front| front < bands + behind) else {
                     continue;
                 };
-                let rows = at(j)..at(j + 1);
-                let seen = at(j.saturating_sub(1))..at(j + 2);
+                let seen = at(front.saturating_sub(1 + behind))..at(front + 2);
                 let start = seen.start;
-                let window = cut(&mut rest[k % 2], seen);
-                let out = cut(&mut rest[(k + 1) % 2], rows.clone());
-                for (from, out) in rows.step_by(PIECE).zip(out.chunks_mut(PIECE)) {
-                    tasks.push(Task {
-                        rows: from..from + out.len(),
-                        window,
-                        start,
-                        out,
-                        coefficients,
-                    });
+                let window = (&*cut(&mut rest[k % 2], seen), start);
+                if let Some(j) = front.checked_sub(behind).filter(|&j| j < bands) {
+                    let known = self.operator.sums_of(at(j.saturating_sub(1))..at(j + 1));
+                    let first = known.start;
+                    let sums = (&*cut(&mut rest_of_sums, known), first);
+                    let rows = at(j)..at(j + 1);
+                    let out = cut(&mut rest[(k + 1) % 2], rows.clone());
+                    for (from, out) in rows.step_by(PIECE).zip(out.chunks_mut(PIECE)) {
+                        tasks.push(Task::Rows(Update {
+                            rows: from..from + out.len(),
+                            window,
+                            sums,
+                            out,
+                            coefficients,
+                        }));
+                    }
+                }
+                if behind > 0 && front < bands {
+                    let made = self.operator.sums_of(at(front)..at(front + 1));
+                    let first = made.start;
+                    let sums = cut(&mut rest_of_sums, made);
+                    // Whole faces: sums come in ones or in threes.
+                    let piece = 3 * PIECE;
+                    for (k, sums) in sums.chunks_mut(piece).enumerate() {
+                        tasks.push(Task::Faces {
+                            window,
+                            first: first + k * piece,
+                            sums,
+                        });
+                    }
                 }
             }
-            tasks
-                .into_par_iter()
-                .for_each(|task| self.run(task, r, &[]));
+            tasks.into_par_iter().for_each(|task| match task {
+                Task::Rows(update) => self.update(update, r),
+                Task::Faces {
+                    window,
+                    first,
+                    sums,
+                } => self.operator.sums(first, window, sums),
+            });
         }
     }
 
     /// `out ← v + γ (v − out) + τ (r − A v)` on the rows of the task.
-    fn run<P: Point>(&self, task: Task<P>, r: &[P], moments: &[[P; 3]]) {
+    fn update<P: Point>(&self, task: Update<P>, r: &[P]) {
         let (gamma, tau) = task.coefficients;
         let (gamma, tau) = (P::weight(gamma), P::weight(tau));
         let mut r = &r[task.rows.clone()];
         let mut out = task.out;
         self.operator.rows(
             task.rows,
-            (task.window, task.start),
-            moments,
+            task.window,
+            task.sums,
             |count| {
                 let out = out.split_off_mut(..count).unwrap_or_default();
                 out.iter_mut().zip(r.split_off(..count).unwrap_or_default())
