@@ -5,6 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::Faces;
+use super::topology::NONE;
 use crate::pages::large;
 use crate::prefetch::prefetch;
 
@@ -213,19 +214,33 @@ impl Incidence {
                         && out.windows(2).all(|w| w[0] != w[1])
                         && out.binary_search(&(v as u32)).is_err();
                 }
-                let mut ends = [(0, 0); FEW];
-                let ends = &mut ends[..at.len()];
-                for (end, &c) in ends.iter_mut().zip(at) {
-                    *end = sides(c);
+                // Eight at a time, by one comparison of all: a vertex of more faces is rare.
+                if at.len() <= FEW / 2 {
+                    each_once::<{ FEW / 2 }>(v, at.iter().map(|&c| sides(c)))
+                } else {
+                    each_once::<FEW>(v, at.iter().map(|&c| sides(c)))
                 }
-                ends.iter().all(|&(out, _)| {
-                    let count = |same: fn(&(u32, u32)) -> u32| {
-                        ends.iter().filter(|e| same(e) == out).count()
-                    };
-                    out as usize != v && count(|e| e.0) == 1 && count(|e| e.1) == 1
-                })
             })
     }
+}
+
+/// Whether the vertices where sides leave `v` for are the ones that sides enter it from, no two the same and none `v`;
+/// at most `MOST`.
+#[inline(always)]
+fn each_once<const MOST: usize>(v: usize, sides: impl Iterator<Item = (u32, u32)>) -> bool {
+    // What no place of a list holds is no vertex.
+    let (mut out, mut into) = ([NONE; MOST], [NONE; MOST]);
+    let mut count = 0;
+    for (k, (to, from)) in sides.enumerate() {
+        (out[k], into[k]) = (to, from);
+        count += 1;
+    }
+    let times = |list: &[u32; MOST], w: u32| list.iter().map(|&x| u32::from(x == w)).sum::<u32>();
+    let mut wrong = 0;
+    for &w in &out[..count] {
+        wrong |= (times(&out, w) ^ 1) | (times(&into, w) ^ 1) | u32::from(w as usize == v);
+    }
+    wrong == 0
 }
 
 /// Cuts `values`, of which row i is `offsets[i]..offsets[i + 1]`, after every `chunk` rows.
