@@ -37,6 +37,8 @@ pub struct Polygons {
     weights: Vec<[f64; 2]>,
     /// By size: where its turns start.
     first_turn: Vec<u32>,
+    /// What a face adds between places t apart, t = 1 − m…m − 1, twice as far from the start as its turns.
+    circulants: Vec<f64>,
     double: Vec<Turn<f64>>,
     single: Vec<Turn<Vec3A>>,
     /// By face, in the order of the sums: where its corners start, and the end.
@@ -137,7 +139,6 @@ impl Polygons {
 
     /// Where corners start, and what is known by size.
     fn measure(&mut self, faces: &Faces, scheme: Scheme, sorted: &[u32]) {
-        self.parts = 1;
         self.offsets = large(Vec::with_capacity(sorted.len() + 1));
         self.offsets.push(0);
         let (mut end, mut last) = (0, usize::MAX);
@@ -158,10 +159,13 @@ impl Polygons {
                 let modes = scheme.modes(size);
                 self.weights[size] = [modes.constant, modes.cosine];
                 self.first_turn[size] = self.double.len() as u32;
-                if modes.cosine != 0.0 {
-                    self.parts = 3;
-                    self.double.extend((0..size).map(|t| turn(t, size)));
-                }
+                self.parts = if modes.cosine == 0.0 { 1 } else { 3 };
+                self.double.extend((0..size).map(|t| turn(t, size)));
+                let turns = &self.double[self.double.len() - size..];
+                let places = (1..size).rev().chain(0..size);
+                let weight = |t: usize| modes.constant + modes.cosine * turns[t][0];
+                self.circulants.extend(places.map(weight));
+                self.circulants.push(0.0);
             }
         }
         self.single = self.double.iter().map(|t| t.map(Vec3A::weight)).collect();
@@ -287,19 +291,30 @@ impl Polygons {
         &self.corners[self.offsets[f] as usize..self.offsets[f + 1] as usize]
     }
 
+    /// The corners of face `e` of those listed, and what it adds to M between each of them and the row that lists it.
+    #[inline(always)]
+    fn block(&self, e: usize) -> (&[u32], &[f64]) {
+        let corners = self.corners_of(self.faces[e] as usize);
+        let size = corners.len();
+        let first = self.first_turn[size] as usize;
+        let place = self
+            .places
+            .get(e)
+            .map_or(0, |&place| place as usize - first);
+        let circulant = &self.circulants[2 * first + size - 1 - place..];
+        (corners, &circulant[..size])
+    }
+
     /// Calls `visit(j, m)` for what each face adds to the row of M at row `i`, at each other corner j.
     pub(super) fn entries(&self, i: usize, mut visit: impl FnMut(usize, f64)) {
         for e in self.at(i) {
-            let corners = self.corners_of(self.faces[e] as usize);
-            let [constant, cosine] = self.weights[corners.len()];
-            let first = self.first_turn[corners.len()];
-            let own = self.places.get(e).map_or(0, |&place| place - first);
-            for (s, &j) in (0..).zip(corners).filter(|&(_, &j)| j as usize != i) {
-                let wave = match self.double.get((first + u32::abs_diff(s, own)) as usize) {
-                    Some([cos, _]) if cosine != 0.0 => cosine * cos,
-                    _ => 0.0,
-                };
-                visit(j as usize, constant + wave);
+            let (corners, weights) = self.block(e);
+            for (&j, &m) in corners
+                .iter()
+                .zip(weights)
+                .filter(|&(&j, _)| j as usize != i)
+            {
+                visit(j as usize, m);
             }
         }
     }
@@ -432,16 +447,18 @@ impl Polygons {
         total
     }
 
-    /// What the faces at row `i` add up to, summed for this row alone: O(corners of these faces).
-    pub(super) fn row<P: Point>(&self, i: usize, points: (&[P], usize)) -> P {
+    /// What the faces at row `i` add up to, for this row alone: O(corners of these faces).
+    #[inline]
+    pub(super) fn row<P: Point>(&self, i: usize, (points, start): (&[P], usize)) -> P {
         let mut total = P::ZERO;
         for e in self.at(i) {
-            let f = self.faces[e] as usize;
-            let mut sums = [P::ZERO; 3];
-            let sums = &mut sums[..self.parts];
-            let corners = self.offsets[f] as usize..self.offsets[f + 1] as usize;
-            self.sum_run(self.size(f), corners, points, sums);
-            total += self.gather::<1, P>(e, (sums, self.parts * f));
+            let (corners, weights) = self.block(e);
+            // A sum of its own, so that no face need wait for another.
+            let mut part = P::ZERO;
+            for (&j, &m) in corners.iter().zip(weights) {
+                part += points[(j as usize).wrapping_sub(start)].times(P::weight(m));
+            }
+            total += part;
         }
         total
     }
