@@ -8,7 +8,6 @@ use rayon::prelude::*;
 
 use super::bounds::{SpectralBounds, usual_lambda_min};
 use super::codes::Neighbours;
-pub use super::polygons::BLOCK;
 use super::scheme::{Masks, Scheme};
 use super::source::Source;
 use super::stencil::{Point, Stencil, runs};
@@ -219,8 +218,8 @@ impl Operator {
         self.stencil.polygons.all_sums(x, sums);
     }
 
-    /// Which of all sums are those of faces whose first corner is in `rows`, from a multiple of [`BLOCK`] on and up to
-    /// one, or to the last row. A row needs those of rows no further before it than it [reaches](Self::reach), and none of
+    /// Which of all sums are those of faces whose first corner is in `rows`, from a multiple of [`BLOCK`](super::polygons::BLOCK)
+    /// on and up to one, or to the last row. A row needs those of rows no further before it than it [reaches](Self::reach), and none of
     /// later rows.
     pub fn sums_of(&self, rows: Range<usize>) -> Range<usize> {
         self.stencil.polygons.sums_of(rows)

@@ -92,12 +92,14 @@ impl<'a> Wavefront<'a> {
             "rows reach no further than a band"
         );
         // Sums are ordered by blocks of rows.
-        let band = band.map(
-            |band| match operator.sums_of(0..operator.len()).is_empty() {
-                true => band,
-                false => band.next_multiple_of(BLOCK),
-            },
-        );
+        let sums = !operator.sums_of(0..operator.len()).is_empty();
+        let band = band.map(|band| {
+            if sums {
+                band.next_multiple_of(BLOCK)
+            } else {
+                band
+            }
+        });
         Wavefront { operator, band }
     }
 
