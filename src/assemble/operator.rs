@@ -218,9 +218,9 @@ impl Operator {
         self.stencil.polygons.all_sums(x, sums);
     }
 
-    /// Which of all sums are those of faces whose first corner is in `rows`, from a multiple of [`BLOCK`](super::polygons::BLOCK)
-    /// on and up to one, or to the last row. A row needs those of rows no further before it than it [reaches](Self::reach), and none of
-    /// later rows.
+    /// Which of all sums are those of faces whose first corner is in `rows`. These start, and end, at a multiple of
+    /// [`BLOCK`](super::polygons::BLOCK), or end at the last row. A row needs the sums of rows no further before it
+    /// than it [reaches](Self::reach), and none of later rows.
     pub fn sums_of(&self, rows: Range<usize>) -> Range<usize> {
         self.stencil.polygons.sums_of(rows)
     }
