@@ -109,10 +109,12 @@ impl<'a> Source<'a> {
                     met | 1u8 << kind as u8
                 });
                 let only = |kind: Kind| met == 1 << kind as u8;
-                match () {
-                    () if only(Kind::Quads) => Kind::Quads,
-                    () if met == 0 || only(Kind::Edges) => Kind::Edges,
-                    () => Kind::Polygons,
+                if only(Kind::Quads) {
+                    Kind::Quads
+                } else if met == 0 || only(Kind::Edges) {
+                    Kind::Edges
+                } else {
+                    Kind::Polygons
                 }
             })
             .collect()

@@ -55,7 +55,8 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
     let mut rows = Rows::new(n);
     // Empty stands for V = P.
     let mut control: Vec<DVec3> = Vec::new();
-    let [mut residual, mut correction] = [Vec3A::ZERO; 2].map(|zero| filled(n, zero));
+    let mut residual = filled(n, Vec3A::ZERO);
+    let mut correction = filled(n, Vec3A::ZERO);
     let mut scratch = wavefront.scratch();
     // Residuals in units of the tolerance are far from the ends of single precision's range.
     let unit = if stop.tolerance > 0.0 {
