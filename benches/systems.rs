@@ -31,10 +31,7 @@ const SCHEME: Scheme = Scheme::CatmullClark;
 const INTERVAL: (f64, f64) = (0.07, 1.0);
 
 fn mesh() -> Mesh {
-    let n = std::env::var("LIMITLAB_BENCH_VERTICES")
-        .ok()
-        .and_then(|n| n.parse().ok())
-        .unwrap_or(100_000);
+    let n = std::env::var("LIMITLAB_BENCH_VERTICES").ok().and_then(|n| n.parse().ok()).unwrap_or(100_000);
     let mut mesh = builtin(&format!("irregular-quad:{n}")).expect("an even number of vertices");
     add_noise(&mut mesh, 0.1, 1);
     mesh
@@ -42,9 +39,7 @@ fn mesh() -> Mesh {
 
 /// (row, column, value) of every stored entry.
 fn triplets(a: &Csr) -> Vec<(usize, usize, f64)> {
-    (0..a.len())
-        .flat_map(|i| a.row(i).map(move |(j, value)| (i, j, value)))
-        .collect()
+    (0..a.len()).flat_map(|i| a.row(i).map(move |(j, value)| (i, j, value))).collect()
 }
 
 fn assembly(c: &mut Criterion) {
@@ -64,19 +59,15 @@ fn assembly(c: &mut Criterion) {
         b.iter(|| Operator::new(&mesh.faces, &topology, SCHEME));
     });
     let incidence = &topology.incidence;
-    group.bench_function("front order", |b| {
-        b.iter(|| in_fronts(&mesh.faces, incidence))
-    });
+    group.bench_function("front order", |b| b.iter(|| in_fronts(&mesh.faces, incidence)));
     let fronts = in_fronts(&mesh.faces, incidence);
     group.bench_function("operator in front order", |b| {
         b.iter(|| Operator::closed_in_order(&mesh.faces, incidence, SCHEME, Some(&fronts)));
     });
     // The libraries are given A's entries, summed already: their part is the conversion only.
     group.bench_function("faer, from triplets", |b| {
-        let triplets: Vec<_> = entries
-            .iter()
-            .map(|&(i, j, a)| faer::sparse::Triplet::new(i as u32, j as u32, a))
-            .collect();
+        let triplets: Vec<_> =
+            entries.iter().map(|&(i, j, a)| faer::sparse::Triplet::new(i as u32, j as u32, a)).collect();
         b.iter(|| SparseColMat::<u32, f64>::try_new_from_triplets(n, n, &triplets));
     });
     group.bench_function("sprs, from triplets", |b| {
@@ -120,9 +111,7 @@ fn sweep(c: &mut Criterion) {
     let mut rows = Rows::new(n);
     let mut group = c.benchmark_group("A times three columns");
     group.sample_size(20);
-    group.bench_function("stored", |b| {
-        b.iter(|| product(&mut rows, &system, x, &mut y))
-    });
+    group.bench_function("stored", |b| b.iter(|| product(&mut rows, &system, x, &mut y)));
     group.bench_function("matrix-free, file order", |b| {
         b.iter(|| product(&mut rows, &file, x, &mut y));
     });
@@ -134,24 +123,14 @@ fn sweep(c: &mut Criterion) {
 
     let entries = triplets(&system.a);
     let columns = |i: usize, axis: usize| x[i][axis];
-    let faer_triplets: Vec<_> = entries
-        .iter()
-        .map(|&(i, j, a)| faer::sparse::Triplet::new(i as u32, j as u32, a))
-        .collect();
-    let a =
-        SparseColMat::<u32, f64>::try_new_from_triplets(n, n, &faer_triplets).expect("a matrix");
+    let faer_triplets: Vec<_> =
+        entries.iter().map(|&(i, j, a)| faer::sparse::Triplet::new(i as u32, j as u32, a)).collect();
+    let a = SparseColMat::<u32, f64>::try_new_from_triplets(n, n, &faer_triplets).expect("a matrix");
     let right = Mat::from_fn(n, 3, columns);
     let mut left = Mat::<f64>::zeros(n, 3);
     group.bench_function("faer", |b| {
         b.iter(|| {
-            sparse_dense_matmul(
-                left.as_mut(),
-                Accum::Replace,
-                a.as_ref(),
-                right.as_ref(),
-                1.0,
-                Par::rayon(0),
-            );
+            sparse_dense_matmul(left.as_mut(), Accum::Replace, a.as_ref(), right.as_ref(), 1.0, Par::rayon(0));
         });
     });
     let mut triplets = sprs::TriMatI::<f64, u32>::new((n, n));
@@ -192,10 +171,7 @@ fn methods(c: &mut Criterion) {
     let front = Operator::in_order(&mesh.faces, &topology, SCHEME, Some(&fronts));
     let front = front.expect("an operator");
     let moved = fronts.there(points);
-    let stop = Stop {
-        tolerance: 1e-10 * mesh.diagonal(),
-        max_iterations: 1000,
-    };
+    let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 1000 };
     let mut group = c.benchmark_group("solve to 1e-10");
     group.sample_size(10);
     group.bench_function("auto, from faces to control points", |b| {
@@ -211,9 +187,7 @@ fn methods(c: &mut Criterion) {
     group.bench_function("matrix-free chebyshev, fused, double", |b| {
         b.iter(|| {
             let mut method = Chebyshev::new(&front, &moved, INTERVAL);
-            solve(&mut method, &stop, &mut |_| {
-                std::ops::ControlFlow::Continue(())
-            })
+            solve(&mut method, &stop, &mut |_| std::ops::ControlFlow::Continue(()))
         });
     });
     let singles: Vec<glam::Vec3A> = moved.iter().map(|p| p.as_vec3a()).collect();
@@ -230,27 +204,9 @@ fn methods(c: &mut Criterion) {
         ("stored, chebyshev", Setup::Chebyshev { spectrum: INTERVAL }),
         ("stored, pia", Setup::Pia { omega: 1.0 }),
         ("stored, thall", Setup::THALL),
-        (
-            "stored, gauss-seidel",
-            Setup::Sor {
-                omega: 1.0,
-                order: None,
-            },
-        ),
-        (
-            "stored, sor",
-            Setup::Sor {
-                omega: 1.1,
-                order: None,
-            },
-        ),
-        (
-            "stored, ssor",
-            Setup::Ssor {
-                omega: 1.0,
-                order: None,
-            },
-        ),
+        ("stored, gauss-seidel", Setup::Sor { omega: 1.0, order: None }),
+        ("stored, sor", Setup::Sor { omega: 1.1, order: None }),
+        ("stored, ssor", Setup::Ssor { omega: 1.0, order: None }),
         ("stored, cg", Setup::Cg),
         ("stored, pcg-jacobi", Setup::PcgJacobi),
         ("stored, pcg-ssor", Setup::PcgSsor { omega: 1.0 }),

@@ -53,21 +53,11 @@ fn run(arguments: &Arguments) -> Result<()> {
     create_dir(&arguments.out)?;
     let path = |name: &str| arguments.out.join(name);
     let mut batch = Batch::default();
-    batch.write(&path("A.mtx"), |out| {
-        matrix_market::write_general(&system.a, out)
-    })?;
-    batch.write(&path("M.mtx"), |out| {
-        matrix_market::write_symmetric(&system.m, out)
-    })?;
-    batch.write(&path("H.mtx"), |out| {
-        matrix_market::write_vector(&system.h, out)
-    })?;
-    batch.write(&path("P.mtx"), |out| {
-        matrix_market::write_points(points, out)
-    })?;
-    batch.write(&path("R.mtx"), |out| {
-        matrix_market::write_points(&right_hand_side, out)
-    })?;
+    batch.write(&path("A.mtx"), |out| matrix_market::write_general(&system.a, out))?;
+    batch.write(&path("M.mtx"), |out| matrix_market::write_symmetric(&system.m, out))?;
+    batch.write(&path("H.mtx"), |out| matrix_market::write_vector(&system.h, out))?;
+    batch.write(&path("P.mtx"), |out| matrix_market::write_points(points, out))?;
+    batch.write(&path("R.mtx"), |out| matrix_market::write_points(&right_hand_side, out))?;
     batch.commit()?;
     let names = input.scheme.paper_names();
     arguments.common.remark(format_args!(
@@ -80,8 +70,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         names.symmetric
     ));
     if arguments.json {
-        let files =
-            ["A.mtx", "M.mtx", "H.mtx", "P.mtx", "R.mtx"].map(|n| path(n).display().to_string());
+        let files = ["A.mtx", "M.mtx", "H.mtx", "P.mtx", "R.mtx"].map(|n| path(n).display().to_string());
         let object = input.json(json!({
             "entries": system.a.values().len(),
             "bandwidth": system.a.pattern().bandwidth(),

@@ -8,9 +8,7 @@ use serde_json::{Value, json};
 use limitlab::Result;
 use limitlab::analysis::comparison::{self, Row};
 use limitlab::analysis::spectrum::spectrum;
-use limitlab::cli::{
-    self, CommonFlags, Input, List, MeshFlags, OutputFlags, Progress, StopFlags, number,
-};
+use limitlab::cli::{self, CommonFlags, Input, List, MeshFlags, OutputFlags, Progress, StopFlags, number};
 use limitlab::mesh::order::Order;
 use limitlab::report::{Column, Figure, LinePlot, Scale, Series, Table};
 use limitlab::solvers::Method;
@@ -62,9 +60,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         let table = table(&input, arguments, &rows);
         let stem = input.stem("compare-solvers");
         table.write(&arguments.output.out)?;
-        plot(&input, &rows)
-            .render()?
-            .save(&arguments.output.out.join(format!("{stem}.png")))?;
+        plot(&input, &rows).render()?.save(&arguments.output.out.join(format!("{stem}.png")))?;
         if !arguments.output.json {
             cli::print(&table.to_markdown())?;
         }
@@ -75,21 +71,13 @@ fn run(arguments: &Arguments) -> Result<()> {
 
 fn compare(input: &Input, arguments: &Arguments) -> Result<Vec<Row>> {
     let system = input.system()?;
-    let order = arguments
-        .order
-        .order(&input.mesh, &input.topology().incidence);
+    let order = arguments.order.order(&input.mesh, &input.topology().incidence);
     let methods = match &arguments.method {
         Some(list) => list.0.clone(),
         None => Method::ALL.to_vec(),
     };
     let spectrum = spectrum(&system)?;
-    let lines = comparison::entries(
-        &system,
-        &spectrum,
-        &methods,
-        Some(&order),
-        &arguments.order.to_string(),
-    )?;
+    let lines = comparison::entries(&system, &spectrum, &methods, Some(&order), &arguments.order.to_string())?;
     let progress = Progress::new(&input.name, lines.len(), arguments.common.quiet);
     comparison::compare(
         &system,

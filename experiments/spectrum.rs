@@ -14,14 +14,10 @@ use limitlab::analysis::eigen::End;
 use limitlab::analysis::promise::{Counts, Promise};
 use limitlab::analysis::radius::{SpectralRadius, spectral_radius};
 use limitlab::analysis::singularity::{Mode, Singularity, modes};
-use limitlab::analysis::spectrum::{
-    Ends, Estimate, Extremes, Operator, Spectrum, excited, mesh_ends,
-};
+use limitlab::analysis::spectrum::{Ends, Estimate, Extremes, Operator, Spectrum, excited, mesh_ends};
 use limitlab::assemble::LimitSystem;
 use limitlab::assemble::bounds::SpectralBounds;
-use limitlab::cli::{
-    self, CommonFlags, Input, MeshFlags, OutputFlags, Progress, StopFlags, number,
-};
+use limitlab::cli::{self, CommonFlags, Input, MeshFlags, OutputFlags, Progress, StopFlags, number};
 use limitlab::report::series::Bars;
 use limitlab::report::{Column, Figure, LinePlot, Rule, Table};
 use limitlab::solvers::Method;
@@ -102,11 +98,7 @@ impl Findings {
         let Spectrum { a, jacobi } = self.spectrum();
         let mut rows = vec![
             ("pia", "ω=1".into(), a.radius(1.0)),
-            (
-                "w-pia",
-                format!("ω={:.6} (optimal)", a.optimal_omega()),
-                a.radius(a.optimal_omega()),
-            ),
+            ("w-pia", format!("ω={:.6} (optimal)", a.optimal_omega()), a.radius(a.optimal_omega())),
             ("thall", "ω=0.5".into(), jacobi.radius(0.5)),
             ("jacobi", "ω=1".into(), jacobi.radius(1.0)),
             (
@@ -116,18 +108,10 @@ impl Findings {
             ),
         ];
         for (method, omega, radius) in &self.sweeps {
-            rows.push((
-                method.name(),
-                format!("ω={omega}, file order"),
-                radius.value,
-            ));
+            rows.push((method.name(), format!("ω={omega}, file order"), radius.value));
         }
         for (name, ends) in [("chebyshev", a), ("cg", a), ("pcg-jacobi", jacobi)] {
-            let rate = if ends.min > 0.0 {
-                ends.krylov_rate()
-            } else {
-                1.0
-            };
+            let rate = if ends.min > 0.0 { ends.krylov_rate() } else { 1.0 };
             rows.push((name, "(√κ−1)/(√κ+1)".into(), rate));
         }
         rows
@@ -142,10 +126,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         };
         let findings = analyse(&input, arguments)?;
         let out = &arguments.output.out;
-        let tables = [
-            eigenvalue_table(&input, &findings),
-            radius_table(&input, &findings),
-        ];
+        let tables = [eigenvalue_table(&input, &findings), radius_table(&input, &findings)];
         for table in &tables {
             table.write(out)?;
             if !arguments.output.json {
@@ -155,9 +136,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         if let Some(full) = &findings.full {
             full_table(&input, full).write(out)?;
             let png = out.join(format!("{}.png", input.stem("spectrum-histogram")));
-            histogram(&input, full, &findings.promise)
-                .render()?
-                .save(&png)?;
+            histogram(&input, full, &findings.promise).render()?.save(&png)?;
         }
         if !findings.modes.is_empty() {
             mode_table(&input, &findings.modes).write(out)?;
@@ -170,12 +149,10 @@ fn run(arguments: &Arguments) -> Result<()> {
 fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
     let with_name = |e: limitlab::Error| limitlab::Error::mesh(&input.name, e.to_string());
     // Only some of what can be asked for needs entries.
-    let explicit =
-        arguments.full || !arguments.no_sweeps || arguments.modes > 0 || arguments.certify;
+    let explicit = arguments.full || !arguments.no_sweeps || arguments.modes > 0 || arguments.certify;
     let system = explicit.then(|| input.system()).transpose()?;
     let operator =
-        limitlab::assemble::Operator::new(&input.mesh.faces, input.topology(), input.scheme)
-            .map_err(with_name)?;
+        limitlab::assemble::Operator::new(&input.mesh.faces, input.topology(), input.scheme).map_err(with_name)?;
     let progress = Progress::new(&input.name, 5, arguments.common.quiet);
     let verdict = Singularity::detect(&input.mesh, input.topology(), input.scheme);
     let promise = Promise::new(&operator.bounds());
@@ -229,18 +206,7 @@ fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
         }
     }
     progress.step();
-    Ok(Findings {
-        bounds: operator.bounds(),
-        ends,
-        full,
-        sweeps,
-        verdict,
-        promise,
-        counts,
-        data,
-        modes,
-        certificates,
-    })
+    Ok(Findings { bounds: operator.bounds(), ends, full, sweeps, verdict, promise, counts, data, modes, certificates })
 }
 
 fn radii_of_sweeps(system: &LimitSystem) -> Result<Vec<(Method, f64, SpectralRadius)>> {
@@ -285,11 +251,7 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
                  bipartite graph, the null vectors are their ±1 colourings, and the points {} a part that no control \
                  points reach.",
                 found.verdict.singular[0].first_vertex,
-                if found.verdict.excited {
-                    "have"
-                } else {
-                    "do not have"
-                }
+                if found.verdict.excited { "have" } else { "do not have" }
             )
         } else {
             "non-singular: no component with all valences 3 and a bipartite graph, or a scheme that never is.".into()
@@ -328,18 +290,8 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
     for (k, (name, estimate, bound, excited)) in [
         ("lambda_min", e.lambda_min, b.lambda_min, data(0, true)),
         ("lambda_max", e.lambda_max, b.lambda_max, data(0, false)),
-        (
-            "jacobi_lambda_min",
-            e.jacobi_lambda_min,
-            b.jacobi_lambda_min,
-            data(1, true),
-        ),
-        (
-            "jacobi_lambda_max",
-            e.jacobi_lambda_max,
-            b.jacobi_lambda_max,
-            data(1, false),
-        ),
+        ("jacobi_lambda_min", e.jacobi_lambda_min, b.jacobi_lambda_min, data(1, true)),
+        ("jacobi_lambda_max", e.jacobi_lambda_max, b.jacobi_lambda_max, data(1, false)),
     ]
     .into_iter()
     .enumerate()
@@ -361,22 +313,14 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
 }
 
 fn promised(count: f64) -> String {
-    if count.is_finite() {
-        count.to_string()
-    } else {
-        "unknown (the bound for λ_min is 0)".into()
-    }
+    if count.is_finite() { count.to_string() } else { "unknown (the bound for λ_min is 0)".into() }
 }
 
 fn radius_table(input: &Input, found: &Findings) -> Table {
     let mut table = Table::new(
         input.stem("spectrum-rates"),
         format!("Predicted rates on {} under {}", input.label, input.scheme),
-        vec![
-            Column::key("method"),
-            Column::key("parameter"),
-            Column::number("rho", 1e-5, 6),
-        ],
+        vec![Column::key("method"), Column::key("parameter"), Column::number("rho", 1e-5, 6)],
     );
     table.note(
         "Factors per iteration: the spectral radius of the error matrix; for Chebyshev and conjugate gradients the bound \
@@ -393,11 +337,7 @@ fn full_table(input: &Input, full: &dense::Eigenvalues) -> Table {
     let mut table = Table::new(
         input.stem("spectrum-full"),
         format!("All eigenvalues of {} under {}", input.label, input.scheme),
-        vec![
-            Column::key("index"),
-            Column::number("a", 1e-9, 10),
-            Column::number("jacobi", 1e-9, 10),
-        ],
+        vec![Column::key("index"), Column::number("a", 1e-9, 10), Column::number("jacobi", 1e-9, 10)],
     );
     for (i, (a, jacobi)) in full.a.iter().zip(&full.jacobi).enumerate() {
         table.push(vec![i.to_string().into(), (*a).into(), (*jacobi).into()]);
@@ -415,14 +355,8 @@ fn mode_table(input: &Input, modes: &[Mode]) -> Table {
         format!("Slowest modes of {} under {}", input.label, input.scheme),
         columns,
     );
-    let values: Vec<String> = modes
-        .iter()
-        .map(|m| format!("{:.10}", m.eigenvalue.value))
-        .collect();
-    table.note(format!(
-        "Eigenvectors of A, largest entry 1, of the eigenvalues {}.",
-        values.join(", ")
-    ));
+    let values: Vec<String> = modes.iter().map(|m| format!("{:.10}", m.eigenvalue.value)).collect();
+    table.note(format!("Eigenvectors of A, largest entry 1, of the eigenvalues {}.", values.join(", ")));
     for v in 0..modes[0].values.len() {
         let mut row = vec![v.to_string().into()];
         row.extend(modes.iter().map(|m| m.values[v].into()));
@@ -436,10 +370,7 @@ fn histogram(input: &Input, full: &dense::Eigenvalues, promise: &Promise) -> Fig
         x_label: format!("eigenvalue of {label}"),
         y_label: "eigenvalues".into(),
         bars: vec![Bars::histogram(name, values, BINS)],
-        vertical_lines: vec![
-            Rule::new(bounds.min, "proven bounds"),
-            Rule::new(bounds.max, ""),
-        ],
+        vertical_lines: vec![Rule::new(bounds.min, "proven bounds"), Rule::new(bounds.max, "")],
         ..LinePlot::default()
     };
     let a = LinePlot {
@@ -455,10 +386,7 @@ fn histogram(input: &Input, full: &dense::Eigenvalues, promise: &Promise) -> Fig
 fn json(input: &Input, found: &Findings) -> Value {
     let e = &found.ends;
     let Spectrum { a, jacobi } = found.spectrum();
-    let multiplicity = |e: Estimate| {
-        e.multiplicity
-            .map(|m| json!({ "count": m.count, "within": m.within }))
-    };
+    let multiplicity = |e: Estimate| e.multiplicity.map(|m| json!({ "count": m.count, "within": m.within }));
     let mut rho = Map::new();
     for (method, _, value) in found.radii() {
         rho.insert(method.into(), number(value));
@@ -509,12 +437,7 @@ fn json(input: &Input, found: &Findings) -> Value {
         "kernel_excited": found.verdict.excited,
     });
     if let Value::Object(map) = &mut object {
-        let names = [
-            "lambda_min",
-            "lambda_max",
-            "jacobi_lambda_min",
-            "jacobi_lambda_max",
-        ];
+        let names = ["lambda_min", "lambda_max", "jacobi_lambda_min", "jacobi_lambda_max"];
         let proofs: Map<String, Value> = names
             .into_iter()
             .zip(&found.certificates)
@@ -524,19 +447,12 @@ fn json(input: &Input, found: &Findings) -> Value {
             map.insert("certified".into(), Value::Object(proofs));
         }
         if found.verdict.is_singular() {
-            let all = Method::ALL.iter().map(|&m| {
-                (
-                    m.name().to_owned(),
-                    Value::from(found.verdict.prediction(m).name()),
-                )
-            });
+            let all =
+                Method::ALL.iter().map(|&m| (m.name().to_owned(), Value::from(found.verdict.prediction(m).name())));
             map.insert("predictions".into(), Value::Object(all.collect()));
         }
         if let Some(full) = &found.full {
-            map.insert(
-                "eigenvalues".into(),
-                json!({ "a": full.a, "jacobi": full.jacobi }),
-            );
+            map.insert("eigenvalues".into(), json!({ "a": full.a, "jacobi": full.jacobi }));
         }
         if !found.modes.is_empty() {
             let values: Vec<Value> = found

@@ -45,17 +45,11 @@ impl std::str::FromStr for Valences {
         let (first, last) = text.split_once("..").unwrap_or((text, text));
         let valence = |text: &str| match text.parse::<usize>() {
             Ok(n) if VALENCES.contains(&n) => Ok(n),
-            _ => Err(format!(
-                "valences are whole numbers in {}..{}, not {text:?}",
-                VALENCES.start(),
-                VALENCES.end()
-            )),
+            _ => Err(format!("valences are whole numbers in {}..{}, not {text:?}", VALENCES.start(), VALENCES.end())),
         };
         let (first, last) = (valence(first)?, valence(last)?);
         if first > last {
-            return Err(format!(
-                "{first}..{last} is empty: the first valence is not above the last"
-            ));
+            return Err(format!("{first}..{last} is empty: the first valence is not above the last"));
         }
         Ok(Valences((first..=last).collect()))
     }
@@ -65,9 +59,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let scheme = match LocalScheme::new(&arguments.scheme, arguments.alpha) {
         Ok(scheme) => scheme,
-        Err(error) => Arguments::command()
-            .error(ErrorKind::InvalidValue, error)
-            .exit(),
+        Err(error) => Arguments::command().error(ErrorKind::InvalidValue, error).exit(),
     };
     cli::exit(|| {
         arguments.common.apply()?;
@@ -95,9 +87,7 @@ fn run(arguments: &Arguments, scheme: LocalScheme) -> Result<()> {
         object["condition"] = condition_json(valences, &sampled.crossings, &sampled.conditions);
     }
     if figures.is_empty() {
-        arguments
-            .common
-            .remark("no characteristic map to draw: the leading pairs are complex");
+        arguments.common.remark("no characteristic map to draw: the leading pairs are complex");
     }
     for (stem, figure) in &figures {
         figure.render()?.save(&out.join(format!("{stem}.png")))?;
@@ -145,7 +135,8 @@ fn row_json(row: &Row) -> Value {
 
 fn condition_json(valences: &[usize], crossings: &[Vec<Crossing>], sampled: &[Condition]) -> Value {
     let entry = |(&n, found): (&usize, &Vec<Crossing>)| {
-        let crossing = |c: &Crossing| json!({ "alpha": number(c.alpha), "holds_above": c.holds_above, "frequency": c.frequency });
+        let crossing =
+            |c: &Crossing| json!({ "alpha": number(c.alpha), "holds_above": c.holds_above, "frequency": c.frequency });
         let samples = || sampled.iter().filter(|c| c.valence == n);
         json!({
             "valence": n,

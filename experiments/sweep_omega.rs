@@ -10,9 +10,7 @@ use serde_json::{Map, Value, json};
 
 use limitlab::Result;
 use limitlab::analysis::sweep::{Sweep, rounding_floor, sweep};
-use limitlab::cli::{
-    self, CommonFlags, Grid, Input, List, MeshFlags, OutputFlags, Progress, StopFlags, number,
-};
+use limitlab::cli::{self, CommonFlags, Grid, Input, List, MeshFlags, OutputFlags, Progress, StopFlags, number};
 use limitlab::error::Error;
 use limitlab::mesh::order::Order;
 use limitlab::solvers::Method;
@@ -45,21 +43,14 @@ struct Arguments {
 }
 
 /// What `sweep-omega` runs on without arguments.
-const BUILT_IN: [&str; 4] = [
-    "torus:32x32",
-    "quad-sphere:4",
-    "icosphere:3",
-    "irregular-quad:1000",
-];
+const BUILT_IN: [&str; 4] = ["torus:32x32", "quad-sphere:4", "icosphere:3", "irregular-quad:1000"];
 fn main() -> ExitCode {
     let mut arguments = Arguments::parse();
     cli::exit(|| {
         arguments.common.apply()?;
         for method in &arguments.method.0 {
             if !matches!(method, Method::Jacobi | Method::Pia | Method::Sor) {
-                return Err(Error::Unknown(format!(
-                    "{method} has no ω to sweep; choose among jacobi, pia and sor"
-                )));
+                return Err(Error::Unknown(format!("{method} has no ω to sweep; choose among jacobi, pia and sor")));
             }
         }
         if arguments.meshes.is_empty() {
@@ -104,9 +95,7 @@ fn run(arguments: &Arguments) -> Result<()> {
 
 fn sweep_one(input: &Input, arguments: &Arguments) -> Result<Sweep> {
     let system = input.system()?;
-    let order = arguments
-        .order
-        .order(&input.mesh, &input.topology().incidence);
+    let order = arguments.order.order(&input.mesh, &input.topology().incidence);
     let grids: Vec<(Method, Vec<f64>)> = arguments
         .method
         .0
@@ -146,8 +135,7 @@ fn json(input: &Input, arguments: &Arguments, sweep: &Sweep) -> Value {
             })
         })
         .collect();
-    let (mut best, mut critical, mut critical_data, mut optimal) =
-        (Map::new(), Map::new(), Map::new(), Map::new());
+    let (mut best, mut critical, mut critical_data, mut optimal) = (Map::new(), Map::new(), Map::new(), Map::new());
     for &method in &arguments.method.0 {
         let omega = sweep.best(method).map_or(Value::Null, |r| number(r.omega));
         best.insert(method.name().into(), omega);

@@ -15,11 +15,7 @@ pub enum Error {
     },
     /// A file's text or bytes are not what its format says, at a line where there is one.
     #[error("{}{}: {what}", path.display(), at_line(*line))]
-    Parse {
-        path: PathBuf,
-        line: Option<usize>,
-        what: String,
-    },
+    Parse { path: PathBuf, line: Option<usize>, what: String },
     /// A mesh that was read but cannot be used: defects, a scheme that refuses it, a boundary.
     #[error("{mesh}: {what}")]
     Mesh { mesh: String, what: String },
@@ -37,28 +33,17 @@ pub type Result<T> = std::result::Result<T, Error>;
 impl Error {
     /// An [`Error::Io`] about `path`.
     pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
-        Error::Io {
-            path: path.to_path_buf(),
-            action,
-            source,
-        }
+        Error::Io { path: path.to_path_buf(), action, source }
     }
 
     /// An [`Error::Parse`] at a 1-based `line` of `path`; `None` where the place is not a line.
     pub fn parse(path: &Path, line: Option<usize>, what: impl Into<String>) -> Self {
-        Error::Parse {
-            path: path.to_path_buf(),
-            line,
-            what: what.into(),
-        }
+        Error::Parse { path: path.to_path_buf(), line, what: what.into() }
     }
 
     /// An [`Error::Mesh`] about the mesh called `mesh`.
     pub fn mesh(mesh: impl Into<String>, what: impl Into<String>) -> Self {
-        Error::Mesh {
-            mesh: mesh.into(),
-            what: what.into(),
-        }
+        Error::Mesh { mesh: mesh.into(), what: what.into() }
     }
 }
 

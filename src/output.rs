@@ -57,29 +57,18 @@ struct Staged {
 
 impl Batch {
     /// Writes one file of the batch; a target that is not a regular file gets its data here and now.
-    pub fn write(
-        &mut self,
-        path: &Path,
-        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<()> {
+    pub fn write(&mut self, path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
         let refused = |e| Error::io(path, "write", e);
         match destination(path).map_err(refused)? {
             Destination::Straight => {
                 // Appending keeps what a redirected standard output holds already.
-                let file = OpenOptions::new()
-                    .append(true)
-                    .open(path)
-                    .map_err(refused)?;
+                let file = OpenOptions::new().append(true).open(path).map_err(refused)?;
                 fill_file(file, fill).map_err(refused)
             }
             Destination::Rename { folder, name } => {
                 let (temporary, file) = Temporary::create(&folder).map_err(refused)?;
                 fill_file(file, fill).map_err(refused)?;
-                self.staged.push(Staged {
-                    asked: path.to_path_buf(),
-                    temporary,
-                    target: folder.join(name),
-                });
+                self.staged.push(Staged { asked: path.to_path_buf(), temporary, target: folder.join(name) });
                 Ok(())
             }
         }
@@ -89,10 +78,7 @@ impl Batch {
     /// those before it stay and the rest is removed.
     pub fn commit(self) -> Result<()> {
         for staged in self.staged {
-            staged
-                .temporary
-                .rename(&staged.target)
-                .map_err(|e| Error::io(&staged.asked, "write", e))?;
+            staged.temporary.rename(&staged.target).map_err(|e| Error::io(&staged.asked, "write", e))?;
         }
         Ok(())
     }
@@ -113,10 +99,7 @@ enum Destination {
 fn destination(path: &Path) -> io::Result<Destination> {
     match fs::metadata(path) {
         Ok(found) if found.is_dir() => {
-            return Err(io::Error::new(
-                io::ErrorKind::IsADirectory,
-                "it is a folder: name a file",
-            ));
+            return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder: name a file"));
         }
         Ok(found) if !found.is_file() => return Ok(Destination::Straight),
         _ => {}
@@ -140,9 +123,7 @@ fn destination(path: &Path) -> io::Result<Destination> {
 
 /// The folder of `path`, free of links, and the name in it.
 fn split(path: &Path) -> io::Result<(PathBuf, OsString)> {
-    let name = path
-        .file_name()
-        .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "it names no file"))?;
+    let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "it names no file"))?;
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -203,10 +184,8 @@ mod tests {
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<_> = fs::read_dir(folder)
-            .unwrap()
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
+        let mut names: Vec<_> =
+            fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
         names.sort();
         names
     }
@@ -236,10 +215,7 @@ mod tests {
             Err(io::Error::other("out of ideas"))
         })
         .unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            format!("{}: cannot write: out of ideas", path.display())
-        );
+        assert_eq!(error.to_string(), format!("{}: cannot write: out of ideas", path.display()));
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(names(folder.path()), ["a.txt"]);
     }
@@ -280,9 +256,7 @@ mod tests {
         let mut batch = Batch::default();
         batch.write(&path("a"), |out| out.write_all(b"1")).unwrap();
         assert!(!path("a").exists());
-        batch
-            .write(&path("b"), |_| Err(io::Error::other("no")))
-            .unwrap_err();
+        batch.write(&path("b"), |_| Err(io::Error::other("no"))).unwrap_err();
         drop(batch);
         assert!(names(folder.path()).is_empty());
 
@@ -360,10 +334,7 @@ mod tests {
                 let path = PathBuf::from(format!("{place}/{}", file.as_raw_fd()));
                 write(&path, "more").unwrap();
             }
-            assert_eq!(
-                fs::read_to_string(folder.path().join("a")).unwrap(),
-                "first, moremore"
-            );
+            assert_eq!(fs::read_to_string(folder.path().join("a")).unwrap(), "first, moremore");
         }
     }
 }

@@ -32,12 +32,7 @@ fn bits(points: &[DVec3]) -> Vec<[u64; 3]> {
 /// Any doubles, all bit patterns among them, and faces of 3 to 9 corners that may point anywhere.
 fn any_mesh() -> impl Strategy<Value = (Mesh, Vec<DVec3>)> {
     let coordinate = || {
-        prop_oneof![
-            any::<u64>().prop_map(f64::from_bits),
-            -1e3..1e3f64,
-            (-99..99i32).prop_map(f64::from),
-            Just(-0.0),
-        ]
+        prop_oneof![any::<u64>().prop_map(f64::from_bits), -1e3..1e3f64, (-99..99i32).prop_map(f64::from), Just(-0.0),]
     };
     let point = move || [coordinate(), coordinate(), coordinate()].prop_map(DVec3::from);
     let index = prop_oneof![0..20u32, any::<u32>()];
@@ -170,17 +165,8 @@ fn prism() -> Mesh {
             DVec3::new(cos, sin, z)
         })
     };
-    let faces: [&[u32]; 5] = [
-        &[2, 1, 0],
-        &[3, 4, 5],
-        &[0, 1, 4, 3],
-        &[1, 2, 5, 4],
-        &[2, 0, 3, 5],
-    ];
-    Mesh::new(
-        ring(0.0).chain(ring(1.0)).collect(),
-        Faces::from_lists(faces),
-    )
+    let faces: [&[u32]; 5] = [&[2, 1, 0], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]];
+    Mesh::new(ring(0.0).chain(ring(1.0)).collect(), Faces::from_lists(faces))
 }
 
 #[test]
@@ -198,11 +184,7 @@ fn a_file_cut_anywhere_is_refused_or_says_so() {
                 match name {
                     // No counts are announced: whole lines are a file, and a part of a line is remarked.
                     "obj" => {
-                        let starting = |word: &[u8]| {
-                            cut.split(|&b| b == b'\n')
-                                .filter(|l| l.starts_with(word))
-                                .count()
-                        };
+                        let starting = |word: &[u8]| cut.split(|&b| b == b'\n').filter(|l| l.starts_with(word)).count();
                         assert_eq!(loaded.mesh.len(), starting(b"v "));
                         assert_eq!(loaded.mesh.faces.len(), starting(b"f"));
                         let told = loaded.remarks.iter().any(|r| r.contains("cut off"));
@@ -228,14 +210,8 @@ fn absurd_counts_are_refused_where_the_data_end() {
          property list uint double w\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\n\
          element face 0\nproperty list int int vertex_index\nend_header\nabc",
     ] {
-        let read = if text.starts_with("OFF") {
-            off::read_bytes
-        } else {
-            ply::read_bytes
-        };
-        let error = read(text.as_bytes(), Path::new("a"))
-            .unwrap_err()
-            .to_string();
+        let read = if text.starts_with("OFF") { off::read_bytes } else { ply::read_bytes };
+        let error = read(text.as_bytes(), Path::new("a")).unwrap_err().to_string();
         assert!(error.contains("the file ends where"), "{error}");
     }
 }
@@ -243,26 +219,18 @@ fn absurd_counts_are_refused_where_the_data_end() {
 /// The faces as lists of positions, which do not depend on the numbering of the vertices.
 fn by_position(mesh: &Mesh) -> Vec<Vec<[u64; 3]>> {
     let positions = bits(&mesh.positions);
-    mesh.faces
-        .iter()
-        .map(|face| face.iter().map(|&v| positions[v as usize]).collect())
-        .collect()
+    mesh.faces.iter().map(|face| face.iter().map(|&v| positions[v as usize]).collect()).collect()
 }
 
 /// What `tobj` makes of an OBJ file. It gives each group vertices of its own, numbered by first use.
 fn by_position_tobj(bytes: &[u8]) -> Vec<Vec<[u64; 3]>> {
     let options = tobj::LoadOptions::default();
     let mut reader = std::io::BufReader::new(bytes);
-    let (models, _) =
-        tobj::load_obj_buf(&mut reader, &options, |_| Ok(Default::default())).unwrap();
+    let (models, _) = tobj::load_obj_buf(&mut reader, &options, |_| Ok(Default::default())).unwrap();
     let mut faces = Vec::new();
     for model in models {
         let mesh = model.mesh;
-        let positions: Vec<_> = mesh
-            .positions
-            .chunks_exact(3)
-            .map(DVec3::from_slice)
-            .collect();
+        let positions: Vec<_> = mesh.positions.chunks_exact(3).map(DVec3::from_slice).collect();
         let positions = bits(&positions);
         let mut indices = mesh.indices.iter();
         let sizes = match mesh.face_arities.as_slice() {
@@ -320,11 +288,8 @@ fn collection() -> Option<PathBuf> {
 fn the_collection_is_read_with_its_listed_counts() {
     let Some(folder) = collection() else { return };
     let manifest = std::fs::read_to_string(folder.join("MANIFEST.tsv")).unwrap();
-    let mut rows = csv::ReaderBuilder::new()
-        .delimiter(b'\t')
-        .quoting(false)
-        .flexible(true)
-        .from_reader(manifest.as_bytes());
+    let mut rows =
+        csv::ReaderBuilder::new().delimiter(b'\t').quoting(false).flexible(true).from_reader(manifest.as_bytes());
     let mut listed = 0;
     for row in rows.records() {
         let row = row.unwrap();
@@ -333,31 +298,19 @@ fn the_collection_is_read_with_its_listed_counts() {
         let result = io::read(&folder.join(file));
         if file.contains("4off") {
             let error = result.unwrap_err().to_string();
-            assert!(
-                error.contains("line 1: \"4OFF\" is not a mesh in space"),
-                "{error}"
-            );
+            assert!(error.contains("line 1: \"4OFF\" is not a mesh in space"), "{error}");
             continue;
         }
         let loaded = result.unwrap();
         let counts = [loaded.mesh.len(), loaded.mesh.faces.len()].map(|n| n.to_string());
         assert_eq!(counts, [&row[2], &row[4]], "{file}");
-        let sizes = |wanted: fn(usize) -> bool| {
-            loaded
-                .mesh
-                .faces
-                .iter()
-                .filter(|f| wanted(f.len()))
-                .count()
-                .to_string()
-        };
+        let sizes =
+            |wanted: fn(usize) -> bool| loaded.mesh.faces.iter().filter(|f| wanted(f.len())).count().to_string();
         let sizes = [sizes(|n| n == 3), sizes(|n| n == 4), sizes(|n| n > 4)];
         assert_eq!(sizes, [&row[5], &row[6], &row[7]], "{file}");
     }
-    let files: usize = ["closed", "open", "bad"]
-        .iter()
-        .map(|part| std::fs::read_dir(folder.join(part)).unwrap().count())
-        .sum();
+    let files: usize =
+        ["closed", "open", "bad"].iter().map(|part| std::fs::read_dir(folder.join(part)).unwrap().count()).sum();
     assert_eq!(listed, files);
 }
 
@@ -393,8 +346,5 @@ fn an_unwritable_folder_is_an_error() {
         locked.join("a.off")
     };
     let error = io::write(&path, &prism(), None).unwrap_err().to_string();
-    assert!(
-        error.starts_with(&format!("{}: cannot write: ", path.display())),
-        "{error}"
-    );
+    assert!(error.starts_with(&format!("{}: cannot write: ", path.display())), "{error}");
 }

@@ -21,10 +21,7 @@ fn the_list_names_items_and_claims() {
     let dir = tempfile::tempdir().unwrap();
     let output = reproduce(dir.path(), &["--list"]);
     assert!(output.status.success());
-    let ids: Vec<&str> = text(&output.stdout)
-        .lines()
-        .map(|line| line.split_whitespace().next().unwrap())
-        .collect();
+    let ids: Vec<&str> = text(&output.stdout).lines().map(|line| line.split_whitespace().next().unwrap()).collect();
     for id in ["claims", "findings", "T1", "T29", "Z24", "P12", "L12"] {
         assert_eq!(ids.iter().filter(|i| **i == id).count(), 1, "{id}");
     }
@@ -50,10 +47,7 @@ fn without_models_a_claim_says_why_it_cannot_run() {
     let output = reproduce(dir.path(), &["--only", "P1"]);
     assert!(output.status.success());
     let page = text(&output.stdout);
-    assert!(
-        page.contains("— not reproducible") && page.contains("--meshes"),
-        "{page}"
-    );
+    assert!(page.contains("— not reproducible") && page.contains("--meshes"), "{page}");
 }
 
 #[test]
@@ -62,20 +56,14 @@ fn an_unknown_claim_is_refused_in_one_line() {
     let output = reproduce(dir.path(), &["--only", "T99"]);
     assert_eq!(output.status.code(), Some(1));
     let line = text(&output.stderr);
-    assert!(
-        line.starts_with("error: ") && line.contains("T99") && line.contains("--list"),
-        "{line}"
-    );
+    assert!(line.starts_with("error: ") && line.contains("T99") && line.contains("--list"), "{line}");
     assert_eq!(line.lines().count(), 1);
 }
 
 #[test]
 fn the_quick_ledger_is_written_and_held_against_a_committed_one() {
     let dir = tempfile::tempdir().unwrap();
-    let output = reproduce(
-        dir.path(),
-        &["--quick", "--only", "claims", "--only", "findings"],
-    );
+    let output = reproduce(dir.path(), &["--quick", "--only", "claims", "--only", "findings"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let folder = dir.path().join("built-in");
     let json = std::fs::read_to_string(folder.join("claims.json")).unwrap();
@@ -102,9 +90,5 @@ fn the_quick_ledger_is_written_and_held_against_a_committed_one() {
     std::fs::write(folder.join("claims.csv"), altered).unwrap();
     let output = reproduce(dir.path(), &check);
     assert_eq!(output.status.code(), Some(1));
-    assert!(
-        text(&output.stderr).contains("claims: row [T4, "),
-        "{}",
-        text(&output.stderr)
-    );
+    assert!(text(&output.stderr).contains("claims: row [T4, "), "{}", text(&output.stderr));
 }

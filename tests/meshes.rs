@@ -40,10 +40,7 @@ fn rows(root: &Path) -> Vec<Row> {
     let text = fs::read_to_string(root.join("MANIFEST.tsv")).unwrap();
     let rows = text.lines().skip(1).map(|line| {
         let columns: Vec<String> = line.split('\t').map(str::to_owned).collect();
-        Row {
-            file: columns[0].clone(),
-            columns,
-        }
+        Row { file: columns[0].clone(), columns }
     });
     rows.collect()
 }
@@ -78,28 +75,15 @@ fn counts_and_defects_are_those_of_the_manifest() {
         let report = report(&loaded, Boundary::Refuse);
         let topology = report.topology.as_ref().unwrap();
         let counts = report.counts.as_ref().unwrap();
-        let sizes = [
-            counts.vertices,
-            counts.edges,
-            counts.faces,
-            counts.components,
-        ];
-        assert_eq!(
-            sizes.map(|n| n as i64),
-            [2, 3, 4, 9].map(|c| row.number(c)),
-            "{file}"
-        );
+        let sizes = [counts.vertices, counts.edges, counts.faces, counts.components];
+        assert_eq!(sizes.map(|n| n as i64), [2, 3, 4, 9].map(|c| row.number(c)), "{file}");
         assert_eq!(counts.euler_characteristic, row.number(10), "{file}");
 
         let totals = report.totals();
         let total = |kind| totals.get(&kind).copied().unwrap_or(0);
         // The MANIFEST counts a vertex twice in a row as an edge: among those in 3+ faces if that often, and
         // twice in a valence.
-        let loops: Vec<_> = topology
-            .irregular_edges()
-            .iter()
-            .filter(|e| e.is_loop())
-            .collect();
+        let loops: Vec<_> = topology.irregular_edges().iter().filter(|e| e.is_loop()).collect();
         let long_loops = loops.iter().filter(|e| e.sides > 2).count();
         let looped: BTreeSet<u32> = loops.iter().map(|e| e.vertices[0]).collect();
         if looped.is_empty() {
@@ -133,10 +117,7 @@ fn counts_and_defects_are_those_of_the_manifest() {
         ];
         assert_eq!(found, noted.map(|what| row.noted(what)), "{file}");
         // The MANIFEST compares faces by vertices; by position there are more where positions are doubled.
-        let (faces, noted) = (
-            remarked(&report, "on the same positions"),
-            row.noted("duplicate faces"),
-        );
+        let (faces, noted) = (remarked(&report, "on the same positions"), row.noted("duplicate faces"));
         let more = match file.as_str() {
             "closed/psb_m149_boy_17342v_holesfilled.off" | "bad/all_degen_7v.off" => 2,
             _ => 0,
@@ -223,23 +204,11 @@ fn closed_meshes_are_valid_open_and_bad_ones_are_not() {
                 assert_eq!(refused.defects[0].kind, DefectKind::BoundaryEdge, "{file}");
                 assert!(summary.contains("boundary edge"), "{file}: {summary}");
                 let has_valence_two = row.number(11) < 3;
-                assert_eq!(
-                    summary.contains("valence below three"),
-                    has_valence_two,
-                    "{file}"
-                );
+                assert_eq!(summary.contains("valence below three"), has_valence_two, "{file}");
                 let interior = report(&loaded, Boundary::AsInterior);
-                assert!(
-                    interior
-                        .totals()
-                        .keys()
-                        .all(|&k| k == DefectKind::LowValence)
-                );
+                assert!(interior.totals().keys().all(|&k| k == DefectKind::LowValence));
                 assert_eq!(interior.is_valid(), !has_valence_two, "{file}");
-                assert!(
-                    interior.remarks[0].contains("treated as interior"),
-                    "{file}"
-                );
+                assert!(interior.remarks[0].contains("treated as interior"), "{file}");
             }
             _ => {
                 assert!(!refused.is_valid(), "{file}");
@@ -264,9 +233,7 @@ fn the_papers_boy_has_six_holes() {
         ]
     );
     let topology = report.topology.unwrap();
-    let mut loops: Vec<usize> = (topology.boundary_loops(&loaded.mesh.faces).iter())
-        .map(Vec::len)
-        .collect();
+    let mut loops: Vec<usize> = (topology.boundary_loops(&loaded.mesh.faces).iter()).map(Vec::len).collect();
     loops.sort_unstable();
     assert_eq!(loops, [4, 4, 4, 4, 5, 5]);
 }
@@ -309,9 +276,7 @@ fn assert_paired_as_defined(faces: &Faces, vertices: usize) {
     let incidence = &topology.incidence;
     for v in 0..vertices {
         let all = 0..faces.corners().len() as u32;
-        let at: Vec<u32> = all
-            .filter(|&c| faces.corners()[c as usize] as usize == v)
-            .collect();
+        let at: Vec<u32> = all.filter(|&c| faces.corners()[c as usize] as usize == v).collect();
         assert_eq!(incidence.corners_at(v), at);
     }
     for f in 0..faces.len() {
@@ -338,20 +303,11 @@ fn any_faces_are_paired_as_defined() {
         // Loops, repeated vertices, edges with any number of sides in either direction.
         let faces = (0..rng.random_range(0..30)).map(|_| {
             let size = rng.random_range(sizes.clone());
-            (0..size)
-                .map(|_| rng.random_range(0..vertices))
-                .collect::<Vec<u32>>()
+            (0..size).map(|_| rng.random_range(0..vertices)).collect::<Vec<u32>>()
         });
-        assert_paired_as_defined(
-            &Faces::from_lists(faces.collect::<Vec<_>>()),
-            vertices as usize,
-        );
+        assert_paired_as_defined(&Faces::from_lists(faces.collect::<Vec<_>>()), vertices as usize);
     }
-    for mesh in [
-        builtin::bipyramid(40),
-        builtin::irregular_tri(500, 2),
-        builtin::irregular_poly(500, 2),
-    ] {
+    for mesh in [builtin::bipyramid(40), builtin::irregular_tri(500, 2), builtin::irregular_poly(500, 2)] {
         // Closed, and with every fifth face missing.
         assert_paired_as_defined(&mesh.faces, mesh.len());
         let lists = mesh.faces.iter().enumerate();

@@ -113,31 +113,21 @@ const ROUNDING: f64 = 1000.0 * f64::EPSILON;
 fn assert_close(what: &str, a: &[DVec3], b: &[DVec3], tolerance: f64) {
     assert_eq!(a.len(), b.len(), "{what}");
     for (i, (a, b)) in a.iter().zip(b).enumerate() {
-        assert!(
-            (*a - *b).length() <= tolerance,
-            "{what}, vertex {i}: {a} against {b}"
-        );
+        assert!((*a - *b).length() <= tolerance, "{what}, vertex {i}: {a} against {b}");
     }
 }
 
 fn product<S: System>(system: &S, x: &[DVec3]) -> Vec<DVec3> {
     let mut out = vec![DVec3::ZERO; x.len()];
     let mut nothing = vec![(); x.len()];
-    Rows::new(x.len()).product(system, x, &mut out, &mut nothing, |_, ax, out, (), _| {
-        *out = ax
-    });
+    Rows::new(x.len()).product(system, x, &mut out, &mut nothing, |_, ax, out, (), _| *out = ax);
     out
 }
 
 #[test]
 fn rows_equal_the_explicit_matrix() {
     for case in all() {
-        let Both {
-            name,
-            explicit,
-            operator,
-            ..
-        } = &case;
+        let Both { name, explicit, operator, .. } = &case;
         let x = rough(explicit.len());
         let expected = product(explicit, &x);
         assert_close(name, &product(operator, &x), &expected, ROUNDING);
@@ -172,11 +162,10 @@ fn single_precision_rows_agree_to_single_rounding() {
             left.start += count;
             from..left.start
         };
-        case.operator
-            .rows(0..n, (&single, 0), (&sums, 0), rows, |i, _, ax| {
-                let difference = (ax.as_dvec3() - expected[i]).length();
-                assert!(difference <= 4e-6, "{}: {difference}", case.name);
-            });
+        case.operator.rows(0..n, (&single, 0), (&sums, 0), rows, |i, _, ax| {
+            let difference = (ax.as_dvec3() - expected[i]).length();
+            assert!(difference <= 4e-6, "{}: {difference}", case.name);
+        });
     }
 }
 
@@ -192,20 +181,14 @@ fn renumbering_permutes_rows_and_the_front_order_is_a_permutation() {
         let shuffled = Order::Random(5).order(&case.mesh, &topology.incidence);
         let file = Numbering::new((0..n as u32).collect());
         for numbering in [front, Numbering::new(shuffled), file] {
-            let moved = Operator::in_order(faces, &topology, case.scheme, Some(&numbering))
-                .expect("an operator");
+            let moved = Operator::in_order(faces, &topology, case.scheme, Some(&numbering)).expect("an operator");
             let product = product(&moved, &numbering.there(&x));
             assert_close(&case.name, &numbering.back(&product), &expected, ROUNDING);
             assert_eq!(numbering.back(moved.diagonal()), case.operator.diagonal());
             assert_eq!(numbering.back(moved.weights()), case.operator.weights());
             assert_eq!(moved.bounds(), case.operator.bounds());
-            let closed = Operator::closed_in_order(
-                faces,
-                &topology.incidence,
-                case.scheme,
-                Some(&numbering),
-            )
-            .expect("an operator");
+            let closed = Operator::closed_in_order(faces, &topology.incidence, case.scheme, Some(&numbering))
+                .expect("an operator");
             let again = crate::product(&closed, &numbering.there(&x));
             assert!(again == product, "{}", case.name);
         }
@@ -223,12 +206,7 @@ fn distances_beyond_16_bits_are_stored_in_full() {
         let case = both("shuffled torus", permute_vertices(&ordered, &order), scheme);
         assert!(case.operator.reach() > 1 << 15);
         let x = rough(n);
-        assert_close(
-            &case.name,
-            &product(&case.operator, &x),
-            &product(&case.explicit, &x),
-            ROUNDING,
-        );
+        assert_close(&case.name, &product(&case.operator, &x), &product(&case.explicit, &x), ROUNDING);
         let near = in_front_order(&case).0;
         assert!(near.reach() < 1 << 11);
         assert!(near.sweep_bytes() < case.operator.sweep_bytes());
@@ -238,26 +216,13 @@ fn distances_beyond_16_bits_are_stored_in_full() {
 #[test]
 fn a_boundary_treated_as_interior_is_the_same_in_both() {
     // An open fan and a strip: 7 triangles.
-    let faces = Faces::from_lists([
-        [0u32, 1, 2],
-        [0, 2, 3],
-        [0, 3, 4],
-        [0, 4, 5],
-        [2, 1, 6],
-        [2, 6, 3],
-        [3, 6, 7],
-    ]);
+    let faces = Faces::from_lists([[0u32, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5], [2, 1, 6], [2, 6, 3], [3, 6, 7]]);
     let open = Mesh::new(rough(8), faces);
     for scheme in [Scheme::Loop, Scheme::Sqrt3] {
         let case = both("open", open.clone(), scheme);
         let x = rough(8);
         let expected = product(&case.explicit, &x);
-        assert_close(
-            &case.name,
-            &product(&case.operator, &x),
-            &expected,
-            ROUNDING,
-        );
+        assert_close(&case.name, &product(&case.operator, &x), &expected, ROUNDING);
     }
     let topology = Topology::new(&open.faces, 8);
     assert!(Operator::new(&open.faces, &topology, Scheme::CatmullClark).is_err());
@@ -265,10 +230,7 @@ fn a_boundary_treated_as_interior_is_the_same_in_both() {
 
 #[test]
 fn every_iteration_runs_on_both_alike() {
-    let stop = Stop {
-        tolerance: 1e-9,
-        max_iterations: 300,
-    };
+    let stop = Stop { tolerance: 1e-9, max_iterations: 300 };
     fn reports<S: System>(system: &S, points: &[DVec3], stop: &Stop) -> Vec<Report> {
         let mut methods: Vec<Box<dyn Iterate + '_>> = vec![
             Box::new(Pia::new(system, points, 1.0)),
@@ -276,22 +238,11 @@ fn every_iteration_runs_on_both_alike() {
             Box::new(Sor::new(system, points, 1.1, None)),
             Box::new(Ssor::new(system, points, 1.0, None)),
             Box::new(Chebyshev::new(system, points, (0.1, 1.0))),
-            Box::new(ConjugateGradient::new(
-                system,
-                points,
-                Preconditioner::weights(system),
-            )),
-            Box::new(ConjugateGradient::new(
-                system,
-                points,
-                Preconditioner::Ssor { omega: 1.0 },
-            )),
+            Box::new(ConjugateGradient::new(system, points, Preconditioner::weights(system))),
+            Box::new(ConjugateGradient::new(system, points, Preconditioner::Ssor { omega: 1.0 })),
         ];
         let watch = &mut |_: &limitlab::solvers::Step| ControlFlow::Continue(());
-        methods
-            .iter_mut()
-            .map(|m| solve(m.as_mut(), stop, watch))
-            .collect()
+        methods.iter_mut().map(|m| solve(m.as_mut(), stop, watch)).collect()
     }
     for case in all().filter(|c| c.explicit.bounds.lambda_min > 0.05) {
         let points = &case.mesh.positions;
@@ -325,8 +276,7 @@ fn bands_change_no_bit() {
                 continue;
             }
             let front = in_fronts(&mesh.faces, &topology.incidence);
-            let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&front))
-                .expect("an operator");
+            let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&front)).expect("an operator");
             let r = rough(mesh.len());
             let recurrence = Recurrence::new((0.1, 1.0));
             let first = recurrence.coefficients().1;
@@ -340,10 +290,7 @@ fn bands_change_no_bit() {
             let plain = iterate(None);
             let reach = operator.reach();
             for band in [reach, reach + 17, 2 * reach, 10 * mesh.len()] {
-                assert!(
-                    iterate(Some(band)) == plain,
-                    "{name}, {scheme}, bands of {band}"
-                );
+                assert!(iterate(Some(band)) == plain, "{name}, {scheme}, bands of {band}");
             }
             // The same iterates as by the method that works with residuals from x = r's own start.
             let zero = vec![DVec3::ZERO; r.len()];
@@ -353,9 +300,8 @@ fn bands_change_no_bit() {
             for _ in 0..count {
                 let (gamma, tau) = steps.coefficients();
                 let ax = product(&operator, &x);
-                let next: Vec<DVec3> = (0..r.len())
-                    .map(|i| x[i] + gamma * (x[i] - before[i]) + tau * (r[i] - ax[i]))
-                    .collect();
+                let next: Vec<DVec3> =
+                    (0..r.len()).map(|i| x[i] + gamma * (x[i] - before[i]) + tau * (r[i] - ax[i])).collect();
                 before = std::mem::replace(&mut x, next);
                 steps.step();
             }
@@ -365,21 +311,14 @@ fn bands_change_no_bit() {
 }
 
 fn in_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .expect("threads")
-        .install(work)
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads").install(work)
 }
 
 #[test]
 fn mixed_precision_meets_the_tolerance_with_any_number_of_threads() {
     for case in all() {
         let points = &case.mesh.positions;
-        let stop = Stop {
-            tolerance: 1e-11 * case.mesh.diagonal(),
-            max_iterations: 10_000,
-        };
+        let stop = Stop { tolerance: 1e-11 * case.mesh.diagonal(), max_iterations: 10_000 };
         let bound = case.explicit.bounds.lambda_min;
         let solve = || mixed::solve(&case.operator, points, &stop);
         let (control, report) = in_threads(1, solve);
@@ -428,21 +367,13 @@ fn sweeps_by_colours_are_the_sweeps_one_after_the_other() {
         ("icosphere:7", Scheme::Loop),
     ];
     let large = large.map(|(name, scheme)| both(name, mesh(name), scheme));
-    let open = Faces::from_lists([
-        [0u32, 1, 2],
-        [0, 2, 3],
-        [0, 3, 4],
-        [2, 1, 5],
-        [2, 5, 3],
-        [3, 5, 6],
-    ]);
+    let open = Faces::from_lists([[0u32, 1, 2], [0, 2, 3], [0, 3, 4], [2, 1, 5], [2, 5, 3], [3, 5, 6]]);
     let open = both("open", Mesh::new(rough(7), open), Scheme::Sqrt3);
     for case in all().chain(large).chain([open]) {
         let (faces, n) = (&case.mesh.faces, case.mesh.len());
         let topology = Topology::new(faces, n);
         let numbering = in_colours(faces, &topology.incidence);
-        let operator = Operator::in_order(faces, &topology, case.scheme, Some(&numbering))
-            .expect("an operator");
+        let operator = Operator::in_order(faces, &topology, case.scheme, Some(&numbering)).expect("an operator");
         let points = numbering.there(&case.mesh.positions);
         let order = Order::Multicolour.order(&case.mesh, &topology.incidence);
         let mut sor = Sor::new(&operator, &points, 1.1, None);
@@ -462,12 +393,7 @@ fn sweeps_by_colours_are_the_sweeps_one_after_the_other() {
         }
         let length = case.mesh.diagonal();
         let back = numbering.back(sor.points());
-        assert_close(
-            &case.name,
-            &back,
-            explicit.points(),
-            10.0 * ROUNDING * length,
-        );
+        assert_close(&case.name, &back, explicit.points(), 10.0 * ROUNDING * length);
         // In any other order runs are short, and right.
         if n < 2000 {
             let mut sor = Sor::new(&case.operator, &points, 0.9, None);
@@ -486,13 +412,9 @@ fn gauss_seidel_by_colours_solves_and_knows_when_it_cannot() {
         let topology = Topology::new(&case.mesh.faces, case.mesh.len());
         let numbering = in_colours(&case.mesh.faces, &topology.incidence);
         let operator =
-            Operator::in_order(&case.mesh.faces, &topology, case.scheme, Some(&numbering))
-                .expect("an operator");
+            Operator::in_order(&case.mesh.faces, &topology, case.scheme, Some(&numbering)).expect("an operator");
         let points = numbering.there(&case.mesh.positions);
-        let stop = Stop {
-            tolerance,
-            max_iterations: 1000,
-        };
+        let stop = Stop { tolerance, max_iterations: 1000 };
         let (control, report) = by_colours(&operator, &points, 1.0, &stop);
         let control = numbering.back(&control);
         let errors = Rows::new(points.len()).errors(&case.explicit, &case.mesh.positions, &control);
@@ -513,10 +435,7 @@ fn gauss_seidel_by_colours_solves_and_knows_when_it_cannot() {
 fn large() -> (Both, Operator, Numbering, Stop) {
     let case = both("icosphere:7", mesh("icosphere:7"), Scheme::Loop);
     let (operator, numbering) = in_front_order(&case);
-    let stop = Stop {
-        tolerance: 1e-10 * case.mesh.diagonal(),
-        max_iterations: 1000,
-    };
+    let stop = Stop { tolerance: 1e-10 * case.mesh.diagonal(), max_iterations: 1000 };
     (case, operator, numbering, stop)
 }
 
@@ -531,15 +450,9 @@ fn gauss_seidel_in_waves_solves_large_meshes() {
     assert!(report.iterations >= reference.iterations);
     assert!(report.iterations < reference.iterations + 8);
     assert_close("icosphere:7", &control, sor.points(), 10.0 * stop.tolerance);
-    let few = Stop {
-        max_iterations: 3,
-        ..stop
-    };
+    let few = Stop { max_iterations: 3, ..stop };
     let (_, report) = in_waves(&operator, &points, 1.0, &few);
-    assert_eq!(
-        (report.outcome, report.iterations),
-        (Outcome::MaxIterations, 3)
-    );
+    assert_eq!((report.outcome, report.iterations), (Outcome::MaxIterations, 3));
     let (_, report) = in_waves(&operator, &points, 2.5, &stop);
     assert_eq!(report.outcome, Outcome::Diverged);
 }
@@ -553,36 +466,22 @@ fn large_meshes_take_the_banded_way_with_the_same_result_as_the_explicit_method(
     let one = in_threads(1, solve);
     assert!(one == in_threads(2, solve));
     assert_eq!(one.1.outcome, Outcome::Converged);
-    let setup = Setup::Chebyshev {
-        spectrum: (bound, 1.0),
-    };
+    let setup = Setup::Chebyshev { spectrum: (bound, 1.0) };
     let reference = run(&case.explicit, &case.mesh.positions, setup, &stop);
     let expected = numbering.there(&reference.points);
     // Both are within tolerance/λ_min of the solution, in a norm close to the greatest difference.
-    assert_close(
-        "icosphere:7",
-        &one.0,
-        &expected,
-        2.0 * stop.tolerance / bound,
-    );
+    assert_close("icosphere:7", &one.0, &expected, 2.0 * stop.tolerance / bound);
     assert!(one.1.iterations <= reference.report.iterations + 8);
 }
 
 #[test]
 fn mixed_precision_stalls_on_inconsistent_data_of_a_singular_matrix() {
     let case = both("cube", mesh("cube"), Scheme::CatmullClark);
-    let stop = Stop {
-        tolerance: 1e-10,
-        max_iterations: 10_000,
-    };
+    let stop = Stop { tolerance: 1e-10, max_iterations: 10_000 };
     let (_, report) = mixed::solve(&case.operator, &case.mesh.positions, &stop);
     assert_eq!(report.outcome, Outcome::Stagnated);
     // The cube's own points have no part in the kernel.
-    let exact = both(
-        "cube",
-        builtin("cube").expect("a mesh"),
-        Scheme::CatmullClark,
-    );
+    let exact = both("cube", builtin("cube").expect("a mesh"), Scheme::CatmullClark);
     let (_, report) = mixed::solve(&exact.operator, &exact.mesh.positions, &stop);
     assert_eq!(report.outcome, Outcome::Converged);
 }
@@ -593,10 +492,7 @@ fn an_interval_that_is_too_short_is_corrected() {
     let mut prism = mesh("prism:7");
     add_noise(&mut prism, 0.2, 9);
     let case = both("prism:7", prism, Scheme::CatmullClark);
-    let stop = Stop {
-        tolerance: 1e-10,
-        max_iterations: 10_000,
-    };
+    let stop = Stop { tolerance: 1e-10, max_iterations: 10_000 };
     let (control, report) = mixed::solve(&case.operator, &case.mesh.positions, &stop);
     assert_eq!(report.outcome, Outcome::Converged, "{report:?}");
     let lu = run(&case.explicit, &case.mesh.positions, Setup::Lu, &stop);
@@ -605,20 +501,12 @@ fn an_interval_that_is_too_short_is_corrected() {
 
 #[test]
 fn scatter_is_recognised_and_mended() {
-    for name in [
-        "torus:300x300",
-        "irregular-quad:90000",
-        "irregular-tri:90000",
-        "icosphere:6",
-    ] {
+    for name in ["torus:300x300", "irregular-quad:90000", "irregular-tri:90000", "icosphere:6"] {
         let mesh = mesh(name);
         assert!(!is_scattered(&mesh.faces), "{name}");
         let topology = Topology::new(&mesh.faces, mesh.len());
         let order = Order::Random(2).order(&mesh, &topology.incidence);
-        for scattered in [
-            permute_vertices(&mesh, &order),
-            shuffle_faces(&permute_vertices(&mesh, &order), 4),
-        ] {
+        for scattered in [permute_vertices(&mesh, &order), shuffle_faces(&permute_vertices(&mesh, &order), 4)] {
             assert!(is_scattered(&scattered.faces), "{name}");
             let (mended, order) = along_curve(&scattered).expect("good indices");
             assert!(!is_scattered(&mended.faces), "{name}");
@@ -627,10 +515,7 @@ fn scatter_is_recognised_and_mended() {
             }
             // The same faces, in another order.
             let sorted = |faces: &Faces, name: &dyn Fn(u32) -> u32| {
-                let mut list: Vec<Vec<u32>> = faces
-                    .iter()
-                    .map(|f| f.iter().map(|&v| name(v)).collect())
-                    .collect();
+                let mut list: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().map(|&v| name(v)).collect()).collect();
                 list.sort_unstable();
                 list
             };
@@ -651,10 +536,7 @@ fn the_inverse_decays_as_on_the_infinite_grid() {
     assert!(rings.len() >= 17, "{rings:?}");
     for (m, &entry) in rings.iter().enumerate() {
         let exact = 3.0 * q.powi(m as i32);
-        assert!(
-            (entry - exact).abs() <= 2e-11,
-            "ring {m}: {entry} against {exact}"
-        );
+        assert!((entry - exact).abs() <= 2e-11, "ring {m}: {entry} against {exact}");
     }
 }
 
@@ -664,16 +546,12 @@ fn local_edits_give_what_solving_anew_gives() {
         let points = &case.mesh.positions;
         let n = points.len();
         let tolerance = 1e-11 * case.mesh.diagonal();
-        let stop = Stop {
-            tolerance,
-            max_iterations: 1000,
-        };
+        let stop = Stop { tolerance, max_iterations: 1000 };
         let bound = case.explicit.bounds.lambda_min;
         let (control, _) = mixed::solve(&case.operator, points, &stop);
         let mut editor = Editor::new(&case.operator, points.clone(), control);
-        let moves: Vec<(u32, DVec3)> = [0, n / 3, n - 1]
-            .map(|v| (v as u32, points[v] + DVec3::new(0.1, -0.2, 0.05)))
-            .to_vec();
+        let moves: Vec<(u32, DVec3)> =
+            [0, n / 3, n - 1].map(|v| (v as u32, points[v] + DVec3::new(0.1, -0.2, 0.05))).to_vec();
         // Twice: an edit leaves a solution to edit.
         for moves in [&moves[..1], &moves[1..]] {
             let edit = editor.edit(moves, tolerance, usize::MAX);
@@ -681,23 +559,13 @@ fn local_edits_give_what_solving_anew_gives() {
         }
         let errors = Rows::new(n).errors(&case.explicit, editor.points(), editor.control());
         assert!(errors.max <= 1.01 * tolerance, "{}: {errors:?}", case.name);
-        assert_eq!(
-            editor.points()[n - 1],
-            points[n - 1] + DVec3::new(0.1, -0.2, 0.05)
-        );
+        assert_eq!(editor.points()[n - 1], points[n - 1] + DVec3::new(0.1, -0.2, 0.05));
         let lu = run(&case.explicit, editor.points(), Setup::Lu, &stop);
         // The residuals of both, times ‖A⁻¹‖ ≤ √κ(H)/λ_min.
         let h = &case.explicit.h;
-        let (low, high) = h
-            .iter()
-            .fold((f64::MAX, 0.0f64), |(l, u), &h| (l.min(h), u.max(h)));
+        let (low, high) = h.iter().fold((f64::MAX, 0.0f64), |(l, u), &h| (l.min(h), u.max(h)));
         let factor = (n as f64 * high / low).sqrt() / bound;
-        assert_close(
-            &case.name,
-            editor.control(),
-            &lu.points,
-            2.0 * factor * tolerance,
-        );
+        assert_close(&case.name, editor.control(), &lu.points, 2.0 * factor * tolerance);
     }
 }
 
@@ -707,10 +575,7 @@ fn an_edit_of_many_points_solves_all_anew() {
     let points = &case.mesh.positions;
     let n = points.len();
     let tolerance = 1e-10 * case.mesh.diagonal();
-    let stop = Stop {
-        tolerance,
-        max_iterations: 1000,
-    };
+    let stop = Stop { tolerance, max_iterations: 1000 };
     let (control, _) = mixed::solve(&case.operator, points, &stop);
     let mut editor = Editor::new(&case.operator, points.clone(), control);
     for (count, anew) in [(1, false), (n / 10, true), (n, true), (2, false)] {
@@ -733,10 +598,7 @@ fn the_work_of_an_edit_does_not_grow_with_the_mesh() {
     let work = |name| {
         let case = both(name, mesh(name), Scheme::Loop);
         let points = case.mesh.positions.clone();
-        let stop = Stop {
-            tolerance: 1e-10,
-            max_iterations: 1000,
-        };
+        let stop = Stop { tolerance: 1e-10, max_iterations: 1000 };
         let (control, _) = mixed::solve(&case.operator, &points, &stop);
         let mut editor = Editor::new(&case.operator, points.clone(), control);
         let edit = editor.edit(&[(20, points[20] + DVec3::X)], 1e-8, usize::MAX);
@@ -744,51 +606,31 @@ fn the_work_of_an_edit_does_not_grow_with_the_mesh() {
     };
     let (small, _) = work("icosphere:5");
     let (large, n) = work("icosphere:7");
-    assert!(
-        large <= 2 * small && 50 * large < n,
-        "{small} and {large} of {n}"
-    );
+    assert!(large <= 2 * small && 50 * large < n, "{small} and {large} of {n}");
 }
 
 #[test]
 fn auto_returns_to_file_order_and_meets_the_tolerance() {
     // Above and below the size from which vertices are renumbered, in good and in random order.
-    for name in [
-        "irregular-quad:3000",
-        "irregular-quad:60000",
-        "icosphere:6",
-        "irregular-poly:60000",
-    ] {
+    for name in ["irregular-quad:3000", "irregular-quad:60000", "icosphere:6", "irregular-poly:60000"] {
         let good = mesh(name);
         let topology = Topology::new(&good.faces, good.len());
         let order = Order::Random(2).order(&good, &topology.incidence);
         let scattered = shuffle_faces(&permute_vertices(&good, &order), 4);
         for mesh in [&good, &scattered] {
             let scheme = Scheme::default_for(&mesh.faces);
-            let stop = Stop {
-                tolerance: 1e-10 * mesh.diagonal(),
-                max_iterations: 1000,
-            };
+            let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 1000 };
             let found = control_points(mesh, None, scheme, &stop).expect("a system");
             assert_eq!(found.report.outcome, Outcome::Converged, "{name}");
             let case = both(name, mesh.clone(), scheme);
-            let errors =
-                Rows::new(mesh.len()).errors(&case.explicit, &mesh.positions, &found.points);
+            let errors = Rows::new(mesh.len()).errors(&case.explicit, &mesh.positions, &found.points);
             assert!(errors.max <= 1.01 * stop.tolerance, "{name}: {errors:?}");
         }
     }
     // Nearly singular: κ grows like k², beyond what corrections of the interval reach. Conjugate gradients finish.
     let mut prism = mesh("prism:401");
     add_noise(&mut prism, 0.1, 3);
-    let stop = Stop {
-        tolerance: 1e-9,
-        max_iterations: 10_000,
-    };
+    let stop = Stop { tolerance: 1e-9, max_iterations: 10_000 };
     let found = control_points(&prism, None, Scheme::CatmullClark, &stop).expect("a system");
-    assert_eq!(
-        found.report.outcome,
-        Outcome::Converged,
-        "{:?}",
-        found.report
-    );
+    assert_eq!(found.report.outcome, Outcome::Converged, "{:?}", found.report);
 }

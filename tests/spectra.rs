@@ -48,11 +48,7 @@ fn torus_symbols(scheme: Scheme, n: usize, m: usize) -> Vec<f64> {
 }
 
 fn torus(scheme: Scheme, n: usize, m: usize) -> Mesh {
-    if scheme.needs_triangles() {
-        builtin::tri_torus(n, m)
-    } else {
-        builtin::torus(n, m)
-    }
+    if scheme.needs_triangles() { builtin::tri_torus(n, m) } else { builtin::torus(n, m) }
 }
 
 #[test]
@@ -73,12 +69,7 @@ fn extreme_values_and_multiplicities_are_those_of_the_torus() {
             let exact = torus_symbols(scheme, n, m);
             let s = symmetric(&system, Operator::A);
             for end in [End::Lowest, End::Highest] {
-                let request = Request {
-                    end,
-                    count: 7,
-                    tolerance: 1e-11,
-                    spectrum: (system.bounds.lambda_min, 1.0),
-                };
+                let request = Request { end, count: 7, tolerance: 1e-11, spectrum: (system.bounds.lambda_min, 1.0) };
                 let found = extreme(&s, &request).expect("large enough");
                 assert!(found.converged, "{scheme} {n}x{m} {end:?}");
                 for (k, v) in found.values.iter().enumerate() {
@@ -103,12 +94,7 @@ fn extreme_values_and_multiplicities_are_those_of_the_torus() {
 #[test]
 fn a_regular_grid_attains_its_bounds_at_once() {
     let ends = ends(&assemble(&builtin::torus(64, 50), Scheme::CatmullClark)).expect("values");
-    for e in [
-        ends.lambda_min,
-        ends.lambda_max,
-        ends.jacobi_lambda_min,
-        ends.jacobi_lambda_max,
-    ] {
+    for e in [ends.lambda_min, ends.lambda_max, ends.jacobi_lambda_min, ends.jacobi_lambda_max] {
         assert_eq!(e.source, Source::Proven);
     }
     assert_eq!(ends.applications, 4);
@@ -130,20 +116,11 @@ fn clusters_on_spheres_agree_with_dense_eigenvalues() {
         let b = system.bounds;
         for (operator, exact, spectrum) in [
             (Operator::A, &all.a, (b.lambda_min, b.lambda_max)),
-            (
-                Operator::Jacobi,
-                &all.jacobi,
-                (b.jacobi_lambda_min, b.jacobi_lambda_max),
-            ),
+            (Operator::Jacobi, &all.jacobi, (b.jacobi_lambda_min, b.jacobi_lambda_max)),
         ] {
             let s = symmetric(&system, operator);
             for end in [End::Lowest, End::Highest] {
-                let request = Request {
-                    end,
-                    count: 20,
-                    tolerance: 1e-10,
-                    spectrum,
-                };
+                let request = Request { end, count: 20, tolerance: 1e-10, spectrum };
                 let found = extreme(&s, &request).expect("large enough");
                 assert!(found.converged);
                 for (k, v) in found.values.iter().enumerate() {
@@ -163,10 +140,7 @@ fn clusters_on_spheres_agree_with_dense_eigenvalues() {
             (ends.jacobi_lambda_min.value, all.jacobi[0]),
             (ends.jacobi_lambda_max.value, all.jacobi[all.a.len() - 1]),
         ] {
-            assert!(
-                (value - exact).abs() <= 1e-8 * exact,
-                "{name}: {value} {exact}"
-            );
+            assert!((value - exact).abs() <= 1e-8 * exact, "{name}: {value} {exact}");
         }
     }
 }
@@ -213,8 +187,7 @@ fn brackets_hold_the_ends_and_count_them() {
             let all = dense::full_eigenvalues(&assemble(&mesh, scheme)).expect("below the limit");
             for (operator, values) in [(Operator::A, &all.a), (Operator::Jacobi, &all.jacobi)] {
                 for end in [End::Lowest, End::Highest] {
-                    let found = bracket(&mesh.faces, &topology, scheme, operator, end, 1e-9)
-                        .expect("finite numbers");
+                    let found = bracket(&mesh.faces, &topology, scheme, operator, end, 1e-9).expect("finite numbers");
                     let Some(found) = found else { continue };
                     closed.push((scheme, kind, operator, end, found.width));
                     let name = format!("{scheme}, {kind}, {operator:?} {end:?}: {found:?}");
@@ -222,10 +195,7 @@ fn brackets_hold_the_ends_and_count_them() {
                         End::Lowest => -1.0,
                         End::Highest => 1.0,
                     };
-                    let mut out: Vec<f64> = values
-                        .iter()
-                        .map(|v| outwards * (v - found.value))
-                        .collect();
+                    let mut out: Vec<f64> = values.iter().map(|v| outwards * (v - found.value)).collect();
                     out.sort_by(|a, b| b.total_cmp(a));
                     // Nothing further out than the width, as many as are said within it, the next as far as is said.
                     assert!(out[0] <= found.width + 1e-13, "{name} {:e}", out[0]);
@@ -244,41 +214,17 @@ fn brackets_hold_the_ends_and_count_them() {
 
 #[test]
 fn ends_of_meshes_have_the_multiplicities_of_dense_eigenvalues() {
-    let three = generate::union(&[
-        named("quad-sphere:3"),
-        named("quad-sphere:3"),
-        named("cube"),
-    ]);
+    let three = generate::union(&[named("quad-sphere:3"), named("quad-sphere:3"), named("cube")]);
     let meshes = [
-        (
-            "a sphere of quads",
-            named("quad-sphere:4"),
-            Scheme::CatmullClark,
-        ),
+        ("a sphere of quads", named("quad-sphere:4"), Scheme::CatmullClark),
         ("a sphere of triangles", named("icosphere:3"), Scheme::Loop),
         ("a sphere of triangles", named("icosphere:3"), Scheme::Sqrt3),
         ("an odd torus", builtin::torus(31, 23), Scheme::CatmullClark),
-        (
-            "a torus of triangles",
-            builtin::tri_torus(31, 23),
-            Scheme::Loop,
-        ),
+        ("a torus of triangles", builtin::tri_torus(31, 23), Scheme::Loop),
         ("three components", three, Scheme::CatmullClark),
-        (
-            "defects",
-            torus_with_defects(Scheme::Loop, 26, 2),
-            Scheme::Loop,
-        ),
-        (
-            "irregular quads",
-            named("irregular-quad:700"),
-            Scheme::CatmullClark,
-        ),
-        (
-            "irregular polygons",
-            named("irregular-poly:700"),
-            Scheme::Nasri,
-        ),
+        ("defects", torus_with_defects(Scheme::Loop, 26, 2), Scheme::Loop),
+        ("irregular quads", named("irregular-quad:700"), Scheme::CatmullClark),
+        ("irregular polygons", named("irregular-poly:700"), Scheme::Nasri),
     ];
     let mut counted = 0;
     for (name, mesh, scheme) in meshes {
@@ -294,16 +240,10 @@ fn ends_of_meshes_have_the_multiplicities_of_dense_eigenvalues() {
         ] {
             let exact = values[if lowest { 0 } else { values.len() - 1 }];
             let error = (estimate.value - exact).abs();
-            assert!(
-                error <= 1e-9 * exact + 1e-14,
-                "{name} {scheme}: {estimate:?} {exact}"
-            );
+            assert!(error <= 1e-9 * exact + 1e-14, "{name} {scheme}: {estimate:?} {exact}");
             if let Some(m) = estimate.multiplicity {
                 let slack = (m.within * exact).max(1e-12);
-                let equal = values
-                    .iter()
-                    .filter(|v| (*v - exact).abs() <= slack)
-                    .count();
+                let equal = values.iter().filter(|v| (*v - exact).abs() <= slack).count();
                 assert_eq!(m.count, equal, "{name} {scheme}: {estimate:?}");
                 counted += 1;
             }
@@ -318,53 +258,31 @@ fn a_cluster_of_eight_on_a_sphere_of_quads() {
     let mesh = named("quad-sphere:7");
     let topology = Topology::new(&mesh.faces, mesh.len());
     let scheme = Scheme::CatmullClark;
-    let found = bracket(
-        &mesh.faces,
-        &topology,
-        scheme,
-        Operator::A,
-        End::Lowest,
-        1e-9,
-    )
-    .expect("finite numbers")
-    .expect("eight corners");
+    let found = bracket(&mesh.faces, &topology, scheme, Operator::A, End::Lowest, 1e-9)
+        .expect("finite numbers")
+        .expect("eight corners");
     assert_eq!((found.multiplicity, found.patches, found.kinds), (8, 8, 1));
     let system = assemble(&mesh, scheme);
-    let request = Request {
-        end: End::Lowest,
-        count: 9,
-        tolerance: 1e-10,
-        spectrum: (0.0, 1.0),
-    };
+    let request = Request { end: End::Lowest, count: 9, tolerance: 1e-10, spectrum: (0.0, 1.0) };
     let pairs = extreme(&symmetric(&system, Operator::A), &request).expect("large enough");
     for v in &pairs.values[..8] {
-        assert!(
-            (v.value - found.value).abs() <= found.width + v.error,
-            "{v:?} {found:?}"
-        );
+        assert!((v.value - found.value).abs() <= found.width + v.error, "{v:?} {found:?}");
     }
     assert!(pairs.values[8].value >= found.next);
 }
 
 /// The interval, the spectrum of A or D⁻¹A, and what valences prove of its lower end.
-fn intervals(
-    mesh: &Mesh,
-    scheme: Scheme,
-) -> [(limitlab::analysis::interval::Interval, f64, f64, f64); 2] {
+fn intervals(mesh: &Mesh, scheme: Scheme) -> [(limitlab::analysis::interval::Interval, f64, f64, f64); 2] {
     let topology = Topology::new(&mesh.faces, mesh.len());
     let operator = MatrixFree::new(&mesh.faces, &topology, scheme).expect("a closed mesh");
-    let exact = mesh_ends(mesh, &topology, scheme)
-        .expect("values")
-        .spectrum();
+    let exact = mesh_ends(mesh, &topology, scheme).expect("values").spectrum();
     let b = operator.bounds();
-    [
-        (Operator::A, exact.a, b.lambda_min),
-        (Operator::Jacobi, exact.jacobi, b.jacobi_lambda_min),
-    ]
-    .map(|(which, exact, bound)| {
-        let found = interval(&operator, which).expect("finite numbers");
-        (found, exact.min, exact.max, bound)
-    })
+    [(Operator::A, exact.a, b.lambda_min), (Operator::Jacobi, exact.jacobi, b.jacobi_lambda_min)].map(
+        |(which, exact, bound)| {
+            let found = interval(&operator, which).expect("finite numbers");
+            (found, exact.min, exact.max, bound)
+        },
+    )
 }
 
 #[test]
@@ -374,10 +292,7 @@ fn cheap_intervals_are_proven_above_and_sharp_below() {
             assert!(max <= found.high + 1e-12, "{name}: {found:?} {max}");
             // Small meshes are their own sample.
             assert!(found.least >= min - 1e-12, "{name}: {found:?} {min}");
-            assert!(
-                (found.least - min).abs() <= 5e-3 * max,
-                "{name}: {found:?} {min}"
-            );
+            assert!((found.least - min).abs() <= 5e-3 * max, "{name}: {found:?} {min}");
             assert!(found.low >= bound, "{name}: {found:?} {bound}");
         }
     }
@@ -392,14 +307,8 @@ fn cheap_intervals_are_proven_above_and_sharp_below() {
         ("torus:200x200", Scheme::CatmullClark),
     ] {
         for (found, min, max, _) in intervals(&named(name), scheme) {
-            assert!(
-                max <= found.high * (1.0 + 1e-12) && found.high < 1.06 * max,
-                "{name}: {found:?} {max}"
-            );
-            assert!(
-                min <= found.least * (1.0 + 1e-9) && found.least < 1.03 * min,
-                "{name}: {found:?} {min}"
-            );
+            assert!(max <= found.high * (1.0 + 1e-12) && found.high < 1.06 * max, "{name}: {found:?} {max}");
+            assert!(min <= found.least * (1.0 + 1e-9) && found.least < 1.03 * min, "{name}: {found:?} {min}");
             assert!(found.low <= min * (1.0 + 1e-12), "{name}: {found:?} {min}");
         }
     }
@@ -416,33 +325,16 @@ fn elements_prove_at_least_what_valences_do() {
         for (operator, end, valences, exact) in [
             (Operator::A, End::Lowest, b.lambda_min, all.a[0]),
             (Operator::A, End::Highest, b.lambda_max, all.a[last]),
-            (
-                Operator::Jacobi,
-                End::Lowest,
-                b.jacobi_lambda_min,
-                all.jacobi[0],
-            ),
-            (
-                Operator::Jacobi,
-                End::Highest,
-                b.jacobi_lambda_max,
-                all.jacobi[last],
-            ),
+            (Operator::Jacobi, End::Lowest, b.jacobi_lambda_min, all.jacobi[0]),
+            (Operator::Jacobi, End::Highest, b.jacobi_lambda_max, all.jacobi[last]),
         ] {
-            let bound =
-                element_bound(&mesh.faces, &topology, scheme, operator, end).expect("closed");
+            let bound = element_bound(&mesh.faces, &topology, scheme, operator, end).expect("closed");
             let outwards = match end {
                 End::Lowest => -1.0,
                 End::Highest => 1.0,
             };
-            assert!(
-                outwards * (bound - exact) > -1e-12,
-                "{name}: {bound} {exact}"
-            );
-            assert!(
-                outwards * (valences - bound) > -1e-12,
-                "{name}: {bound} {valences}"
-            );
+            assert!(outwards * (bound - exact) > -1e-12, "{name}: {bound} {exact}");
+            assert!(outwards * (valences - bound) > -1e-12, "{name}: {bound} {valences}");
             better += usize::from(outwards * (valences - bound) > 1e-3);
         }
     }
@@ -455,11 +347,7 @@ fn random_systems(count: u64) -> impl Iterator<Item = (String, Mesh, Scheme, Lim
         let triangles = generate::random_triangulation(seed);
         let polygons = generate::random_polygons(seed);
         Scheme::ALL.into_iter().filter_map(move |scheme| {
-            let mesh = if scheme.needs_triangles() {
-                triangles.clone()
-            } else {
-                polygons.clone()
-            };
+            let mesh = if scheme.needs_triangles() { triangles.clone() } else { polygons.clone() };
             if mesh.len() > 260 {
                 return None;
             }
@@ -477,20 +365,10 @@ fn proven_bounds_hold_on_hundreds_of_random_meshes() {
         let b = system.bounds;
         let slack = 1e-12;
         let (low, high) = (all.a[0], all.a[all.a.len() - 1]);
-        assert!(
-            b.lambda_min <= low + slack,
-            "{name}: {} > {low}",
-            b.lambda_min
-        );
-        assert!(
-            (high - 1.0).abs() < 1e-11 && b.lambda_max == 1.0,
-            "{name}: {high}"
-        );
+        assert!(b.lambda_min <= low + slack, "{name}: {} > {low}", b.lambda_min);
+        assert!((high - 1.0).abs() < 1e-11 && b.lambda_max == 1.0, "{name}: {high}");
         assert!(b.jacobi_lambda_min <= all.jacobi[0] + slack, "{name}");
-        assert!(
-            all.jacobi[all.a.len() - 1] <= b.jacobi_lambda_max + slack,
-            "{name}"
-        );
+        assert!(all.jacobi[all.a.len() - 1] <= b.jacobi_lambda_max + slack, "{name}");
         let ceiling = match scheme {
             Scheme::CatmullClark | Scheme::Nasri => 4.0,
             Scheme::Loop => 2.5,
@@ -518,10 +396,7 @@ fn promised_counts_are_kept_by_runs() {
         let tolerance = 1e-8 * mesh.diagonal();
         let promise = Promise::new(&system.bounds);
         let counts = promise.counts(&system, &mesh.positions, tolerance);
-        let stop = Stop {
-            tolerance,
-            max_iterations: 5000,
-        };
+        let stop = Stop { tolerance, max_iterations: 5000 };
         let mut check = |setup: Setup, promised: f64| {
             if !promised.is_finite() {
                 return;
@@ -533,12 +408,7 @@ fn promised_counts_are_kept_by_runs() {
             tight += usize::from(took > 0.5 * promised);
         };
         check(Setup::Pia { omega: 1.0 }, counts.pia);
-        check(
-            Setup::Pia {
-                omega: promise.omega_w_pia,
-            },
-            counts.w_pia,
-        );
+        check(Setup::Pia { omega: promise.omega_w_pia }, counts.w_pia);
         check(Setup::THALL, counts.thall);
         if promise.a.min > 0.0 {
             let spectrum = (promise.a.min, promise.a.max);
@@ -576,16 +446,10 @@ fn certificates_lie_below_the_spectrum_and_close() {
             let (low, high) = (values[0], values[values.len() - 1]);
             let below = certify(&system, operator, End::Lowest, low).expect("fits");
             let below = below.expect("a factorization succeeds");
-            assert!(
-                below.bound <= low && below.bound > low - 1e-6,
-                "{name} {below:?}"
-            );
+            assert!(below.bound <= low && below.bound > low - 1e-6, "{name} {below:?}");
             let above = certify(&system, operator, End::Highest, high).expect("fits");
             let above = above.expect("a factorization succeeds");
-            assert!(
-                above.bound >= high && above.bound < high + 1e-6,
-                "{name} {above:?}"
-            );
+            assert!(above.bound >= high && above.bound < high + 1e-6, "{name} {above:?}");
             // What is no end of the spectrum is not certified.
             let wrong = certify(&system, operator, End::Lowest, low + 0.05).expect("fits");
             assert_eq!(wrong, None, "{name}");
@@ -600,15 +464,9 @@ fn odd_prisms_are_certified_where_the_valence_bound_is_nothing() {
         assert_eq!(system.bounds.lambda_min, 0.0);
         let low = ends(&system).expect("small").lambda_min.value;
         // theory: 0.82/k²
-        assert!(
-            (low * (k * k) as f64 - 0.82).abs() < 0.06,
-            "prism {k}: {low}"
-        );
+        assert!((low * (k * k) as f64 - 0.82).abs() < 0.06, "prism {k}: {low}");
         let proof = certify(&system, Operator::A, End::Lowest, low).expect("fits");
-        assert!(
-            proof.is_some_and(|c| c.bound > 0.999 * low),
-            "{k}: {proof:?}"
-        );
+        assert!(proof.is_some_and(|c| c.bound > 0.999 * low), "{k}: {proof:?}");
     }
 }
 
@@ -663,14 +521,10 @@ fn methods_do_on_singular_meshes_what_was_predicted() {
             assert!(verdict.is_singular());
             assert_eq!(verdict.excited, excited, "{name}");
             let system = assemble(&mesh, Scheme::CatmullClark);
-            let stop = Stop {
-                tolerance: 1e-10 * mesh.diagonal(),
-                max_iterations: 2000,
-            };
+            let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 2000 };
             let spectrum = || limitlab::analysis::spectrum::spectrum(&system);
             for method in Method::ALL {
-                let mut setup = comparison::standard_setup(&system, method, None, &spectrum)
-                    .expect("dense spectra");
+                let mut setup = comparison::standard_setup(&system, method, None, &spectrum).expect("dense spectra");
                 if let Setup::Chebyshev { spectrum } = &mut setup {
                     let all = dense::eigenvalues(&system).expect("small").a;
                     spectrum.0 = all.into_iter().find(|&l| l > 1e-10).expect("not all zero");
@@ -684,9 +538,7 @@ fn methods_do_on_singular_meshes_what_was_predicted() {
                     // Without fill the incomplete factor may break down: a result of its own.
                     _ if method == Method::PcgIc0 && outcome == Outcome::Breakdown => true,
                     Prediction::Drifts => outcome != Outcome::Converged,
-                    Prediction::MinimumNorm | Prediction::SomeSolution => {
-                        outcome == Outcome::Converged
-                    }
+                    Prediction::MinimumNorm | Prediction::SomeSolution => outcome == Outcome::Converged,
                 };
                 assert!(expected, "{name} {method} {outcome:?}, {prediction:?}");
                 if prediction == Prediction::MinimumNorm {
@@ -707,10 +559,7 @@ fn methods_do_on_singular_meshes_what_was_predicted() {
 #[test]
 fn two_quads_back_to_back_have_a_negative_eigenvalue() {
     let positions = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
-    let mesh = Mesh::new(
-        positions,
-        Faces::from_lists([[0u32, 1, 2, 3], [3, 2, 1, 0]]),
-    );
+    let mesh = Mesh::new(positions, Faces::from_lists([[0u32, 1, 2, 3], [3, 2, 1, 0]]));
     let topology = Topology::new(&mesh.faces, mesh.len());
     let system = LimitSystem::with_masks(&mesh, &topology, &Scheme::CatmullClark).expect("small");
     let all = dense::eigenvalues(&system).expect("small");
@@ -720,10 +569,7 @@ fn two_quads_back_to_back_have_a_negative_eigenvalue() {
     // PIA diverges from a start that has a part in that mode.
     let mut points = mesh.positions.clone();
     points[0].z += 0.1;
-    let stop = Stop {
-        tolerance: 1e-10,
-        max_iterations: 2000,
-    };
+    let stop = Stop { tolerance: 1e-10, max_iterations: 2000 };
     let report = run(&system, &points, Setup::Pia { omega: 1.0 }, &stop).report;
     assert_eq!(report.outcome, Outcome::Diverged);
 }
@@ -743,16 +589,10 @@ fn spectral_radii_of_sweeps_agree_with_dense_ones() {
             let both = |x: &mut [DVec3]| symmetric_sweep(&system, &zero, omega, None, x);
             let exact = dense::spectral_radius(&system, plain).expect("small");
             let found = spectral_radius(&system, plain).expect("a value");
-            assert!(
-                (found.value - exact).abs() < 1e-5 * exact,
-                "{name} SOR({omega}): {found:?} {exact}"
-            );
+            assert!((found.value - exact).abs() < 1e-5 * exact, "{name} SOR({omega}): {found:?} {exact}");
             let exact = dense::spectral_radius(&system, both).expect("small");
             let found = spectral_radius(&system, both).expect("a value");
-            assert!(
-                (found.value - exact).abs() < 1e-5 * exact,
-                "{name} SSOR({omega}): {found:?} {exact}"
-            );
+            assert!((found.value - exact).abs() < 1e-5 * exact, "{name} SSOR({omega}): {found:?} {exact}");
         }
     }
 }
@@ -761,10 +601,7 @@ fn spectral_radii_of_sweeps_agree_with_dense_ones() {
 fn results_do_not_depend_on_the_number_of_threads() {
     let system = assemble(&named("irregular-quad:9000"), Scheme::CatmullClark);
     let on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
             let modes = modes(&system, Operator::A, End::Lowest, 3).expect("modes");
             (ends(&system).expect("values"), modes)
@@ -776,20 +613,10 @@ fn results_do_not_depend_on_the_number_of_threads() {
 #[test]
 fn limits_are_told_with_what_would_do() {
     let system = assemble(&builtin::torus(70, 70), Scheme::CatmullClark);
-    let message = dense::full_eigenvalues(&system)
-        .expect_err("too large")
-        .to_string();
-    assert!(
-        message.contains("4900") && message.contains("at most 4000"),
-        "{message}"
-    );
+    let message = dense::full_eigenvalues(&system).expect_err("too large").to_string();
+    assert!(message.contains("4900") && message.contains("at most 4000"), "{message}");
     let s = symmetric(&system, Operator::A);
-    let ask = |count| Request {
-        end: End::Lowest,
-        count,
-        tolerance: 1e-9,
-        spectrum: (0.0, 1.0),
-    };
+    let ask = |count| Request { end: End::Lowest, count, tolerance: 1e-9, spectrum: (0.0, 1.0) };
     assert!(extreme(&s, &ask(60)).is_err());
     let tiny = symmetric(&assemble(&named("cube"), Scheme::CatmullClark), Operator::A);
     let message = extreme(&tiny, &ask(1)).expect_err("too small").to_string();
@@ -803,10 +630,7 @@ fn greedy_and_ordered_sweeps_solve_the_same_system() {
     let topology = Topology::new(&mesh.faces, mesh.len());
     for scheme in [Scheme::CatmullClark, Scheme::Nasri, Scheme::ZhengCai] {
         let system = assemble(&mesh, scheme);
-        let stop = Stop {
-            tolerance: 1e-10 * mesh.diagonal(),
-            max_iterations: 2000,
-        };
+        let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 2000 };
         let greedy = gauss_southwell(&system, &mesh.positions, &stop);
         assert_eq!(greedy.outcome, Outcome::Converged);
         assert!(greedy.max_error <= 1.01 * stop.tolerance);
@@ -883,18 +707,11 @@ fn the_program_prints_the_agreed_fields() {
     assert_eq!(json["singular"], false);
     assert_eq!(json["kernel_dimension"], 0);
     assert_eq!(json["eigenvalues"]["a"].as_array().map(Vec::len), Some(80));
-    assert!(
-        out.path()
-            .join("spectrum-histogram-torus-10x8-catmull-clark.png")
-            .is_file()
-    );
+    assert!(out.path().join("spectrum-histogram-torus-10x8-catmull-clark.png").is_file());
 
     let done = spectrum(&["cube"]);
     let json: serde_json::Value = serde_json::from_slice(&done.stdout).expect("one JSON object");
-    assert_eq!(
-        (&json["singular"], &json["kernel_dimension"]),
-        (&true.into(), &1.into())
-    );
+    assert_eq!((&json["singular"], &json["kernel_dimension"]), (&true.into(), &1.into()));
 
     let refused = spectrum(&["torus:70x70", "--full"]);
     assert_eq!(refused.status.code(), Some(1));

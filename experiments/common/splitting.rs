@@ -3,8 +3,8 @@
 use limitlab::Result;
 use limitlab::analysis::splitting::row::MAP_ROUNDS;
 use limitlab::analysis::splitting::{
-    Condition, Crossing, LocalScheme, Row, SplittingMatrix, ThallTables, characteristic_map,
-    condition_over_alpha, crossings, thall_tables,
+    Condition, Crossing, LocalScheme, Row, SplittingMatrix, ThallTables, characteristic_map, condition_over_alpha,
+    crossings, thall_tables,
 };
 use limitlab::report::{Column, Figure, LinePlot, Marker, Rule, Series, Table, palette};
 
@@ -34,10 +34,7 @@ pub fn sampled(scheme: LocalScheme, valences: &[usize]) -> Result<Option<Sampled
         return Ok(None);
     };
     Ok(Some(Sampled {
-        crossings: valences
-            .iter()
-            .map(|&n| crossings(n))
-            .collect::<Result<_>>()?,
+        crossings: valences.iter().map(|&n| crossings(n)).collect::<Result<_>>()?,
         conditions: condition_over_alpha(valences, &grid(TABLE_STEP))?,
     }))
 }
@@ -46,17 +43,8 @@ pub fn sampled(scheme: LocalScheme, valences: &[usize]) -> Result<Option<Sampled
 ///
 /// # Errors
 /// If eigenvalues do not converge.
-pub fn tables(
-    scheme: LocalScheme,
-    valences: &[usize],
-    rows: &[Row],
-    sampled: Option<&Sampled>,
-) -> Result<Vec<Table>> {
-    let mut tables = vec![
-        summary(scheme, rows),
-        eigenvalue_table(scheme, rows),
-        mask_table(scheme, rows),
-    ];
+pub fn tables(scheme: LocalScheme, valences: &[usize], rows: &[Row], sampled: Option<&Sampled>) -> Result<Vec<Table>> {
+    let mut tables = vec![summary(scheme, rows), eigenvalue_table(scheme, rows), mask_table(scheme, rows)];
     if scheme == LocalScheme::CatmullClark {
         tables.extend(thall_report(&thall_tables()?));
     }
@@ -71,20 +59,13 @@ pub fn tables(
 ///
 /// # Errors
 /// If eigenvalues do not converge.
-pub fn figures(
-    scheme: LocalScheme,
-    valences: &[usize],
-    sampled: Option<&Sampled>,
-) -> Result<Vec<(String, Figure)>> {
+pub fn figures(scheme: LocalScheme, valences: &[usize], sampled: Option<&Sampled>) -> Result<Vec<(String, Figure)>> {
     let mut figures = Vec::new();
     if let Some(figure) = maps(scheme, valences)? {
         figures.push((format!("{}-maps", stem(scheme)), figure));
     }
     if let Some(sampled) = sampled {
-        figures.push((
-            "splitting-sqrt3-condition".into(),
-            condition_plot(valences, &sampled.crossings)?,
-        ));
+        figures.push(("splitting-sqrt3-condition".into(), condition_plot(valences, &sampled.crossings)?));
     }
     Ok(figures)
 }
@@ -179,12 +160,7 @@ fn eigenvalue_table(scheme: LocalScheme, rows: &[Row]) -> Table {
     table.note("All of them with their multiplicities, by falling modulus.");
     for row in rows {
         for (index, z) in row.eigenvalues.iter().enumerate() {
-            table.push(vec![
-                row.valence.into(),
-                index.into(),
-                z.re.into(),
-                z.im.into(),
-            ]);
+            table.push(vec![row.valence.into(), index.into(), z.re.into(), z.im.into()]);
         }
     }
     table
@@ -221,9 +197,7 @@ fn mask_table(scheme: LocalScheme, rows: &[Row]) -> Table {
 /// How the positions of a star are named.
 fn order(scheme: LocalScheme) -> &'static str {
     match scheme {
-        LocalScheme::DooSabin => {
-            "sector:i,j is the corner of a sector's grid about the face, 0,0 on the face itself"
-        }
+        LocalScheme::DooSabin => "sector:i,j is the corner of a sector's grid about the face, 0,0 on the face itself",
         _ => {
             "v the middle, sector:i,j the vertex i edges along the sector's first edge and then j towards the next \
              sector's"
@@ -233,11 +207,7 @@ fn order(scheme: LocalScheme) -> &'static str {
 
 /// The characteristic maps side by side; none if no valence has one.
 fn maps(scheme: LocalScheme, valences: &[usize]) -> Result<Option<Figure>> {
-    let mut drawn: Vec<usize> = valences
-        .iter()
-        .copied()
-        .filter(|n| DRAWN.contains(n))
-        .collect();
+    let mut drawn: Vec<usize> = valences.iter().copied().filter(|n| DRAWN.contains(n)).collect();
     if drawn.is_empty() {
         drawn = valences.iter().copied().take(MOST_DRAWN).collect();
     }
@@ -257,9 +227,7 @@ fn maps(scheme: LocalScheme, valences: &[usize]) -> Result<Option<Figure>> {
         };
         let joined = |lines: Vec<Vec<(f64, f64)>>| {
             let gap = (f64::NAN, f64::NAN);
-            lines
-                .into_iter()
-                .flat_map(move |line| line.into_iter().chain([gap]))
+            lines.into_iter().flat_map(move |line| line.into_iter().chain([gap]))
         };
         // As far as a line of every family goes all around.
         let step = (net.rings / LINES).max(1);
@@ -343,21 +311,11 @@ fn thall_report(tables: &ThallTables) -> [Table; 3] {
     let mut normals = Table::new(
         "splitting-thall-normals",
         "Which way m_2 × m_3 points",
-        vec![
-            Column::key("place"),
-            Column::key("valence"),
-            Column::key("masks"),
-            Column::number("sine", 1e-9, 4),
-        ],
+        vec![Column::key("place"), Column::key("valence"), Column::key("masks"), Column::number("sine", 1e-9, 4)],
     );
     normals.note("The sine of the angle from m_2 to m_3 on a counter-clockwise planar star: positive is outward.");
     for o in &tables.orientations {
-        normals.push(vec![
-            o.place.into(),
-            o.valence.into(),
-            o.masks.into(),
-            o.sine.into(),
-        ]);
+        normals.push(vec![o.place.into(), o.valence.into(), o.masks.into(), o.sine.into()]);
     }
     [entries, members, normals]
 }
@@ -370,11 +328,7 @@ fn condition_table(sampled: &[Condition]) -> Table {
     columns.push(Column::number("margin", 1e-6, 4));
     columns.push(Column::text("holds"));
     columns.push(Column::text("third_equals_fourth"));
-    let mut table = Table::new(
-        "splitting-sqrt3-condition",
-        "Lin and Luo's eigenvalue condition over α",
-        columns,
-    );
+    let mut table = Table::new("splitting-sqrt3-condition", "Lin and Luo's eigenvalue condition over α", columns);
     table.note(
         "S̃ = R·S·S on three rings. The condition: λ_0 = 1 > λ_1 = λ_2 > λ_3, a real pair of frequency 1 leading; `margin` is \
          the modulus of that pair less the largest other. The paper (§6) states it for all α in [0, 2], and λ_3 = λ_4 \
@@ -384,11 +338,7 @@ fn condition_table(sampled: &[Condition]) -> Table {
         let yes = |b: bool| if b { "yes" } else { "no" };
         let mut row = vec![c.valence.into(), c.alpha.to_string().into()];
         row.extend(c.lambda.iter().map(|z| z.norm().into()));
-        row.extend([
-            c.margin.into(),
-            yes(c.holds).into(),
-            yes(c.third_equals_fourth).into(),
-        ]);
+        row.extend([c.margin.into(), yes(c.holds).into(), yes(c.third_equals_fourth).into()]);
         table.push(row);
     }
     table
@@ -411,32 +361,18 @@ fn crossing_table(valences: &[usize], crossings: &[Vec<Crossing>]) -> Table {
     );
     for (&n, found) in valences.iter().zip(crossings) {
         if found.is_empty() {
-            table.push(vec![
-                n.into(),
-                None::<f64>.into(),
-                "holds".into(),
-                "".into(),
-            ]);
+            table.push(vec![n.into(), None::<f64>.into(), "holds".into(), "".into()]);
         }
         for c in found {
             let above = if c.holds_above { "holds" } else { "fails" };
-            table.push(vec![
-                n.into(),
-                c.alpha.into(),
-                above.into(),
-                c.frequency.into(),
-            ]);
+            table.push(vec![n.into(), c.alpha.into(), above.into(), c.frequency.into()]);
         }
     }
     table
 }
 
 fn condition_plot(valences: &[usize], crossings: &[Vec<Crossing>]) -> Result<Figure> {
-    let mut plotted: Vec<usize> = valences
-        .iter()
-        .copied()
-        .filter(|n| PLOTTED.contains(n))
-        .collect();
+    let mut plotted: Vec<usize> = valences.iter().copied().filter(|n| PLOTTED.contains(n)).collect();
     if plotted.is_empty() {
         plotted = valences.iter().copied().take(MOST_DRAWN).collect();
     }
@@ -455,10 +391,7 @@ fn condition_plot(valences: &[usize], crossings: &[Vec<Crossing>]) -> Result<Fig
         ..LinePlot::default()
     };
     let points = |frequency: usize| {
-        let all = crossings
-            .iter()
-            .flatten()
-            .filter(move |c| c.frequency == frequency);
+        let all = crossings.iter().flatten().filter(move |c| c.frequency == frequency);
         all.map(|c| (c.valence as f64, c.alpha))
     };
     let mut series = vec![
@@ -470,16 +403,12 @@ fn condition_plot(valences: &[usize], crossings: &[Vec<Crossing>]) -> Result<Fig
         title: "Where it ceases to hold, and which eigenvalue meets λ_{1} there".into(),
         x_label: "valence n".into(),
         y_label: "α".into(),
-        x_range: Some((
-            valences[0] as f64 - 1.0,
-            valences[valences.len() - 1] as f64 + 1.0,
-        )),
+        x_range: Some((valences[0] as f64 - 1.0, valences[valences.len() - 1] as f64 + 1.0)),
         y_range: Some((0.0, 2.05)),
         series,
         ..LinePlot::default()
     };
-    let mut figure =
-        Figure::stack([margins, first]).title("Lin and Luo's eigenvalue condition, blended √3");
+    let mut figure = Figure::stack([margins, first]).title("Lin and Luo's eigenvalue condition, blended √3");
     figure.share_x = false;
     figure.height = 520;
     Ok(figure)

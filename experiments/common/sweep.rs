@@ -7,11 +7,7 @@ use limitlab::solvers::{Method, Outcome};
 
 /// The grids unless told: Jacobi's reaches beyond 2/λ_max(D⁻¹A) on regular quads, the others over all of (0, 2].
 pub fn default_grid(method: Method) -> Vec<f64> {
-    let text = if method == Method::Jacobi {
-        "0.05:1.2:0.05"
-    } else {
-        "0.05:2:0.05"
-    };
+    let text = if method == Method::Jacobi { "0.05:1.2:0.05" } else { "0.05:2:0.05" };
     text.parse::<Grid>().map(|g| g.0).unwrap_or_default()
 }
 
@@ -55,10 +51,7 @@ pub fn table(id: String, title: String, about: String, sweep: &Sweep) -> Table {
             );
         }
         if let Some(best) = sweep.best(t.method) {
-            text += &format!(
-                "; best on the grid: ω = {} with {} iterations",
-                best.omega, best.iterations
-            );
+            text += &format!("; best on the grid: ω = {} with {} iterations", best.omega, best.iterations);
         }
         table.note(text + ".");
     }
@@ -100,19 +93,14 @@ pub fn plot(title: String, methods: &[Method], sweep: &Sweep) -> Figure {
         iterations.series.push(
             Series::line(
                 method.name(),
-                rows()
-                    .filter(|r| r.outcome == converged)
-                    .map(|r| (r.omega, r.iterations as f64)),
+                rows().filter(|r| r.outcome == converged).map(|r| (r.omega, r.iterations as f64)),
             )
             .marker(Marker::Circle)
             .colour(colour),
         );
         rates.series.push(
-            Series::line(
-                format!("{method}: predicted ρ(ω)"),
-                rows().map(|r| (r.omega, r.predicted_rho)),
-            )
-            .colour(colour),
+            Series::line(format!("{method}: predicted ρ(ω)"), rows().map(|r| (r.omega, r.predicted_rho)))
+                .colour(colour),
         );
         rates.series.push(
             Series::scatter(
@@ -124,10 +112,9 @@ pub fn plot(title: String, methods: &[Method], sweep: &Sweep) -> Figure {
     }
     for t in &sweep.thresholds {
         if t.method == Method::Jacobi {
-            for (at, label) in [
-                (t.matrix.optimal_omega(), "Jacobi ω_{opt}"),
-                (t.matrix.critical_omega(), "Jacobi ω_{crit}"),
-            ] {
+            for (at, label) in
+                [(t.matrix.optimal_omega(), "Jacobi ω_{opt}"), (t.matrix.critical_omega(), "Jacobi ω_{crit}")]
+            {
                 iterations.vertical_lines.push(Rule::new(at, label));
                 rates.vertical_lines.push(Rule::new(at, ""));
             }

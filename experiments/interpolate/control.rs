@@ -52,11 +52,8 @@ pub fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Re
             "all points coincide, so no tolerance can be relative to their extent: give --tol-absolute",
         ));
     }
-    if let (
-        Choice::Solver(method @ (Method::GaussSeidel | Method::Sor)),
-        Order::Multicolour,
-        None,
-    ) = (arguments.method, arguments.order, &wishes.interpolated)
+    if let (Choice::Solver(method @ (Method::GaussSeidel | Method::Sor)), Order::Multicolour, None) =
+        (arguments.method, arguments.order, &wishes.interpolated)
     {
         return by_colour(arguments, input, method);
     }
@@ -82,12 +79,8 @@ pub fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Re
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
     let mut method = chosen.unwrap_or_else(|| automatic(solved));
     let start = Instant::now();
-    let order = arguments
-        .order
-        .order(&input.mesh, &input.topology().incidence);
-    let order = part
-        .as_ref()
-        .map_or_else(|| order.clone(), |p| p.order(&order));
+    let order = arguments.order.order(&input.mesh, &input.topology().incidence);
+    let order = part.as_ref().map_or_else(|| order.clone(), |p| p.order(&order));
     let stop = arguments.stop.stop(&input.mesh);
     let progress = Progress::toward("solving", arguments.common.quiet);
     let solve = |method: Method| -> Result<Solution> {
@@ -99,9 +92,7 @@ pub fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Re
             let digits = |e: f64| (e / stop.tolerance).ln();
             progress.part(1.0 - digits(error) / digits(*start.get_or_insert(error)));
             let iteration = step.iteration;
-            progress.message(format!(
-                "{method}, iteration {iteration}: max error {error:.2e}"
-            ));
+            progress.message(format!("{method}, iteration {iteration}: max error {error:.2e}"));
             ControlFlow::Continue(())
         };
         let points = &input.mesh.positions;
@@ -126,20 +117,13 @@ pub fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Re
         status: solution.report.outcome.name(),
         errors: solution.report.last(),
         tolerance: stop.tolerance,
-        seconds: Seconds {
-            assemble,
-            solve: start.elapsed().as_secs_f64(),
-            ..Seconds::default()
-        },
+        seconds: Seconds { assemble, solve: start.elapsed().as_secs_f64(), ..Seconds::default() },
     })
 }
 
 /// Whether an iteration ended without getting nearer.
 fn no_progress(outcome: Outcome) -> bool {
-    matches!(
-        outcome,
-        Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown
-    )
+    matches!(outcome, Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown)
 }
 
 /// All vertices, by the library's choice of order, operator and method; `None` if that makes no progress.
@@ -182,11 +166,7 @@ fn by_colour(arguments: &Arguments, input: &Input, method: Method) -> Result<Con
         .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let omega = if method == Method::Sor {
-        SOR_OMEGA
-    } else {
-        1.0
-    };
+    let omega = if method == Method::Sor { SOR_OMEGA } else { 1.0 };
     let points = numbering.there(&mesh.positions);
     let (control, report) = by_colours(&operator, &points, omega, &stop);
     drop(progress);
@@ -198,20 +178,14 @@ fn by_colour(arguments: &Arguments, input: &Input, method: Method) -> Result<Con
         status: report.outcome.name(),
         errors: report.last(),
         tolerance: stop.tolerance,
-        seconds: Seconds {
-            assemble,
-            solve: start.elapsed().as_secs_f64(),
-            ..Seconds::default()
-        },
+        seconds: Seconds { assemble, solve: start.elapsed().as_secs_f64(), ..Seconds::default() },
     })
 }
 
 /// Zheng & Cai's phase one by its own rule.
 fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
     let start = Instant::now();
-    let order = arguments
-        .order
-        .order(&input.mesh, &input.topology().incidence);
+    let order = arguments.order.order(&input.mesh, &input.topology().incidence);
     let phase = PhaseOne {
         sweep: Sweep::GaussSeidel(Some(&order)),
         max_iterations: arguments.shape.ite_max,
@@ -225,17 +199,9 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
         errors: auxiliary_errors(input, marks, &found.mesh)?,
         points: found.mesh.positions,
         iterations: found.updates.len(),
-        status: if found.passed {
-            "converged"
-        } else {
-            "max-iterations"
-        },
+        status: if found.passed { "converged" } else { "max-iterations" },
         tolerance: arguments.shape.eps * mesh.diagonal(),
-        seconds: Seconds {
-            assemble: input.check_seconds,
-            solve: start.elapsed().as_secs_f64(),
-            ..Seconds::default()
-        },
+        seconds: Seconds { assemble: input.check_seconds, solve: start.elapsed().as_secs_f64(), ..Seconds::default() },
     })
 }
 
@@ -243,10 +209,8 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
 fn auxiliary_errors(input: &Input, marks: Option<&[bool]>, auxiliary: &Mesh) -> Result<Errors> {
     let limits = limit_positions(Rule::ZhengCai, auxiliary, input.topology())?;
     let pairs = input.mesh.positions.iter().zip(&limits).enumerate();
-    let distances: Vec<f64> = pairs
-        .filter(|(v, _)| marks.is_none_or(|m| m[*v]))
-        .map(|(_, (p, q))| p.distance(*q))
-        .collect();
+    let distances: Vec<f64> =
+        pairs.filter(|(v, _)| marks.is_none_or(|m| m[*v])).map(|(_, (p, q))| p.distance(*q)).collect();
     Ok(Errors {
         max: distances.iter().copied().fold(0.0, f64::max),
         mean: distances.iter().sum::<f64>() / distances.len() as f64,
@@ -269,10 +233,7 @@ fn check(input: &Input, method: Method, report: &Report, tolerance: f64) -> Resu
         }
         Outcome::Breakdown | Outcome::Stopped => "the method broke down; try another --method",
     };
-    let detail = report
-        .detail
-        .as_ref()
-        .map_or_else(String::new, |d| format!(" [{d}]"));
+    let detail = report.detail.as_ref().map_or_else(String::new, |d| format!(" [{d}]"));
     Err(Error::mesh(
         &input.name,
         format!(

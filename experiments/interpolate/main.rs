@@ -107,12 +107,7 @@ struct ShapeFlags {
     #[arg(long, value_name = "T", default_value_t = 0.003, value_parser = cli::positive)]
     eps: f64,
     /// Weight of the thin-plate energy in --method halstead, 0 or more
-    #[arg(
-        long,
-        value_name = "W",
-        default_value_t = 1.0,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true)]
     thin_plate: f64,
     /// Weight of the membrane energy in --method halstead, positive
     #[arg(long, value_name = "W", default_value_t = 1.0, value_parser = cli::positive)]
@@ -173,27 +168,19 @@ fn main() -> ExitCode {
             conflict("--method halstead belongs to --scheme catmull-clark");
         }
         if arguments.shape.shape_handle.is_some() {
-            conflict(
-                "--method halstead has no type-V faces for shape handles: use --scheme zheng-cai or nasri",
-            );
+            conflict("--method halstead has no type-V faces for shape handles: use --scheme zheng-cai or nasri");
         }
         if arguments.shape.subdivide == 1 {
-            conflict(
-                "--method halstead gives a mesh two refinements down: use --subdivide 2 or more, or leave it out",
-            );
+            conflict("--method halstead gives a mesh two refinements down: use --subdivide 2 or more, or leave it out");
         }
     }
     if let Choice::Keeping(scheme) = arguments.method {
         let shape = &arguments.shape;
         if arguments.mesh.scheme.is_some() {
-            conflict(&format!(
-                "--method {scheme} is a scheme of its own: leave --scheme out"
-            ));
+            conflict(&format!("--method {scheme} is a scheme of its own: leave --scheme out"));
         }
         if shape.vertices.is_some() || shape.normals.is_some() || shape.shape_handle.is_some() {
-            conflict(&format!(
-                "--method {scheme} passes through all vertices and takes no normals or shape handles"
-            ));
+            conflict(&format!("--method {scheme} passes through all vertices and takes no normals or shape handles"));
         }
         if shape.subdivide == 0 {
             conflict(&format!(

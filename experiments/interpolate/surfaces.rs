@@ -28,12 +28,7 @@ pub struct Finished {
     pub seconds: Seconds,
 }
 
-pub fn refine(
-    arguments: &Arguments,
-    input: &Input,
-    wishes: &Wishes,
-    control: Control,
-) -> Result<Finished> {
+pub fn refine(arguments: &Arguments, input: &Input, wishes: &Wishes, control: Control) -> Result<Finished> {
     let start = Instant::now();
     let flags = &arguments.shape;
     let mesh = Mesh::new(control.points, input.mesh.faces.clone());
@@ -71,10 +66,7 @@ pub fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
     let start = Instant::now();
     let flags = &arguments.shape;
-    let weights = Weights {
-        thin_plate: flags.thin_plate,
-        membrane: flags.membrane,
-    };
+    let weights = Weights { thin_plate: flags.thin_plate, membrane: flags.membrane };
     let points = &input.mesh.positions;
     let found = fit(&fairness, points, &wishes.constraints(), weights)?;
     let solve = start.elapsed().as_secs_f64();
@@ -85,13 +77,7 @@ pub fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<
         normals: flags.write_normals,
         ..Request::default()
     };
-    let surface = surface(
-        found.mesh,
-        || &fairness.topology,
-        input.scheme,
-        &[],
-        &request,
-    )?;
+    let surface = surface(found.mesh, || &fairness.topology, input.scheme, &[], &request)?;
     Ok(Finished {
         method: "halstead",
         surface,
@@ -100,12 +86,7 @@ pub fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<
         errors: found.errors,
         tolerance: 0.0,
         fairness: Some(found.energies),
-        seconds: Seconds {
-            assemble,
-            solve,
-            subdivide: start.elapsed().as_secs_f64(),
-            ..Seconds::default()
-        },
+        seconds: Seconds { assemble, solve, subdivide: start.elapsed().as_secs_f64(), ..Seconds::default() },
     })
 }
 
@@ -128,10 +109,7 @@ pub fn unified(arguments: &Arguments, input: &Input, alpha: &[f64]) -> Result<Fi
             mesh.positions = found.positions;
         }
     }
-    let surface = Surface {
-        normals,
-        ..Surface::plain(mesh)
-    };
+    let surface = Surface { normals, ..Surface::plain(mesh) };
     Ok(unsolved("lin-luo", input, surface, start))
 }
 
@@ -146,10 +124,7 @@ pub fn keeping(arguments: &Arguments, input: &Input, scheme: Refinement) -> Resu
     } else {
         None
     };
-    let surface = Surface {
-        normals,
-        ..Surface::plain(mesh)
-    };
+    let surface = Surface { normals, ..Surface::plain(mesh) };
     Ok(unsolved(scheme.name(), input, surface, start))
 }
 
@@ -160,10 +135,7 @@ fn unsolved(method: &'static str, input: &Input, surface: Surface, start: Instan
         surface,
         iterations: 0,
         status: "converged",
-        errors: Errors {
-            max: 0.0,
-            mean: 0.0,
-        },
+        errors: Errors { max: 0.0, mean: 0.0 },
         tolerance: 0.0,
         fairness: None,
         seconds: Seconds {
@@ -177,13 +149,7 @@ fn unsolved(method: &'static str, input: &Input, surface: Surface, start: Instan
 /// Nothing that is no number reaches a file.
 pub fn require_finite(input: &Input, surface: &Surface) -> Result<()> {
     let normals = surface.normals.iter().flatten();
-    match surface
-        .mesh
-        .positions
-        .iter()
-        .chain(normals)
-        .position(|p| !p.is_finite())
-    {
+    match surface.mesh.positions.iter().chain(normals).position(|p| !p.is_finite()) {
         None => Ok(()),
         Some(v) => Err(Error::mesh(
             &input.name,

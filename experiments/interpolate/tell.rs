@@ -9,18 +9,8 @@ use super::surfaces::Finished;
 use super::wishes::Wishes;
 use super::{Arguments, Choice};
 
-pub fn tell(
-    arguments: &Arguments,
-    input: &Input,
-    wishes: &Wishes,
-    result: &Finished,
-) -> Result<()> {
-    let Finished {
-        surface,
-        errors,
-        seconds,
-        ..
-    } = result;
+pub fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished) -> Result<()> {
+    let Finished { surface, errors, seconds, .. } = result;
     let common = &arguments.common;
     if !surface.not_flattened.is_empty() {
         common.remark(format_args!(
@@ -30,12 +20,7 @@ pub fn tell(
             surface.not_flattened[0]
         ));
     }
-    let without = surface
-        .normals
-        .iter()
-        .flatten()
-        .filter(|n| **n == DVec3::ZERO)
-        .count();
+    let without = surface.normals.iter().flatten().filter(|n| **n == DVec3::ZERO).count();
     if without > 0 {
         common.remark(format_args!(
             "{}: the surface has no normal at {without} vertices; (0, 0, 0) is written",

@@ -43,12 +43,7 @@ impl Wishes {
                 *a = 1.0;
             }
         }
-        Ok(Wishes {
-            interpolated,
-            normals,
-            handles,
-            alpha,
-        })
+        Ok(Wishes { interpolated, normals, handles, alpha })
     }
 
     pub fn constraints(&self) -> Constraints<'_> {

@@ -50,8 +50,7 @@ impl Subject {
     /// # Errors
     /// As [`LimitSystem::new`], with the mesh's name.
     pub fn system(&self, scheme: Scheme) -> Result<LimitSystem> {
-        LimitSystem::new(&self.mesh, &self.topology, scheme)
-            .map_err(|e| Error::mesh(&self.name, e.to_string()))
+        LimitSystem::new(&self.mesh, &self.topology, scheme).map_err(|e| Error::mesh(&self.name, e.to_string()))
     }
 
     /// Whether the scheme is defined on the mesh's faces.
@@ -61,12 +60,7 @@ impl Subject {
 }
 
 impl Context {
-    pub fn new(
-        root: &Path,
-        models: Option<&Path>,
-        quick: bool,
-        check: Option<&Path>,
-    ) -> Result<Self> {
+    pub fn new(root: &Path, models: Option<&Path>, quick: bool, check: Option<&Path>) -> Result<Self> {
         if let Some(folder) = models
             && !folder.join("closed").is_dir()
         {
@@ -98,11 +92,7 @@ impl Context {
     }
 
     fn within(&self, root: &Path) -> PathBuf {
-        if self.real() {
-            root.to_path_buf()
-        } else {
-            root.join(BUILT_IN)
-        }
+        if self.real() { root.to_path_buf() } else { root.join(BUILT_IN) }
     }
 
     /// What the tables say about their meshes.
@@ -125,22 +115,12 @@ impl Context {
     /// If it is missing, or invalid under this treatment of the boundary.
     pub fn model(&self, file: &str, boundary: Boundary) -> Result<Subject> {
         let Some(folder) = &self.models else {
-            return Err(Error::Computation(format!(
-                "{file} is a real model: run with --meshes DIR"
-            )));
+            return Err(Error::Computation(format!("{file} is a real model: run with --meshes DIR")));
         };
         let loaded = io::read(&folder.join(file))?;
         let topology = validate(&loaded.mesh, None, boundary).into_topology(&loaded.name)?;
-        let name = Path::new(file)
-            .file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
-        Ok(Subject {
-            name,
-            mesh: loaded.mesh,
-            topology,
-        })
+        let name = Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(Subject { name, mesh: loaded.mesh, topology })
     }
 
     /// A built-in mesh with the noise of stand-ins.
@@ -151,11 +131,7 @@ impl Context {
         let mut mesh = builtin::builtin(name)?;
         add_noise(&mut mesh, STAND_IN_NOISE.amplitude, STAND_IN_NOISE.seed);
         let topology = Topology::new(&mesh.faces, mesh.len());
-        Ok(Subject {
-            name: name.to_owned(),
-            mesh,
-            topology,
-        })
+        Ok(Subject { name: name.to_owned(), mesh, topology })
     }
 
     /// All valid closed models in order of their names, or the stand-ins `otherwise`; none with more than `most`
@@ -219,9 +195,7 @@ impl Context {
     /// # Errors
     /// If it cannot be drawn or written.
     pub fn figure(&self, stem: &str, figure: &Figure) -> Result<()> {
-        figure
-            .render()?
-            .save(&self.folder().join(format!("{stem}.png")))
+        figure.render()?.save(&self.folder().join(format!("{stem}.png")))
     }
 
     /// Writes figures of one size as an animation, `STEM.png`.
@@ -229,10 +203,8 @@ impl Context {
     /// # Errors
     /// If one cannot be drawn, or the file not written.
     pub fn animation(&self, stem: &str, figures: &[Figure]) -> Result<()> {
-        let animation = Animation {
-            frames: figures.iter().map(Figure::render).collect::<Result<_>>()?,
-            milliseconds: 700,
-        };
+        let animation =
+            Animation { frames: figures.iter().map(Figure::render).collect::<Result<_>>()?, milliseconds: 700 };
         animation.save(&self.folder().join(format!("{stem}.png")))
     }
 

@@ -16,11 +16,8 @@ use limitlab::subdivide::Refinement;
 
 use crate::context::{Context, Item};
 
-pub const LINES: Item = Item {
-    id: "lines",
-    title: "Line solves along edge loops as a preconditioner for Catmull-Clark",
-    run,
-};
+pub const LINES: Item =
+    Item { id: "lines", title: "Line solves along edge loops as a preconditioner for Catmull-Clark", run };
 
 /// With the number of Catmull-Clark refinements.
 const STAND_INS: [(&str, usize); 6] = [
@@ -125,11 +122,7 @@ fn run(context: &mut Context) -> Result<()> {
     ));
     let sources: &[(&str, usize)] = if context.real() { &MODELS } else { &STAND_INS };
     for &(name, levels) in sources {
-        let mesh = if context.real() {
-            context.model(name, Boundary::Refuse)?.mesh
-        } else {
-            builtin::builtin(name)?
-        };
+        let mesh = if context.real() { context.model(name, Boundary::Refuse)?.mesh } else { builtin::builtin(name)? };
         // Every refinement makes four vertices of one, but for a few.
         if !context.quick || mesh.len() << (2 * levels) <= QUICK {
             table.push(row(name, mesh, levels)?);
@@ -143,10 +136,7 @@ fn row(name: &str, mesh: Mesh, levels: usize) -> Result<Vec<Cell>> {
     add_noise(&mut mesh, STAND_IN_NOISE.amplitude, STAND_IN_NOISE.seed);
     let topology = Topology::new(&mesh.faces, mesh.len());
     let system = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark)?;
-    let stop = Stop {
-        tolerance: TOLERANCE * mesh.diagonal(),
-        max_iterations: LIMIT,
-    };
+    let stop = Stop { tolerance: TOLERANCE * mesh.diagonal(), max_iterations: LIMIT };
     let points = &mesh.positions;
     let regularity = Regularity::new(&mesh.faces, &topology);
     let preconditioner = Preconditioner::new(&system, &regularity)?;
@@ -157,9 +147,7 @@ fn row(name: &str, mesh: Mesh, levels: usize) -> Result<Vec<Cell>> {
     let iterations = auto.report.iterations;
     let irregular = 1.0 - regularity.share();
     Ok(vec![
-        name.trim_start_matches("closed/")
-            .trim_end_matches(".off")
-            .into(),
+        name.trim_start_matches("closed/").trim_end_matches(".off").into(),
         levels.to_string().into(),
         mesh.len().to_string().into(),
         regularity.share().into(),

@@ -90,16 +90,9 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<()> {
     if arguments.list {
         let claims = claims::all().map(|c| (c.id, c.title));
-        let all: Vec<(&str, &str)> = ITEMS
-            .iter()
-            .map(|i| (i.id, i.title))
-            .chain(claims)
-            .collect();
+        let all: Vec<(&str, &str)> = ITEMS.iter().map(|i| (i.id, i.title)).chain(claims).collect();
         let width = all.iter().map(|(id, _)| id.len()).max().unwrap_or(0);
-        let lines: Vec<String> = all
-            .iter()
-            .map(|(id, title)| format!("{id:width$}  {title}"))
-            .collect();
+        let lines: Vec<String> = all.iter().map(|(id, title)| format!("{id:width$}  {title}")).collect();
         return cli::print(&lines.join("\n"));
     }
     let mut chosen: Vec<&Item> = Vec::new();
@@ -113,17 +106,11 @@ fn run(arguments: &Arguments) -> Result<()> {
         } else if let Some(claim) = claims::find(id) {
             claims.push(claim);
         } else {
-            return Err(Error::Unknown(format!(
-                "no item or claim is called \"{id}\"; see reproduce --list"
-            )));
+            return Err(Error::Unknown(format!("no item or claim is called \"{id}\"; see reproduce --list")));
         }
     }
-    let mut context = Context::new(
-        &arguments.out,
-        arguments.meshes.as_deref(),
-        arguments.quick,
-        arguments.check.as_deref(),
-    )?;
+    let mut context =
+        Context::new(&arguments.out, arguments.meshes.as_deref(), arguments.quick, arguments.check.as_deref())?;
     let steps = chosen.len() + usize::from(!claims.is_empty());
     let progress = Progress::new("reproduce", steps, arguments.common.quiet);
     for item in &chosen {
@@ -139,9 +126,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     drop(progress);
     if !chosen.is_empty() {
         context.write_index(&ITEMS)?;
-        arguments
-            .common
-            .remark(format_args!("reports: {}", context.folder().display()));
+        arguments.common.remark(format_args!("reports: {}", context.folder().display()));
     }
     context.verdict()
 }

@@ -9,11 +9,8 @@ use limitlab::solvers::{Method, Stop, run as solve};
 
 use crate::context::{Context, Item, Subject};
 
-pub const ALL: Item = Item {
-    id: "all-methods",
-    title: "Iterations of every method under every scheme on every mesh",
-    run,
-};
+pub const ALL: Item =
+    Item { id: "all-methods", title: "Iterations of every method under every scheme on every mesh", run };
 
 const STAND_INS: [&str; 9] = [
     "cube",
@@ -27,12 +24,7 @@ const STAND_INS: [&str; 9] = [
     "irregular-poly:1000",
 ];
 /// Meshes with convergence plots, one for every scheme they suit.
-const PLOTTED: [&str; 4] = [
-    "irregular-quad:1000",
-    "irregular-tri:1000",
-    "psb_m104_horse_233v",
-    "spot_2930v_quad",
-];
+const PLOTTED: [&str; 4] = ["irregular-quad:1000", "irregular-tri:1000", "psb_m104_horse_233v", "spot_2930v_quad"];
 /// The lines of a comparison that have a column.
 const COLUMNS: [(Method, &str); 18] = [
     (Method::Lu, ""),
@@ -83,11 +75,7 @@ fn empty_tables() -> Vec<Table> {
     TOLERANCES
         .iter()
         .map(|tolerance| {
-            let mut columns = vec![
-                Column::key("mesh"),
-                Column::key("scheme"),
-                Column::text("vertices"),
-            ];
+            let mut columns = vec![Column::key("mesh"), Column::key("scheme"), Column::text("vertices")];
             columns.extend(COLUMNS.map(|(method, variant)| Column::count(column_name(method, variant))));
             let mut table = Table::new(
                 format!("{}--{tolerance:e}", ALL.id),
@@ -118,27 +106,16 @@ fn one(context: &Context, subject: &Subject, scheme: Scheme, tables: &mut [Table
     let system = subject.system(scheme)?;
     let spectrum = spectrum(&system)?;
     let size = subject.mesh.diagonal();
-    let stop = Stop {
-        tolerance: TOLERANCES[2] * size,
-        max_iterations: LIMIT,
-    };
+    let stop = Stop { tolerance: TOLERANCES[2] * size, max_iterations: LIMIT };
     let mut rows: Vec<Vec<Cell>> = TOLERANCES
         .iter()
-        .map(|_| {
-            vec![
-                subject.name.as_str().into(),
-                scheme.name().into(),
-                subject.mesh.len().to_string().into(),
-            ]
-        })
+        .map(|_| vec![subject.name.as_str().into(), scheme.name().into(), subject.mesh.len().to_string().into()])
         .collect();
     let mut series = Vec::new();
     let lines = entries(&system, &spectrum, &Method::ALL, None, "file")?;
     for (method, variant) in COLUMNS {
         let name = column_name(method, variant);
-        let line = lines
-            .iter()
-            .find(|l| column_name(l.method, l.variant) == name);
+        let line = lines.iter().find(|l| column_name(l.method, l.variant) == name);
         let Some(line) = line else {
             // No bound of λ_min is proven for this mesh.
             rows.iter_mut().for_each(|row| row.push(Cell::Empty));

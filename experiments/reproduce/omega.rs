@@ -10,11 +10,8 @@ use limitlab::solvers::{Method, Stop};
 use crate::common;
 use crate::context::{Context, Item, Subject};
 
-pub const SWEEPS: Item = Item {
-    id: "omega-sweeps",
-    title: "Iterations over ω for Jacobi, PIA and SOR, predicted and measured",
-    run,
-};
+pub const SWEEPS: Item =
+    Item { id: "omega-sweeps", title: "Iterations over ω for Jacobi, PIA and SOR, predicted and measured", run };
 
 const STAND_INS: [(&str, Scheme); 5] = [
     ("torus:32x32", Scheme::CatmullClark),
@@ -65,10 +62,7 @@ fn run(context: &mut Context) -> Result<()> {
             .map(|(file, scheme)| Ok((context.model(file, Boundary::Refuse)?, *scheme)))
             .collect::<Result<_>>()?
     } else {
-        STAND_INS
-            .iter()
-            .map(|(name, scheme)| Ok((context.stand_in(name)?, *scheme)))
-            .collect::<Result<_>>()?
+        STAND_INS.iter().map(|(name, scheme)| Ok((context.stand_in(name)?, *scheme))).collect::<Result<_>>()?
     };
     if context.quick {
         subjects.truncate(QUICK);
@@ -79,61 +73,31 @@ fn run(context: &mut Context) -> Result<()> {
     context.table(summary)
 }
 
-fn one(
-    context: &mut Context,
-    subject: &Subject,
-    scheme: Scheme,
-    summary: &mut Table,
-) -> Result<()> {
+fn one(context: &mut Context, subject: &Subject, scheme: Scheme, summary: &mut Table) -> Result<()> {
     let system = subject.system(scheme)?;
-    let grids: Vec<(Method, Vec<f64>)> = METHODS
-        .iter()
-        .map(|&m| (m, common::default_grid(m)))
-        .collect();
+    let grids: Vec<(Method, Vec<f64>)> = METHODS.iter().map(|&m| (m, common::default_grid(m))).collect();
     let size = subject.mesh.diagonal();
-    let stop = Stop {
-        tolerance: TOLERANCE * size,
-        max_iterations: LIMIT,
-    };
-    let found = sweep(
-        &system,
-        &subject.mesh.positions,
-        &grids,
-        None,
-        &stop,
-        rounding_floor(size),
-        &|| {},
-    )?;
+    let stop = Stop { tolerance: TOLERANCE * size, max_iterations: LIMIT };
+    let found = sweep(&system, &subject.mesh.positions, &grids, None, &stop, rounding_floor(size), &|| {})?;
     for &method in &METHODS {
         let thresholds = found.thresholds.iter().find(|t| t.method == method);
         let best = found.best(method);
-        let diverged = found
-            .rows
-            .iter()
-            .find(|r| r.method == method && r.outcome == limitlab::solvers::Outcome::Diverged);
+        let diverged =
+            found.rows.iter().find(|r| r.method == method && r.outcome == limitlab::solvers::Outcome::Diverged);
         summary.push(vec![
             subject.name.as_str().into(),
             scheme.name().into(),
             method.name().into(),
             thresholds.map(|t| t.matrix.critical_omega()).into(),
-            thresholds
-                .and_then(|t| t.data)
-                .map(|d| d.critical_omega())
-                .into(),
+            thresholds.and_then(|t| t.data).map(|d| d.critical_omega()).into(),
             diverged.map(|r| r.omega).into(),
             thresholds.map(|t| t.matrix.optimal_omega()).into(),
             best.map(|r| r.omega).into(),
             best.map(|r| r.iterations).into(),
-            thresholds
-                .map(|t| t.matrix.radius(t.matrix.optimal_omega()))
-                .into(),
+            thresholds.map(|t| t.matrix.radius(t.matrix.optimal_omega())).into(),
         ]);
     }
-    let stem = format!(
-        "{}--{}-{scheme}",
-        SWEEPS.id,
-        subject.name.replace([':', ' '], "-")
-    );
+    let stem = format!("{}--{}-{scheme}", SWEEPS.id, subject.name.replace([':', ' '], "-"));
     let title = format!("{} under {scheme}", subject.name);
     let about = format!(
         "{} vertices, {} faces; start V = P; tolerance 10⁻¹⁰ of the bounding box's diagonal.",

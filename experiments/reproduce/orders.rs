@@ -9,26 +9,17 @@ use limitlab::solvers::Stop;
 
 use crate::context::{Context, Item, Subject};
 
-pub const ORDERS: Item = Item {
-    id: "orders",
-    title: "Gauss-Seidel and SOR in many vertex orders (open in Zheng-Cai §5)",
-    run,
-};
+pub const ORDERS: Item =
+    Item { id: "orders", title: "Gauss-Seidel and SOR in many vertex orders (open in Zheng-Cai §5)", run };
 
 const STAND_INS: [(&str, &[Scheme]); 4] = [
-    (
-        "torus:24x24",
-        &[Scheme::CatmullClark, Scheme::Nasri, Scheme::ZhengCai],
-    ),
+    ("torus:24x24", &[Scheme::CatmullClark, Scheme::Nasri, Scheme::ZhengCai]),
     ("irregular-quad:500", &[Scheme::CatmullClark, Scheme::Nasri]),
     ("icosphere:2", &[Scheme::Loop, Scheme::Sqrt3]),
     ("irregular-tri:500", &[Scheme::Loop, Scheme::ZhengCai]),
 ];
 const MODELS: [(&str, &[Scheme]); 2] = [
-    (
-        "closed/psb_m1630_hat_562v.off",
-        &[Scheme::ZhengCai, Scheme::Loop],
-    ),
+    ("closed/psb_m1630_hat_562v.off", &[Scheme::ZhengCai, Scheme::Loop]),
     ("closed/bob_334v_quad.off", &[Scheme::CatmullClark]),
 ];
 const OMEGAS: [f64; 2] = [1.0, 1.1];
@@ -65,10 +56,7 @@ fn run(context: &mut Context) -> Result<()> {
             .map(|(file, schemes)| Ok((context.model(file, Boundary::Refuse)?, *schemes)))
             .collect::<Result<_>>()?
     } else {
-        STAND_INS
-            .iter()
-            .map(|(name, schemes)| Ok((context.stand_in(name)?, *schemes)))
-            .collect::<Result<_>>()?
+        STAND_INS.iter().map(|(name, schemes)| Ok((context.stand_in(name)?, *schemes))).collect::<Result<_>>()?
     };
     if context.quick {
         return Ok(());
@@ -76,18 +64,8 @@ fn run(context: &mut Context) -> Result<()> {
     for (subject, schemes) in &mut subjects {
         for &scheme in *schemes {
             let system = subject.system(scheme)?;
-            let stop = Stop {
-                tolerance: TOLERANCE * subject.mesh.diagonal(),
-                max_iterations: 10_000,
-            };
-            let rows = order_study(
-                &subject.mesh,
-                &subject.topology,
-                &system,
-                &OMEGAS,
-                RANDOM,
-                &stop,
-            )?;
+            let stop = Stop { tolerance: TOLERANCE * subject.mesh.diagonal(), max_iterations: 10_000 };
+            let rows = order_study(&subject.mesh, &subject.topology, &system, &OMEGAS, RANDOM, &stop)?;
             push(&mut table, &subject.name, scheme, &rows);
         }
     }
@@ -113,12 +91,7 @@ fn push(table: &mut Table, mesh: &str, scheme: Scheme, rows: &[Row]) {
             continue;
         };
         for (k, name) in ["least", "mean", "greatest"].into_iter().enumerate() {
-            line(
-                omega,
-                format!("random, {name}"),
-                Some(spread.rho[k]),
-                spread.iterations[k],
-            );
+            line(omega, format!("random, {name}"), Some(spread.rho[k]), spread.iterations[k]);
         }
     }
 }

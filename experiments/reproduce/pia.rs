@@ -12,11 +12,7 @@ use limitlab::report::{Column, Table};
 
 use crate::context::{Context, Item, Subject};
 
-pub const TABLE1: Item = Item {
-    id: "pia-table1",
-    title: "PIA Table 1: iterations and errors at 10⁻³",
-    run,
-};
+pub const TABLE1: Item = Item { id: "pia-table1", title: "PIA Table 1: iterations and errors at 10⁻³", run };
 
 /// The paper's tolerance, in the units of the mesh.
 const TOLERANCE: f64 = 1e-3;
@@ -143,13 +139,7 @@ fn run(context: &mut Context) -> Result<()> {
                 _ => Boundary::Refuse,
             };
             let subject = context.model(line.file, boundary)?;
-            row(
-                &mut table,
-                line.model,
-                &subject,
-                line.reading,
-                Some(line.printed),
-            )?;
+            row(&mut table, line.model, &subject, line.reading, Some(line.printed))?;
         }
     } else {
         for (name, reading) in STAND_INS {
@@ -170,17 +160,14 @@ fn row(
     let system = match reading {
         Reading::Loop | Reading::LoopOpen => subject.system(Scheme::Loop)?,
         Reading::CatmullClark => subject.system(Scheme::CatmullClark)?,
-        Reading::TwoStepsBack => {
-            LimitSystem::with_masks(&subject.mesh, &subject.topology, &TwoStepsBack)?
-        }
+        Reading::TwoStepsBack => LimitSystem::with_masks(&subject.mesh, &subject.topology, &TwoStepsBack)?,
     };
     let run = passes(&system, &subject.mesh.positions, TOLERANCE, LIMIT);
     let near = |measured: f64, printed: f64| (measured - printed).abs() <= AGREEMENT * printed;
     let verdict = match printed {
         None => "not the paper's model",
         Some((iterations, max, mean)) => {
-            if run.passes == iterations && near(run.errors.max, max) && near(run.errors.mean, mean)
-            {
+            if run.passes == iterations && near(run.errors.max, max) && near(run.errors.mean, mean) {
                 "reproduced"
             } else if matches!(reading, Reading::CatmullClark) {
                 "corrected: the true limit mask"

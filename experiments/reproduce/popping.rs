@@ -7,18 +7,11 @@ use limitlab::report::{Column, Figure, LinePlot, Rule, Series, Table};
 
 use crate::context::{Context, Item, Subject};
 
-pub const POPPING: Item = Item {
-    id: "popping",
-    title: "Lin-Luo §5: how far the unified √3 surface shrinks or bulges over α",
-    run,
-};
+pub const POPPING: Item =
+    Item { id: "popping", title: "Lin-Luo §5: how far the unified √3 surface shrinks or bulges over α", run };
 
 const STAND_INS: [&str; 3] = ["icosahedron", "icosphere:1", "irregular-tri:300"];
-const MODELS: [&str; 3] = [
-    "closed/psb_m104_horse_233v.off",
-    "closed/bunny_1839v.off",
-    "closed/fox_313v.off",
-];
+const MODELS: [&str; 3] = ["closed/psb_m104_horse_233v.off", "closed/bunny_1839v.off", "closed/fox_313v.off"];
 /// α in eighths, up to 2.
 const EIGHTHS: std::ops::RangeInclusive<usize> = 0..=16;
 /// Steps: the volume is then within about 3⁻⁵ of the limit's change.
@@ -46,15 +39,9 @@ fn run(context: &mut Context) -> Result<()> {
          along the normals. The jump that a viewer sees between mesh and surface is least where the ratio passes 1."
     ));
     let mut subjects: Vec<Subject> = if context.real() {
-        MODELS
-            .iter()
-            .map(|file| context.model(file, Boundary::Refuse))
-            .collect::<Result<_>>()?
+        MODELS.iter().map(|file| context.model(file, Boundary::Refuse)).collect::<Result<_>>()?
     } else {
-        STAND_INS
-            .iter()
-            .map(|name| context.stand_in(name))
-            .collect::<Result<_>>()?
+        STAND_INS.iter().map(|name| context.stand_in(name)).collect::<Result<_>>()?
     };
     if context.quick {
         subjects.truncate(1);

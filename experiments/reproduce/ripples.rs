@@ -21,13 +21,7 @@ pub const RIPPLES: Item = Item {
 const METHODS: [(&str, Setup); 4] = [
     ("pia", Setup::Pia { omega: 1.0 }),
     ("thall", Setup::THALL),
-    (
-        "gauss-seidel",
-        Setup::Sor {
-            omega: 1.0,
-            order: None,
-        },
-    ),
+    ("gauss-seidel", Setup::Sor { omega: 1.0, order: None }),
     ("cg", Setup::Cg),
 ];
 /// Iterates with a row, besides the last.
@@ -73,21 +67,10 @@ fn run(context: &mut Context) -> Result<()> {
     let mut normals = limit_normals(&fairest.mesh, &topology)?;
     normals.truncate(subject.mesh.len());
     let size = subject.mesh.diagonal();
-    let stop = Stop {
-        tolerance: TOLERANCE * size,
-        max_iterations: 1000,
-    };
+    let stop = Stop { tolerance: TOLERANCE * size, max_iterations: 1000 };
     let (mut energies, mut deviations) = (Vec::new(), Vec::new());
     for (name, setup) in METHODS {
-        let (rows, _) = follow(
-            &subject.mesh,
-            &subject.topology,
-            &system,
-            &fairness,
-            &normals,
-            setup,
-            &stop,
-        )?;
+        let (rows, _) = follow(&subject.mesh, &subject.topology, &system, &fairness, &normals, setup, &stop)?;
         let last = rows.len().saturating_sub(1);
         for row in &rows {
             if !SHOWN.contains(&row.iteration) && row.iteration != last {
@@ -105,16 +88,9 @@ fn run(context: &mut Context) -> Result<()> {
             ]);
         }
         let curve = |value: &dyn Fn(&limitlab::interpolate::halstead::Row) -> f64| {
-            Series::line(
-                name,
-                rows.iter()
-                    .map(|row| (row.errors.max / size, value(row)))
-                    .collect::<Vec<_>>(),
-            )
+            Series::line(name, rows.iter().map(|row| (row.errors.max / size, value(row))).collect::<Vec<_>>())
         };
-        energies.push(curve(&|row| {
-            row.energies.thin_plate / fairest.energies.thin_plate
-        }));
+        energies.push(curve(&|row| row.energies.thin_plate / fairest.energies.thin_plate));
         deviations.push(curve(&|row| row.deviation_mean.to_degrees()));
     }
     context.table(table)?;
@@ -127,10 +103,7 @@ fn run(context: &mut Context) -> Result<()> {
     };
     context.figure(
         RIPPLES.id,
-        &Figure::stack([
-            panel("thin plate / fairest", energies),
-            panel("mean deviation (°)", deviations),
-        ])
-        .title(format!("{}: ripples against accuracy", subject.name)),
+        &Figure::stack([panel("thin plate / fairest", energies), panel("mean deviation (°)", deviations)])
+            .title(format!("{}: ripples against accuracy", subject.name)),
     )
 }

@@ -8,11 +8,7 @@ use limitlab::report::{Column, Figure, SparsityPlot, Table};
 
 use crate::context::{Context, Item};
 
-pub const PATTERNS: Item = Item {
-    id: "sparsity",
-    title: "The pattern of A before and after reordering",
-    run,
-};
+pub const PATTERNS: Item = Item { id: "sparsity", title: "The pattern of A before and after reordering", run };
 
 const ORDERS: [Order; 4] = [Order::File, Order::Rcm, Order::Morton, Order::Random(1)];
 
@@ -42,10 +38,7 @@ fn run(context: &mut Context) -> Result<()> {
         let entries = || {
             (0..system.len()).flat_map(|i| {
                 let place = &place;
-                pattern
-                    .row(i)
-                    .iter()
-                    .map(move |&j| (place[i], place[j as usize]))
+                pattern.row(i).iter().map(move |&j| (place[i], place[j as usize]))
             })
         };
         let bandwidth = entries().map(|(i, j)| i.abs_diff(j)).max().unwrap_or(0);
@@ -63,8 +56,5 @@ fn run(context: &mut Context) -> Result<()> {
     let mut figure = Figure::row(panels);
     figure.columns = 2;
     (figure.width, figure.height) = (560, 600);
-    context.figure(
-        PATTERNS.id,
-        &figure.title(format!("{} under catmull-clark", subject.name)),
-    )
+    context.figure(PATTERNS.id, &figure.title(format!("{} under catmull-clark", subject.name)))
 }

@@ -8,11 +8,8 @@ use limitlab::report::{Column, Figure, LinePlot, Rule, Table};
 
 use crate::context::{Context, Item};
 
-pub const VALENCES: Item = Item {
-    id: "valences",
-    title: "The spectrum against valence: which vertices slow which method",
-    run,
-};
+pub const VALENCES: Item =
+    Item { id: "valences", title: "The spectrum against valence: which vertices slow which method", run };
 
 const STUDIED: [usize; 10] = [3, 4, 5, 6, 7, 8, 12, 20, 30, 50];
 const SCHEMES: [Scheme; 2] = [Scheme::CatmullClark, Scheme::Loop];
@@ -67,28 +64,22 @@ fn run(context: &mut Context) -> Result<()> {
                 row.limiting_jacobi.peak_valence.to_string().into(),
             ]);
         }
-        context.figure(
-            &format!("{}--{scheme}", VALENCES.id),
-            &histograms(scheme, &rows),
-        )?;
+        context.figure(&format!("{}--{scheme}", VALENCES.id), &histograms(scheme, &rows))?;
     }
     context.table(table)
 }
 
 fn histograms(scheme: Scheme, rows: &[Row]) -> Figure {
     let band = regular_band(scheme);
-    let panels = rows
-        .iter()
-        .filter(|r| DRAWN.contains(&r.valence))
-        .map(|row| LinePlot {
-            title: format!("valence {}", row.valence),
-            x_label: "eigenvalue of A".into(),
-            y_label: "eigenvalues".into(),
-            x_range: Some((0.0, 1.0)),
-            bars: vec![Bars::histogram("", &row.a, BINS)],
-            vertical_lines: vec![Rule::new(band.a.0, "regular band")],
-            ..LinePlot::default()
-        });
+    let panels = rows.iter().filter(|r| DRAWN.contains(&r.valence)).map(|row| LinePlot {
+        title: format!("valence {}", row.valence),
+        x_label: "eigenvalue of A".into(),
+        y_label: "eigenvalues".into(),
+        x_range: Some((0.0, 1.0)),
+        bars: vec![Bars::histogram("", &row.a, BINS)],
+        vertical_lines: vec![Rule::new(band.a.0, "regular band")],
+        ..LinePlot::default()
+    });
     let mut figure = Figure::stack(panels);
     figure.height = 640;
     figure.title(format!("Spectra of A under {scheme}"))

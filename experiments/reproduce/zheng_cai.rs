@@ -38,20 +38,11 @@ const DENSE_QUICK: usize = 1000;
 fn run(context: &mut Context) -> Result<()> {
     let subjects: Vec<(Subject, Option<usize>)> = if context.real() {
         vec![
-            (
-                context.model("closed/psb_m1630_hat_562v.off", Boundary::Refuse)?,
-                Some(3),
-            ),
-            (
-                context.model("closed/spot_11533v.off", Boundary::Refuse)?,
-                None,
-            ),
+            (context.model("closed/psb_m1630_hat_562v.off", Boundary::Refuse)?, Some(3)),
+            (context.model("closed/spot_11533v.off", Boundary::Refuse)?, None),
         ]
     } else {
-        vec![
-            (context.stand_in("irregular-tri:562")?, None),
-            (context.stand_in("irregular-tri:11540")?, None),
-        ]
+        vec![(context.stand_in("irregular-tri:562")?, None), (context.stand_in("irregular-tri:11540")?, None)]
     };
     let mut columns = vec![
         Column::key("mesh"),
@@ -99,12 +90,8 @@ fn run(context: &mut Context) -> Result<()> {
         let size = subject.mesh.diagonal();
         let (updates, error) = updates(&system, points, size);
         let sweeps = updates.len();
-        let mut row = vec![
-            subject.name.as_str().into(),
-            system.len().to_string().into(),
-            printed.into(),
-            sweeps.into(),
-        ];
+        let mut row =
+            vec![subject.name.as_str().into(), system.len().to_string().into(), printed.into(), sweeps.into()];
         row.extend((0..SHOWN).map(|k| updates.get(k).map(|u| 100.0 * u).into()));
         row.push((100.0 * error).into());
         row.push(
@@ -126,14 +113,8 @@ fn run(context: &mut Context) -> Result<()> {
 fn updates(system: &LimitSystem, points: &[DVec3], size: f64) -> (Vec<f64>, f64) {
     let mut before = points.to_vec();
     let mut updates: Vec<f64> = Vec::new();
-    let stop = Stop {
-        tolerance: 0.0,
-        max_iterations: 1000,
-    };
-    let setup = Setup::Sor {
-        omega: 1.0,
-        order: None,
-    };
+    let stop = Stop { tolerance: 0.0, max_iterations: 1000 };
+    let setup = Setup::Sor { omega: 1.0, order: None };
     let solution = run_watched(system, points, setup, &stop, &mut |step| {
         if step.iteration > 0 {
             updates.push(largest_update(&before, step.points) / size);
@@ -148,18 +129,10 @@ fn updates(system: &LimitSystem, points: &[DVec3], size: f64) -> (Vec<f64>, f64)
 }
 
 fn largest_update(before: &[DVec3], after: &[DVec3]) -> f64 {
-    before
-        .iter()
-        .zip(after)
-        .map(|(a, b)| a.distance(*b))
-        .fold(0.0, f64::max)
+    before.iter().zip(after).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
 }
 
-fn timing(
-    context: &Context,
-    subject: &Subject,
-    system: &LimitSystem,
-) -> Result<Vec<limitlab::report::Cell>> {
+fn timing(context: &Context, subject: &Subject, system: &LimitSystem) -> Result<Vec<limitlab::report::Cell>> {
     let points = &subject.mesh.positions;
     let threshold = THRESHOLD * subject.mesh.diagonal();
     // The loop of the paper: sweep, largest update, threshold.
@@ -178,10 +151,7 @@ fn timing(
     let nasri = subject.system(Scheme::Nasri)?;
     let most = if context.quick { DENSE_QUICK } else { DENSE };
     let dense = (nasri.len() <= most).then(|| dense_seconds(&nasri, points));
-    let stop = Stop {
-        tolerance: 1e-10 * subject.mesh.diagonal(),
-        max_iterations: 10,
-    };
+    let stop = Stop { tolerance: 1e-10 * subject.mesh.diagonal(), max_iterations: 10 };
     let direct = |setup: Setup| {
         let solution = solve(&nasri, points, setup, &stop);
         solution.setup_seconds + solution.solve_seconds

@@ -41,30 +41,17 @@ impl Plain {
             greatest = greatest.max(incidence.face_count(v));
         }
         let face = |steps| {
-            if scheme.edges_only() {
-                0.0
-            } else {
-                scheme.face_weight(size, steps)
-            }
+            if scheme.edges_only() { 0.0 } else { scheme.face_weight(size, steps) }
         };
         let weights = (0..=greatest)
             .map(|n| {
                 let n = n.max(1);
                 let h = scheme.h(n);
                 let own = scheme.vertex_weight(n) + n as f64 * face(0);
-                [
-                    h * own,
-                    h * (scheme.edge_weight() + face(1) + face(size - 1)),
-                    h * face(2),
-                ]
+                [h * own, h * (scheme.edge_weight() + face(1) + face(size - 1)), h * face(2)]
             })
             .collect();
-        Some(Plain {
-            offsets,
-            neighbours,
-            weights,
-            per_face,
-        })
+        Some(Plain { offsets, neighbours, weights, per_face })
     }
 
     fn row(&self, i: usize, x: &[DVec3]) -> DVec3 {
@@ -106,28 +93,15 @@ impl Plain {
         let mut work = vec![DVec3::ZERO; n];
         for iteration in 0.. {
             self.product(&x, &mut work);
-            work.par_iter_mut()
-                .zip(points)
-                .with_min_len(CHUNK)
-                .for_each(|(w, p)| *w = *p - *w);
-            let largest = work
-                .par_iter()
-                .with_min_len(CHUNK)
-                .map(|e| e.length_squared())
-                .reduce(|| 0.0, f64::max);
+            work.par_iter_mut().zip(points).with_min_len(CHUNK).for_each(|(w, p)| *w = *p - *w);
+            let largest = work.par_iter().with_min_len(CHUNK).map(|e| e.length_squared()).reduce(|| 0.0, f64::max);
             let converged = largest.sqrt() <= tolerance;
             if converged || iteration == most {
                 return (x, iteration, converged);
             }
             let (gamma, tau) = recurrence.coefficients();
-            step.par_iter_mut()
-                .zip(&work)
-                .with_min_len(CHUNK)
-                .for_each(|(s, e)| *s = gamma * *s + tau * *e);
-            x.par_iter_mut()
-                .zip(&step)
-                .with_min_len(CHUNK)
-                .for_each(|(x, s)| *x += *s);
+            step.par_iter_mut().zip(&work).with_min_len(CHUNK).for_each(|(s, e)| *s = gamma * *s + tau * *e);
+            x.par_iter_mut().zip(&step).with_min_len(CHUNK).for_each(|(x, s)| *x += *s);
             recurrence.step();
         }
         unreachable!("the loop ends by its own conditions")

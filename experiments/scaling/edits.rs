@@ -45,31 +45,20 @@ pub fn edits_table(tol: f64) -> Table {
 }
 
 /// Edits of one mesh, for 1, 10, 100, … points, up to a tenth of all.
-pub fn edits(
-    name: &str,
-    mesh: &Mesh,
-    scheme: Scheme,
-    tol: f64,
-    table: &mut Table,
-) -> Result<Operator> {
+pub fn edits(name: &str, mesh: &Mesh, scheme: Scheme, tol: f64, table: &mut Table) -> Result<Operator> {
     let n = mesh.len();
     let topology = Topology::new(&mesh.faces, n);
     let fronts = in_fronts(&mesh.faces, &topology.incidence);
     let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&fronts))?;
     let points = fronts.there(&mesh.positions);
     let length = mesh.diagonal();
-    let stop = Stop {
-        tolerance: tol * length,
-        max_iterations: 10_000,
-    };
+    let stop = Stop { tolerance: tol * length, max_iterations: 10_000 };
     let (control, _) = mixed::solve(&operator, &points, &stop);
     let mut editor = Editor::new(&operator, points, control);
     for count in (0..).map(|k| 10usize.pow(k)).take_while(|c| 10 * c <= n) {
         let shift = DVec3::new(0.01, 0.0, 0.0) * length;
-        let moves: Vec<(u32, DVec3)> = (0..count)
-            .map(|k| (2 * k + 1) * n / (2 * count))
-            .map(|v| (v as u32, editor.points()[v] + shift))
-            .collect();
+        let moves: Vec<(u32, DVec3)> =
+            (0..count).map(|k| (2 * k + 1) * n / (2 * count)).map(|v| (v as u32, editor.points()[v] + shift)).collect();
         let start = Instant::now();
         let edit = editor.edit(&moves, stop.tolerance, usize::MAX);
         let edit_seconds = start.elapsed().as_secs_f64();
@@ -118,11 +107,7 @@ pub fn decay_table(columns: &[(String, Operator)]) -> Result<Table> {
         let vertex = operator.len() / 2;
         let rings = decay(operator, vertex, 1e-12);
         let proven = operator.bounds().lambda_min;
-        let least = if proven > 0.0 {
-            proven
-        } else {
-            interval(operator, Which::A)?.low
-        };
+        let least = if proven > 0.0 { proven } else { interval(operator, Which::A)?.low };
         let root = (1.0 / least).sqrt();
         let h = operator.weights();
         let greatest = h.iter().copied().fold(0.0, f64::max);
@@ -136,9 +121,7 @@ pub fn decay_table(columns: &[(String, Operator)]) -> Result<Table> {
                 entry.into(),
                 ratio.into(),
                 // At the vertex itself ‖A⁻¹‖ is all that is known.
-                ring.checked_sub(1)
-                    .map(|_| factor * rate.powi(ring as i32))
-                    .into(),
+                ring.checked_sub(1).map(|_| factor * rate.powi(ring as i32)).into(),
             ]);
         }
     }

@@ -17,14 +17,11 @@ pub fn triad() -> f64 {
     for _ in 0..8 {
         let s = black_box(3.0);
         let start = Instant::now();
-        a.par_chunks_mut(CHUNK)
-            .zip(b.par_chunks(CHUNK))
-            .zip(c.par_chunks(CHUNK))
-            .for_each(|((a, b), c)| {
-                for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
-                    *a = b + s * c;
-                }
-            });
+        a.par_chunks_mut(CHUNK).zip(b.par_chunks(CHUNK)).zip(c.par_chunks(CHUNK)).for_each(|((a, b), c)| {
+            for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
+                *a = b + s * c;
+            }
+        });
         black_box(&a);
         best = best.min(start.elapsed().as_secs_f64());
     }

@@ -26,9 +26,7 @@ use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::order::{Numbering, Order};
 use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Faces, Incidence, Mesh, Topology, builtin::builtin, io};
-use limitlab::report::{
-    Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette,
-};
+use limitlab::report::{Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette};
 use limitlab::solvers::chebyshev::Chebyshev;
 use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use limitlab::solvers::gauss_seidel::{by_colours, in_waves};
@@ -41,18 +39,10 @@ use limitlab::solvers::{Method, Report, Setup, Stop, run, solve};
 #[command(name = "scaling", version)]
 struct Arguments {
     /// Numbers of vertices
-    #[arg(
-        long,
-        value_name = "N,N,…",
-        default_value = "1000,10000,100000,1000000"
-    )]
+    #[arg(long, value_name = "N,N,…", default_value = "1000,10000,100000,1000000")]
     sizes: List<usize>,
     /// Schemes
-    #[arg(
-        long,
-        value_name = "NAME,…",
-        default_value = "catmull-clark,loop,sqrt3,nasri,zheng-cai"
-    )]
+    #[arg(long, value_name = "NAME,…", default_value = "catmull-clark,loop,sqrt3,nasri,zheng-cai")]
     scheme: List<Scheme>,
     /// Cholesky up to this many vertices
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
@@ -162,9 +152,7 @@ fn measure(arguments: &Arguments) -> Result<()> {
         cli::print(&profile.to_markdown())?;
     }
     cli::print(&table.to_markdown())?;
-    arguments
-        .common
-        .remark(format_args!("tables and plot: {}", arguments.out.display()));
+    arguments.common.remark(format_args!("tables and plot: {}", arguments.out.display()));
     Ok(())
 }
 
@@ -282,12 +270,7 @@ fn estimate(scheme: Scheme) -> Result<f64> {
     Ok(0.98 * spectrum(&system)?.a.min)
 }
 
-fn of_scheme(
-    arguments: &Arguments,
-    scheme: Scheme,
-    bandwidth: f64,
-    table: &mut Table,
-) -> Result<[LinePlot; 2]> {
+fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut Table) -> Result<[LinePlot; 2]> {
     let estimate = estimate(scheme)?;
     let mut curves: Vec<Curve> = Vec::new();
     let mut bound = Vec::new();
@@ -310,9 +293,7 @@ fn of_scheme(
                     continue;
                 }
                 progress.message(format!("{name}: {}", way.name()));
-                let Some((seconds, outcome, memory)) =
-                    timed(arguments, mesh, scheme, way, estimate)?
-                else {
+                let Some((seconds, outcome, memory)) = timed(arguments, mesh, scheme, way, estimate)? else {
                     continue;
                 };
                 progress.step();
@@ -330,16 +311,10 @@ fn of_scheme(
                     memory.map(|m| m as f64 / 1e6).into(),
                 ]);
                 let at = (mesh.len() as f64, 1e9 * seconds / mesh.len() as f64);
-                let known = curves
-                    .iter_mut()
-                    .find(|c| c.way == way && c.random == random);
+                let known = curves.iter_mut().find(|c| c.way == way && c.random == random);
                 match known {
                     Some(curve) => curve.points.push(at),
-                    None => curves.push(Curve {
-                        way,
-                        random,
-                        points: vec![at],
-                    }),
+                    None => curves.push(Curve { way, random, points: vec![at] }),
                 }
                 if way == Way::Free(Method::Chebyshev) && !random {
                     // What a fused iteration in double precision must move, as often.
@@ -375,19 +350,12 @@ fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) ->
         .map(|c| {
             let (colour, marker) = look(c.way);
             let name = if random { c.way.name() } else { String::new() };
-            Series::line(name, c.points.iter().copied())
-                .colour(colour)
-                .marker(marker)
-                .dash(Dash::Solid)
+            Series::line(name, c.points.iter().copied()).colour(colour).marker(marker).dash(Dash::Solid)
         })
         .collect();
     if bound.len() > 1 {
         let name = if random { "bandwidth bound" } else { "" };
-        series.push(
-            Series::line(name, bound.iter().copied())
-                .colour(Colour(0, 0, 0))
-                .dash(Dash::Dotted),
-        );
+        series.push(Series::line(name, bound.iter().copied()).colour(Colour(0, 0, 0)).dash(Dash::Dotted));
     }
     LinePlot {
         title: format!("{scheme}, {} order", if random { "random" } else { "good" }),
@@ -452,10 +420,7 @@ fn timed(
 fn file_to_file([from, to]: &[PathBuf; 2], scheme: Scheme, tol: f64) -> Result<Outcome> {
     let mesh = io::read(from)?.mesh;
     let name = from.display().to_string();
-    let stop = Stop {
-        tolerance: tol * mesh.diagonal(),
-        max_iterations: 10_000,
-    };
+    let stop = Stop { tolerance: tol * mesh.diagonal(), max_iterations: 10_000 };
     let found = match renumbered(&mesh) {
         Some(moved) => {
             let report = validate(&moved.mesh, None, Boundary::Refuse);
@@ -468,11 +433,7 @@ fn file_to_file([from, to]: &[PathBuf; 2], scheme: Scheme, tol: f64) -> Result<O
     };
     let (iterations, status) = (found.report.iterations, found.report.outcome.name());
     io::write(to, &Mesh::new(found.points, mesh.faces), None)?;
-    Ok(Outcome {
-        iterations,
-        status,
-        solve_seconds: found.solve_seconds,
-    })
+    Ok(Outcome { iterations, status, solve_seconds: found.solve_seconds })
 }
 
 type Number = fn(&Faces, &Incidence) -> Numbering;
@@ -481,10 +442,7 @@ type Sweeps = fn(&Operator, &[DVec3], f64, &Stop) -> (Vec<DVec3>, Report);
 /// One run from faces in memory to control points; `None` if the way does not suit the mesh.
 fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<Option<Outcome>> {
     let points = &mesh.positions;
-    let stop = Stop {
-        tolerance: tol * mesh.diagonal(),
-        max_iterations: 10_000,
-    };
+    let stop = Stop { tolerance: tol * mesh.diagonal(), max_iterations: 10_000 };
     let start = |seconds: &mut f64, since: Instant| *seconds = since.elapsed().as_secs_f64();
     let mut solve_seconds = 0.0;
     let outcome = match way {
@@ -506,15 +464,7 @@ fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<
             let (_, iterations, converged) =
                 plain.chebyshev(points, (estimate, 1.0), stop.tolerance, stop.max_iterations);
             start(&mut solve_seconds, since);
-            Outcome {
-                iterations,
-                status: if converged {
-                    "converged"
-                } else {
-                    "max-iterations"
-                },
-                solve_seconds,
-            }
+            Outcome { iterations, status: if converged { "converged" } else { "max-iterations" }, solve_seconds }
         }
         Way::Waves | Way::Colours => {
             let topology = Topology::new(&mesh.faces, mesh.len());
@@ -529,11 +479,7 @@ fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<
             let (control, report) = sweeps(&operator, &moved, 1.0, &stop);
             numbering.back(&control);
             start(&mut solve_seconds, since);
-            Outcome {
-                iterations: report.iterations,
-                status: report.outcome.name(),
-                solve_seconds,
-            }
+            Outcome { iterations: report.iterations, status: report.outcome.name(), solve_seconds }
         }
         Way::Free(method) => {
             let topology = Topology::new(&mesh.faces, mesh.len());
@@ -545,27 +491,16 @@ fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<
             } else {
                 Box::new(Chebyshev::new(&operator, points, (estimate, 1.0)))
             };
-            let report = solve(iterate.as_mut(), &stop, &mut |_| {
-                std::ops::ControlFlow::Continue(())
-            });
+            let report = solve(iterate.as_mut(), &stop, &mut |_| std::ops::ControlFlow::Continue(()));
             start(&mut solve_seconds, since);
-            Outcome {
-                iterations: report.iterations,
-                status: report.outcome.name(),
-                solve_seconds,
-            }
+            Outcome { iterations: report.iterations, status: report.outcome.name(), solve_seconds }
         }
         Way::Stored(method) => {
             let topology = Topology::new(&mesh.faces, mesh.len());
             let system = LimitSystem::new(mesh, &topology, scheme)?;
             let setup = match method {
-                Method::Chebyshev => Setup::Chebyshev {
-                    spectrum: (estimate, 1.0),
-                },
-                Method::GaussSeidel => Setup::Sor {
-                    omega: 1.0,
-                    order: None,
-                },
+                Method::Chebyshev => Setup::Chebyshev { spectrum: (estimate, 1.0) },
+                Method::GaussSeidel => Setup::Sor { omega: 1.0, order: None },
                 Method::PcgIc0 => Setup::PcgIc0,
                 Method::Lu => Setup::Lu,
                 _ => Setup::Cholesky,
@@ -573,11 +508,7 @@ fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<
             let since = Instant::now();
             let solution = run(&system, points, setup, &stop);
             start(&mut solve_seconds, since);
-            Outcome {
-                iterations: solution.report.iterations,
-                status: solution.report.outcome.name(),
-                solve_seconds,
-            }
+            Outcome { iterations: solution.report.iterations, status: solution.report.outcome.name(), solve_seconds }
         }
     };
     Ok(Some(outcome))

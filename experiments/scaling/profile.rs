@@ -99,24 +99,9 @@ fn kernels(mesh: &Mesh, scheme: Scheme, table: &mut Table) -> Result<f64> {
             seconds,
         );
     }
-    push(
-        "stored matrix, fused, double",
-        double + 12.0 * entries + 4.0,
-        stored_flops,
-        iterations(&explicit, points),
-    );
-    push(
-        "matrix-free, fused, double, file order",
-        double + index(&free),
-        free_flops,
-        iterations(&free, points),
-    );
-    push(
-        "matrix-free, fused, double, front order",
-        double + index(&front),
-        free_flops,
-        iterations(&front, &moved),
-    );
+    push("stored matrix, fused, double", double + 12.0 * entries + 4.0, stored_flops, iterations(&explicit, points));
+    push("matrix-free, fused, double, file order", double + index(&free), free_flops, iterations(&free, points));
+    push("matrix-free, fused, double, front order", double + index(&front), free_flops, iterations(&front, &moved));
     let mut rows = Rows::new(mesh.len());
     let mut image = moved.clone();
     let mut nothing = vec![(); mesh.len()];
@@ -138,24 +123,9 @@ fn kernels(mesh: &Mesh, scheme: Scheme, table: &mut Table) -> Result<f64> {
     let alone = Wavefront::in_bands(&front, None);
     let grouped = Wavefront::new(&front);
     let without_norm = free_flops - 6.0;
-    push(
-        "matrix-free, single, one by one",
-        single + index(&front),
-        without_norm,
-        waves(&alone, &singles),
-    );
-    push(
-        "matrix-free, double, in groups",
-        double + index(&front),
-        without_norm,
-        waves(&grouped, &moved),
-    );
-    push(
-        "matrix-free, single, in groups",
-        single + index(&front),
-        without_norm,
-        waves(&grouped, &singles),
-    );
+    push("matrix-free, single, one by one", single + index(&front), without_norm, waves(&alone, &singles));
+    push("matrix-free, double, in groups", double + index(&front), without_norm, waves(&grouped, &moved));
+    push("matrix-free, single, in groups", single + index(&front), without_norm, waves(&grouped, &singles));
     // The iterate is read and written, the points and the diagonal are read; no norm, no momentum.
     let sweep = 3.0 * 24.0 + 8.0;
     let sweep_flops = free_flops - 12.0;
@@ -167,27 +137,12 @@ fn kernels(mesh: &Mesh, scheme: Scheme, table: &mut Table) -> Result<f64> {
         });
         push(kernel, sweep + index(operator), sweep_flops, seconds);
     };
-    sweeps(
-        "Gauss-Seidel, front order, one by one",
-        &front,
-        &moved,
-        &|k, p, x| alone.relax(1.0, k, p, x),
-    );
-    sweeps(
-        "Gauss-Seidel, front order, in waves",
-        &front,
-        &moved,
-        &|k, p, x| grouped.relax(1.0, k, p, x),
-    );
+    sweeps("Gauss-Seidel, front order, one by one", &front, &moved, &|k, p, x| alone.relax(1.0, k, p, x));
+    sweeps("Gauss-Seidel, front order, in waves", &front, &moved, &|k, p, x| grouped.relax(1.0, k, p, x));
     let colours = in_colours(&mesh.faces, &topology.incidence);
     let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&colours))?;
     let coloured = Coloured::new(&operator);
-    sweeps(
-        "Gauss-Seidel, by colours",
-        &operator,
-        &colours.there(points),
-        &|k, p, x| coloured.relax(1.0, k, p, x),
-    );
+    sweeps("Gauss-Seidel, by colours", &operator, &colours.there(points), &|k, p, x| coloured.relax(1.0, k, p, x));
     Ok(bandwidth)
 }
 

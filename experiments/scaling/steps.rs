@@ -57,11 +57,7 @@ pub fn steps(n: usize, folder: &Path) -> Result<()> {
                 let mut rows = Rows {
                     table: &mut table,
                     mesh,
-                    keys: [
-                        format!("irregular-{name}:{n}"),
-                        order.into(),
-                        threads.to_string(),
-                    ],
+                    keys: [format!("irregular-{name}:{n}"), order.into(), threads.to_string()],
                 };
                 on_threads(threads, || rows.measure(folder))??;
             }
@@ -82,12 +78,8 @@ struct Rows<'a> {
 impl Rows<'_> {
     fn measure(&mut self, folder: &Path) -> Result<()> {
         let mesh = self.mesh;
-        self.plain("topology", "", || {
-            Ok(Topology::new(&mesh.faces, mesh.len()))
-        })?;
-        self.plain("validation", "", || {
-            validate(mesh, None, Boundary::Refuse).into_topology("mesh")
-        })?;
+        self.plain("topology", "", || Ok(Topology::new(&mesh.faces, mesh.len())))?;
+        self.plain("validation", "", || validate(mesh, None, Boundary::Refuse).into_topology("mesh"))?;
         let triangles = mesh.faces.uniform_size() == Some(3);
         for scheme in Scheme::ALL {
             if scheme.needs_triangles() == triangles {
@@ -129,11 +121,7 @@ impl Rows<'_> {
         Ok(())
     }
 
-    fn refinement(
-        &mut self,
-        scheme: &str,
-        step: impl Fn(&Mesh, &Topology) -> Result<(Mesh, Topology)>,
-    ) -> Result<()> {
+    fn refinement(&mut self, scheme: &str, step: impl Fn(&Mesh, &Topology) -> Result<(Mesh, Topology)>) -> Result<()> {
         let mesh = self.mesh;
         let topology = validate(mesh, None, Boundary::Refuse).into_topology("mesh")?;
         let (seconds, (fine, _)) = fastest(|| step(mesh, &topology))?;
@@ -146,9 +134,7 @@ impl Rows<'_> {
 
     fn files(&mut self, path: &Path, ending: &str) -> Result<()> {
         let (seconds, ()) = fastest(|| io::write(path, self.mesh, None))?;
-        let bytes = std::fs::metadata(path)
-            .map_err(|e| Error::io(path, "read", e))?
-            .len() as f64;
+        let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len() as f64;
         let n = self.mesh.len();
         let step = format!("write {ending}");
         self.push(&step, "", n, seconds, Some(bytes / seconds));
@@ -158,20 +144,9 @@ impl Rows<'_> {
         std::fs::remove_file(path).map_err(|e| Error::io(path, "remove", e))
     }
 
-    fn push(
-        &mut self,
-        step: &str,
-        scheme: &str,
-        vertices: usize,
-        seconds: f64,
-        speed: Option<f64>,
-    ) {
+    fn push(&mut self, step: &str, scheme: &str, vertices: usize, seconds: f64, speed: Option<f64>) {
         let [mesh, order, threads] = self.keys.clone();
-        let new = if vertices == self.mesh.len() {
-            Cell::Empty
-        } else {
-            vertices.into()
-        };
+        let new = if vertices == self.mesh.len() { Cell::Empty } else { vertices.into() };
         self.table.push(vec![
             step.into(),
             scheme.into(),

@@ -133,8 +133,7 @@ fn kernels(mesh: &Mesh, scheme: Scheme, runs: usize) -> Result<Vec<(&'static str
     };
     let faces = &mesh.faces;
     let topology = Topology::new(faces, mesh.len());
-    let [fronts, colours] =
-        [in_fronts, in_colours].map(|number| number(faces, &topology.incidence));
+    let [fronts, colours] = [in_fronts, in_colours].map(|number| number(faces, &topology.incidence));
     let build = |numbering| Operator::in_order(faces, &topology, scheme, Some(numbering));
     let mut built = Ok(());
     let operator = fastest(&mut || built = build(&fronts).map(drop));
@@ -146,13 +145,7 @@ fn kernels(mesh: &Mesh, scheme: Scheme, runs: usize) -> Result<Vec<(&'static str
     let mut rows = Rows::new(mesh.len());
     let product = fastest(&mut || {
         for _ in 0..ITERATIONS {
-            rows.product(
-                &front,
-                &points,
-                &mut image,
-                &mut nothing,
-                |_, ax, y, (), _| *y = ax,
-            );
+            rows.product(&front, &points, &mut image, &mut nothing, |_, ax, y, (), _| *y = ax);
         }
     });
     let waves = Wavefront::new(&front);

@@ -101,13 +101,7 @@ struct Form<'a> {
 
 impl<'a> Form<'a> {
     /// `None` if the mesh has a boundary or a face that is too large.
-    fn new(
-        faces: &'a Faces,
-        topology: &'a Topology,
-        scheme: Scheme,
-        operator: Operator,
-        end: End,
-    ) -> Option<Self> {
+    fn new(faces: &'a Faces, topology: &'a Topology, scheme: Scheme, operator: Operator, end: End) -> Option<Self> {
         let mut occurs = [false; LARGEST_FACE + 1];
         for face in faces.iter() {
             *occurs.get_mut(face.len())? = true;
@@ -147,14 +141,7 @@ impl<'a> Form<'a> {
                 ((sign * diagonal - shift) / g, g)
             })
             .unzip();
-        Some(Form {
-            faces,
-            topology,
-            couplings,
-            shifts,
-            potential,
-            metric,
-        })
+        Some(Form { faces, topology, couplings, shifts, potential, metric })
     }
 
     /// μ and the vertices with c_i < μ: as many as are allowed.
@@ -217,13 +204,7 @@ pub fn alternation_is_all(faces: &Faces, scheme: Scheme) -> bool {
 /// The lower bounds min c_i (upper: max) that elements and potentials alone prove: at least as good as those of
 /// [`SpectralBounds`](crate::assemble::bounds::SpectralBounds), as they know the sizes of the faces at each vertex.
 /// `None` on meshes with a boundary or a face of more than 64 corners. O(corners).
-pub fn element_bound(
-    faces: &Faces,
-    topology: &Topology,
-    scheme: Scheme,
-    operator: Operator,
-    end: End,
-) -> Option<f64> {
+pub fn element_bound(faces: &Faces, topology: &Topology, scheme: Scheme, operator: Operator, end: End) -> Option<f64> {
     let form = Form::new(faces, topology, scheme, operator, end)?;
     let least = form.potential.iter().copied().fold(f64::INFINITY, f64::min);
     Some(match end {
@@ -351,13 +332,7 @@ impl Attempt {
         let dirichlet: Vec<Csr> = patches.kinds.iter().map(|k| k.matrix(form, true)).collect();
         let lowest: Vec<f64> = dirichlet.iter().map(lowest).collect::<Result<_>>()?;
         let value = lowest.iter().copied().fold(f64::INFINITY, f64::min);
-        Ok(Attempt {
-            rings,
-            patches,
-            dirichlet,
-            lowest,
-            value,
-        })
+        Ok(Attempt { rings, patches, dirichlet, lowest, value })
     }
 
     /// By how much the value of the last of these attempts is still too high, about.
@@ -381,10 +356,7 @@ impl Attempt {
         let neumann: Vec<Csr> = kinds.iter().map(|k| k.matrix(form, false)).collect();
         let highest = self.value + width;
         let half = 0.5 * (self.value + level);
-        let (beneath, to_half) = rayon::join(
-            || count(&neumann, self.value - width),
-            || count(&neumann, half),
-        );
+        let (beneath, to_half) = rayon::join(|| count(&neumann, self.value - width), || count(&neumann, half));
         if beneath? > 0 {
             return None;
         }
@@ -417,12 +389,8 @@ impl Attempt {
 fn lowest(s: &Csr) -> Result<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(0x50_6174_6368);
     let start = (0..s.len()).map(|_| rng.random_range(-1.0..1.0)).collect();
-    let limits = lanczos::Limits {
-        tolerance: 1e-12,
-        max_steps: STEPS,
-        least_weight: 0.0,
-        ends: lanczos::Wanted::Lowest,
-    };
+    let limits =
+        lanczos::Limits { tolerance: 1e-12, max_steps: STEPS, least_weight: 0.0, ends: lanczos::Wanted::Lowest };
     Ok(lanczos::extremes(s, start, limits)?.low.value)
 }
 
@@ -489,25 +457,17 @@ impl Patches {
         if total > 2 * n / 3 && seeds.len() > 1 && (0..seeds.len()).all(|k| root(&group, k) == 0) {
             return None;
         }
-        let mut found = Patches {
-            kinds: Vec::new(),
-            counts: Vec::new(),
-        };
+        let mut found = Patches { kinds: Vec::new(), counts: Vec::new() };
         let mut place = vec![NONE; n];
         for k in (0..seeds.len()).filter(|&k| group[k] as usize == k) {
             let members = (k..seeds.len()).filter(|&l| root(&group, l) == k);
-            let starts: Vec<u32> = members
-                .flat_map(|l| incidence.corners_at(seeds[l] as usize).iter().copied())
-                .take(STARTS)
-                .collect();
+            let starts: Vec<u32> =
+                members.flat_map(|l| incidence.corners_at(seeds[l] as usize).iter().copied()).take(STARTS).collect();
             let inside = |w: u32| {
                 let owner = owner[w as usize];
                 owner != NONE && root(&group, owner as usize) == k
             };
-            let mut walk = Walk {
-                form,
-                place: &mut place,
-            };
+            let mut walk = Walk { form, place: &mut place };
             let known = found.kinds.iter().position(|kind| {
                 starts.iter().any(|&c| {
                     let mut code = kind.code.iter();
@@ -531,12 +491,8 @@ impl Patches {
             }
         }
         // Non-manifold vertices may hide part of a patch from the walks.
-        let walked: usize = found
-            .kinds
-            .iter()
-            .zip(&found.counts)
-            .map(|(kind, count)| kind.vertices.len() * count)
-            .sum();
+        let walked: usize =
+            found.kinds.iter().zip(&found.counts).map(|(kind, count)| kind.vertices.len() * count).sum();
         (walked == total).then_some(found)
     }
 
@@ -557,12 +513,7 @@ impl Walk<'_> {
     /// From the vertex of corner `start` through all vertices `inside`, around each in counter-clockwise order from
     /// the corner where it was met first. `meet` is told what comes: the size of each face at each vertex, and the
     /// places of its corners, NONE for those outside. `None` as soon as it says no, or if a star is not closed.
-    fn go(
-        &mut self,
-        start: u32,
-        inside: impl Fn(u32) -> bool,
-        mut meet: impl FnMut(u32) -> bool,
-    ) -> Option<Vec<u32>> {
+    fn go(&mut self, start: u32, inside: impl Fn(u32) -> bool, mut meet: impl FnMut(u32) -> bool) -> Option<Vec<u32>> {
         let corners = self.form.faces.corners();
         let first = corners[start as usize];
         let mut vertices = vec![first];
@@ -582,9 +533,7 @@ impl Walk<'_> {
         vertices: &mut Vec<u32>,
         entries: &mut Vec<u32>,
     ) -> Option<()> {
-        let Form {
-            faces, topology, ..
-        } = self.form;
+        let Form { faces, topology, .. } = self.form;
         let corners = faces.corners();
         let mut k = 0;
         while k < vertices.len() {
@@ -633,23 +582,14 @@ impl Patch {
                 at = at.as_slice()[size as usize..].iter();
             }
         }
-        Patch {
-            vertices,
-            corners,
-            sizes,
-            code,
-        }
+        Patch { vertices, corners, sizes, code }
     }
 
     /// The symmetric matrix of the patch: all of it with the elements of the faces within it; or the inside, the
     /// vertices all of whose faces lie within it.
     fn matrix(&self, form: &Form, inside_only: bool) -> Csr {
         let n = self.vertices.len();
-        let metric: Vec<f64> = self
-            .vertices
-            .iter()
-            .map(|&v| form.metric[v as usize])
-            .collect();
+        let metric: Vec<f64> = self.vertices.iter().map(|&v| form.metric[v as usize]).collect();
         let mut rows: Vec<Vec<(u32, f64)>> = vec![Vec::new(); n];
         let mut faces_at = vec![0usize; n];
         let mut rest = self.corners.as_slice();

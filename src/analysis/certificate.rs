@@ -8,8 +8,7 @@ use faer::Side;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
-    factorize_symbolic_cholesky,
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use rand::{RngExt, SeedableRng};
@@ -53,12 +52,7 @@ const ROUNDOFF: f64 = 0.5 * f64::EPSILON;
 ///
 /// # Errors
 /// A factor of more than 4 GiB.
-pub fn certify(
-    system: &LimitSystem,
-    operator: Operator,
-    end: End,
-    estimate: f64,
-) -> Result<Option<Certificate>> {
+pub fn certify(system: &LimitSystem, operator: Operator, end: End, estimate: f64) -> Result<Option<Certificate>> {
     let s = symmetric(system, operator);
     let symbolic = analyse(&s, SupernodalThreshold::AUTO, MOST_ENTRIES)?;
     let need = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
@@ -66,9 +60,7 @@ pub fn certify(
     let mut factor = vec![0.0; symbolic.len_val()];
     let n = s.len() as f64;
     let gamma = (n + 1.0) * ROUNDOFF / (1.0 - (n + 1.0) * ROUNDOFF);
-    let row_sum = (0..s.len())
-        .map(|i| s.row_values(i).iter().map(|v| v.abs()).sum::<f64>())
-        .fold(0.0, f64::max);
+    let row_sum = (0..s.len()).map(|i| s.row_values(i).iter().map(|v| v.abs()).sum::<f64>()).fold(0.0, f64::max);
     let outwards = match end {
         End::Lowest => -1.0,
         End::Highest => 1.0,
@@ -93,12 +85,7 @@ pub fn certify(
         if done && factor.iter().all(|x| x.is_finite()) {
             let trace: f64 = (0..s.len()).map(|i| (s.get(i, i) - sigma).abs()).sum();
             let margin = gamma / (1.0 - gamma) * trace + 6.0 * ROUNDOFF * (row_sum + sigma.abs());
-            return Ok(Some(Certificate {
-                bound: sigma + outwards * margin,
-                sigma,
-                margin,
-                factorizations,
-            }));
+            return Ok(Some(Certificate { bound: sigma + outwards * margin, sigma, margin, factorizations }));
         }
         offset *= 30.0;
     }
@@ -131,11 +118,7 @@ pub fn eigenvalues_below(system: &LimitSystem, operator: Operator, sigma: f64) -
 /// # Errors
 /// As there.
 pub fn inertia(s: &Csr, sigma: f64) -> Result<Inertia> {
-    let symbolic = analyse(
-        s,
-        SupernodalThreshold::FORCE_SIMPLICIAL,
-        MOST_ENTRIES_INERTIA,
-    )?;
+    let symbolic = analyse(s, SupernodalThreshold::FORCE_SIMPLICIAL, MOST_ENTRIES_INERTIA)?;
     let need = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
     let mut memory = MemBuffer::try_new(need).map_err(|_| out_of_memory(s.len()))?;
     let mut factor = vec![0.0; symbolic.len_val()];
@@ -151,11 +134,8 @@ pub fn inertia(s: &Csr, sigma: f64) -> Result<Inertia> {
             Default::default(),
         )
         .map_err(|_| unstable(sigma))?;
-    let (SymbolicCholeskyRaw::Simplicial(l), Some(permutation)) = (symbolic.raw(), symbolic.perm())
-    else {
-        return Err(Error::Computation(
-            "the factorization is not of the kind that was asked for".into(),
-        ));
+    let (SymbolicCholeskyRaw::Simplicial(l), Some(permutation)) = (symbolic.raw(), symbolic.perm()) else {
+        return Err(Error::Computation("the factorization is not of the kind that was asked for".into()));
     };
     // Column j of L: its first entry holds d_j in place of the 1.
     let (starts, rows) = (l.col_ptr(), l.row_idx());
@@ -202,10 +182,7 @@ pub fn inertia(s: &Csr, sigma: f64) -> Result<Inertia> {
     if backward_error.is_nan() || backward_error > LARGEST_BACKWARD_ERROR {
         return Err(unstable(sigma));
     }
-    Ok(Inertia {
-        below,
-        backward_error,
-    })
+    Ok(Inertia { below, backward_error })
 }
 
 fn pattern(s: &Csr) -> SymbolicSparseColMatRef<'_, u32> {
@@ -217,10 +194,7 @@ fn pattern(s: &Csr) -> SymbolicSparseColMatRef<'_, u32> {
 fn shifted(s: &Csr, sigma: f64, sign: f64) -> Vec<f64> {
     let mut values: Vec<f64> = Vec::with_capacity(s.values().len());
     for i in 0..s.len() {
-        values.extend(
-            s.row(i)
-                .map(|(j, v)| sign * if i == j { v - sigma } else { v }),
-        );
+        values.extend(s.row(i).map(|(j, v)| sign * if i == j { v - sigma } else { v }));
     }
     values
 }
@@ -230,13 +204,9 @@ fn analyse(
     supernodal_flop_ratio_threshold: SupernodalThreshold,
     most: usize,
 ) -> Result<SymbolicCholesky<u32>> {
-    let params = CholeskySymbolicParams {
-        supernodal_flop_ratio_threshold,
-        ..Default::default()
-    };
-    let symbolic =
-        factorize_symbolic_cholesky(pattern(s), Side::Upper, SymmetricOrdering::Amd, params)
-            .map_err(|_| out_of_memory(s.len()))?;
+    let params = CholeskySymbolicParams { supernodal_flop_ratio_threshold, ..Default::default() };
+    let symbolic = factorize_symbolic_cholesky(pattern(s), Side::Upper, SymmetricOrdering::Amd, params)
+        .map_err(|_| out_of_memory(s.len()))?;
     if symbolic.len_val() > most {
         return Err(Error::Computation(format!(
             "the factor for {} vertices would have {} entries, at most {most} are allowed; use a mesh about {:.0} times \
@@ -257,7 +227,5 @@ fn out_of_memory(n: usize) -> Error {
 }
 
 fn unstable(sigma: f64) -> Error {
-    Error::Computation(format!(
-        "LDLᵀ without pivoting is not stable at the shift {sigma}; use another shift"
-    ))
+    Error::Computation(format!("LDLᵀ without pivoting is not stable at the shift {sigma}; use another shift"))
 }

@@ -62,26 +62,16 @@ pub fn standard_setup<'a>(
         Method::Lu => Setup::Lu,
         Method::Cholesky => Setup::Cholesky,
         Method::Ldlt => Setup::Ldlt,
-        Method::Jacobi => Setup::Jacobi {
-            omega: spectrum()?.jacobi.optimal_omega(),
-        },
+        Method::Jacobi => Setup::Jacobi { omega: spectrum()?.jacobi.optimal_omega() },
         Method::Thall => Setup::THALL,
         Method::GaussSeidel => Setup::Sor { omega: 1.0, order },
-        Method::Sor => Setup::Sor {
-            omega: SOR_OMEGA,
-            order,
-        },
-        Method::Ssor => Setup::Ssor {
-            omega: SSOR_OMEGA,
-            order,
-        },
+        Method::Sor => Setup::Sor { omega: SOR_OMEGA, order },
+        Method::Ssor => Setup::Ssor { omega: SSOR_OMEGA, order },
         Method::Pia => Setup::Pia { omega: 1.0 },
-        Method::WPia => Setup::Pia {
-            omega: spectrum()?.a.optimal_omega(),
-        },
-        Method::Chebyshev if system.bounds.lambda_min > 0.0 => Setup::Chebyshev {
-            spectrum: (system.bounds.lambda_min, system.bounds.lambda_max),
-        },
+        Method::WPia => Setup::Pia { omega: spectrum()?.a.optimal_omega() },
+        Method::Chebyshev if system.bounds.lambda_min > 0.0 => {
+            Setup::Chebyshev { spectrum: (system.bounds.lambda_min, system.bounds.lambda_max) }
+        }
         Method::Chebyshev => estimated_chebyshev(&spectrum()?),
         Method::Cg => Setup::Cg,
         Method::PcgJacobi => Setup::PcgJacobi,
@@ -91,24 +81,14 @@ pub fn standard_setup<'a>(
 }
 
 fn estimated_chebyshev(spectrum: &Spectrum) -> Setup<'static> {
-    let lowest = if spectrum.a.min < VANISHING {
-        LOWEST
-    } else {
-        SAFETY * spectrum.a.min
-    };
-    Setup::Chebyshev {
-        spectrum: (lowest, 1.0),
-    }
+    let lowest = if spectrum.a.min < VANISHING { LOWEST } else { SAFETY * spectrum.a.min };
+    Setup::Chebyshev { spectrum: (lowest, 1.0) }
 }
 
 /// The method that `auto` stands for: Chebyshev with proven bounds where the one for λ_min is positive (no inner
 /// products, a count known in advance), else conjugate gradients, which need no bound.
 pub fn automatic(system: &LimitSystem) -> Method {
-    if system.bounds.lambda_min > 0.0 {
-        Method::Chebyshev
-    } else {
-        Method::Cg
-    }
+    if system.bounds.lambda_min > 0.0 { Method::Chebyshev } else { Method::Cg }
 }
 
 /// The standard line of each method in `methods`, then the further lines: other intervals, other libraries, the
@@ -124,12 +104,8 @@ pub fn entries<'a>(
     order_name: &str,
 ) -> Result<Vec<Entry<'a>>> {
     let proven = system.bounds.lambda_min > 0.0;
-    let entry = |method, variant, setup| Entry {
-        method,
-        variant,
-        parameter: parameter(variant, setup, order_name),
-        setup,
-    };
+    let entry =
+        |method, variant, setup| Entry { method, variant, parameter: parameter(variant, setup, order_name), setup };
     let mut lines = Vec::new();
     for &method in methods {
         let variant = match method {
@@ -171,9 +147,7 @@ fn parameter(variant: &str, setup: Setup, order_name: &str) -> String {
         Setup::Sor { omega, .. } | Setup::Ssor { omega, .. } => {
             vec![format!("ω={}", short(omega)), order]
         }
-        Setup::Chebyshev {
-            spectrum: (min, max),
-        } => vec![format!("λ ∈ [{}, {}]", short(min), short(max))],
+        Setup::Chebyshev { spectrum: (min, max) } => vec![format!("λ ∈ [{}, {}]", short(min), short(max))],
         _ => Vec::new(),
     };
     if !variant.is_empty() {
@@ -184,15 +158,8 @@ fn parameter(variant: &str, setup: Setup, order_name: &str) -> String {
 
 /// Four significant digits without trailing zeros.
 fn short(x: f64) -> String {
-    let text = format!(
-        "{x:.*}",
-        (3 - x.abs().log10().floor() as i32).clamp(0, 12) as usize
-    );
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').into()
-    } else {
-        text
-    }
+    let text = format!("{x:.*}", (3 - x.abs().log10().floor() as i32).clamp(0, 12) as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
 /// Runs the lines one after the other, so that their times are comparable. `done` is called after each.
@@ -217,9 +184,7 @@ pub fn compare(
         .map(|entry| {
             let solution = run(system, points, entry.setup, stop);
             let maxima: Vec<f64> = solution.report.history.iter().map(|e| e.max).collect();
-            let observed_rate = (!entry.method.is_direct())
-                .then(|| observed_rate(&maxima, floor))
-                .flatten();
+            let observed_rate = (!entry.method.is_direct()).then(|| observed_rate(&maxima, floor)).flatten();
             let predicted_rate = predicted_rate(system, spectrum, entry.setup)?;
             done();
             Ok(Row {

@@ -63,9 +63,7 @@ pub fn eigenpairs(s: &Csr) -> Result<(Vec<f64>, Vec<Vec<f64>>)> {
         .map_err(|e| Error::Computation(format!("dense eigenvectors: {e:?}")))?;
     let n = s.len();
     let values = (0..n).map(|j| eigen.S().column_vector()[j]).collect();
-    let vectors = (0..n)
-        .map(|j| (0..n).map(|i| eigen.U()[(i, j)]).collect())
-        .collect();
+    let vectors = (0..n).map(|j| (0..n).map(|i| eigen.U()[(i, j)]).collect()).collect();
     Ok((values, vectors))
 }
 
@@ -101,9 +99,7 @@ pub fn spectral_radius(system: &LimitSystem, mut step: impl FnMut(&mut [DVec3]))
             }
         }
     }
-    let all = dense
-        .eigenvalues()
-        .map_err(|e| Error::Computation(format!("dense eigenvalues: {e:?}")))?;
+    let all = dense.eigenvalues().map_err(|e| Error::Computation(format!("dense eigenvalues: {e:?}")))?;
     Ok(all.iter().map(|z| z.norm()).fold(0.0, f64::max))
 }
 

@@ -107,11 +107,7 @@ impl Eigenpairs {
                     if let Some(cluster) = last {
                         cluster.complete = true;
                     }
-                    clusters.push(Cluster {
-                        value: here.value,
-                        multiplicity: 1,
-                        complete: false,
-                    });
+                    clusters.push(Cluster { value: here.value, multiplicity: 1, complete: false });
                 }
             }
             before = Some(here);
@@ -188,9 +184,7 @@ pub fn extreme(s: &Csr, request: &Request) -> Result<Eigenpairs> {
                 error: residual.min(residual * residual / (cut - value).abs()),
             })
             .collect();
-        let good = |v: &Eigenvalue| {
-            v.error <= (request.tolerance * v.value.abs()).max(8.0 * f64::EPSILON * scale)
-        };
+        let good = |v: &Eigenvalue| v.error <= (request.tolerance * v.value.abs()).max(8.0 * f64::EPSILON * scale);
         let converged = round > 1 && values.iter().all(good);
         if converged || round == ROUNDS {
             return Ok(Eigenpairs {
@@ -227,13 +221,7 @@ struct Iteration<'a> {
 impl<'a> Iteration<'a> {
     fn new(s: &'a Csr, width: usize) -> Self {
         let zeros = vec![0.0; s.len() * width];
-        Iteration {
-            s,
-            width,
-            x: zeros.clone(),
-            y: zeros,
-            applications: 0,
-        }
+        Iteration { s, width, x: zeros.clone(), y: zeros, applications: 0 }
     }
 
     fn column(&self, j: usize) -> Vec<f64> {
@@ -244,17 +232,10 @@ impl<'a> Iteration<'a> {
     fn filter(&mut self, wanted: f64, cut: f64, far: f64) {
         let (c, e) = (0.5 * (far + cut), 0.5 * (far - cut));
         let outside = ((wanted - c) / e).abs();
-        let degree = if outside > 1.0 {
-            ((2.0 * AMPLIFICATION).ln() / outside.acosh()).ceil() as usize
-        } else {
-            *DEGREES.end()
-        };
+        let degree =
+            if outside > 1.0 { ((2.0 * AMPLIFICATION).ln() / outside.acosh()).ceil() as usize } else { *DEGREES.end() };
         let degree = degree.clamp(*DEGREES.start(), *DEGREES.end());
-        let first = if outside > 1.0 {
-            e / (wanted - c)
-        } else {
-            -1.0
-        };
+        let first = if outside > 1.0 { e / (wanted - c) } else { -1.0 };
         let mut sigma = first;
         // y = (S x − c x) σ/e, then the recurrence, each step in the place of the older vector.
         self.step(sigma / e, c, 0.0);
@@ -271,24 +252,21 @@ impl<'a> Iteration<'a> {
     fn step(&mut self, alpha: f64, c: f64, beta: f64) {
         self.applications += self.width;
         let (s, x, width) = (self.s, &self.x, self.width);
-        self.y
-            .par_chunks_mut(CHUNK * width)
-            .enumerate()
-            .for_each(|(k, y)| {
-                for (offset, y) in y.chunks_exact_mut(width).enumerate() {
-                    let i = k * CHUNK + offset;
-                    for (lane, y) in y.chunks_exact_mut(LANES).enumerate() {
-                        let at = lane * LANES;
-                        let sum = row_times_lanes(s, i, x, width, at);
-                        let own = &x[i * width + at..][..LANES];
-                        for l in 0..LANES {
-                            // β = 0 must also clear what is not a number.
-                            let old = if beta == 0.0 { 0.0 } else { beta * y[l] };
-                            y[l] = alpha * (sum[l] - c * own[l]) + old;
-                        }
+        self.y.par_chunks_mut(CHUNK * width).enumerate().for_each(|(k, y)| {
+            for (offset, y) in y.chunks_exact_mut(width).enumerate() {
+                let i = k * CHUNK + offset;
+                for (lane, y) in y.chunks_exact_mut(LANES).enumerate() {
+                    let at = lane * LANES;
+                    let sum = row_times_lanes(s, i, x, width, at);
+                    let own = &x[i * width + at..][..LANES];
+                    for l in 0..LANES {
+                        // β = 0 must also clear what is not a number.
+                        let old = if beta == 0.0 { 0.0 } else { beta * y[l] };
+                        y[l] = alpha * (sum[l] - c * own[l]) + old;
                     }
                 }
-            });
+            }
+        });
     }
 
     /// Orthonormal vectors of the same span, ordered Ritz pairs of S in it: (value, residual).
@@ -302,18 +280,12 @@ impl<'a> Iteration<'a> {
         if end == End::Highest {
             order.reverse();
         }
-        let rotation = DMatrix::from_fn(self.width, self.width, |i, j| {
-            eigen.eigenvectors[(i, order[j])]
-        });
+        let rotation = DMatrix::from_fn(self.width, self.width, |i, j| eigen.eigenvectors[(i, order[j])]);
         rotate(&mut self.x, &rotation);
         rotate(&mut self.y, &rotation);
         let values: Vec<f64> = order.iter().map(|&j| eigen.eigenvalues[j]).collect();
         let squares = residual_squares(&self.x, &self.y, &values);
-        Ok(values
-            .into_iter()
-            .zip(squares)
-            .map(|(value, square)| (value, square.sqrt()))
-            .collect())
+        Ok(values.into_iter().zip(squares).map(|(value, square)| (value, square.sqrt())).collect())
     }
 
     /// By the eigenvectors of the scaled Gram matrix (Stathopoulos and Wu 2002), repeated until the columns are
@@ -337,24 +309,12 @@ impl<'a> Iteration<'a> {
             if off <= 1e-13 {
                 return Ok(());
             }
-            let d: Vec<f64> = (0..p)
-                .map(|j| {
-                    if g[(j, j)] > 0.0 {
-                        1.0 / g[(j, j)].sqrt()
-                    } else {
-                        0.0
-                    }
-                })
-                .collect();
+            let d: Vec<f64> = (0..p).map(|j| if g[(j, j)] > 0.0 { 1.0 / g[(j, j)].sqrt() } else { 0.0 }).collect();
             let scaled = DMatrix::from_fn(p, p, |i, j| d[i] * g[(i, j)] * d[j]);
             let eigen = decompose(symmetrized(scaled))?;
             let lost: Vec<bool> = eigen.eigenvalues.iter().map(|&l| l <= DEPENDENT).collect();
             let t = DMatrix::from_fn(p, p, |i, j| {
-                if lost[j] {
-                    0.0
-                } else {
-                    d[i] * eigen.eigenvectors[(i, j)] / eigen.eigenvalues[j].sqrt()
-                }
+                if lost[j] { 0.0 } else { d[i] * eigen.eigenvectors[(i, j)] / eigen.eigenvalues[j].sqrt() }
             });
             rotate(&mut self.x, &t);
             if lost.contains(&true) {
@@ -365,9 +325,7 @@ impl<'a> Iteration<'a> {
                 }
             }
         }
-        Err(Error::Computation(
-            "a block of vectors could not be made orthonormal".into(),
-        ))
+        Err(Error::Computation("a block of vectors could not be made orthonormal".into()))
     }
 }
 
@@ -455,7 +413,6 @@ fn symmetrized(m: DMatrix<f64>) -> DMatrix<f64> {
 
 fn decompose(m: DMatrix<f64>) -> Result<SymmetricEigen<f64, nalgebra::Dyn>> {
     let size = m.nrows();
-    SymmetricEigen::try_new(m, f64::EPSILON, 1000 * size).ok_or_else(|| {
-        Error::Computation("the eigenvalues of a projected matrix did not converge".into())
-    })
+    SymmetricEigen::try_new(m, f64::EPSILON, 1000 * size)
+        .ok_or_else(|| Error::Computation("the eigenvalues of a projected matrix did not converge".into()))
 }

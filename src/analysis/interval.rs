@@ -83,20 +83,13 @@ pub fn interval(operator: &Operator, which: Which) -> Result<Interval> {
         Which::Jacobi => (bounds.jacobi_lambda_min, bounds.jacobi_lambda_max),
     };
     if operator.is_empty() {
-        return Ok(Interval {
-            low: proven,
-            high,
-            least: high,
-        });
+        return Ok(Interval { low: proven, high, least: high });
     }
     if which == Which::Jacobi {
         high = high.min(collatz_wielandt(operator));
     }
     let mut average = operator.diagonal().to_vec();
-    let a = Matrix {
-        system: operator,
-        which: Which::A,
-    };
+    let a = Matrix { system: operator, which: Which::A };
     let mut other = vec![0.0; average.len()];
     for _ in 0..AVERAGES {
         multiply(&a, &average, &mut other);
@@ -108,38 +101,22 @@ pub fn interval(operator: &Operator, which: Which) -> Result<Interval> {
     let s = submatrix(operator, which, &sample, |_, _| true);
     let mut rng = ChaCha8Rng::seed_from_u64(0x73_616d_706c);
     let start = (0..s.len()).map(|_| rng.random_range(-1.0..1.0)).collect();
-    let limits = lanczos::Limits {
-        tolerance: 1e-4,
-        max_steps: STEPS,
-        least_weight: 0.0,
-        ends: lanczos::Wanted::Lowest,
-    };
+    let limits =
+        lanczos::Limits { tolerance: 1e-4, max_steps: STEPS, least_weight: 0.0, ends: lanczos::Wanted::Lowest };
     let least = lanczos::extremes(&s, start, limits)?.low.value;
-    Ok(Interval {
-        low: ((1.0 - MARGIN) * least).max(proven).min(high),
-        high,
-        least,
-    })
+    Ok(Interval { low: ((1.0 - MARGIN) * least).max(proven).min(high), high, least })
 }
 
 /// An upper bound of the spectrum of D⁻¹A.
 fn collatz_wielandt(operator: &Operator) -> f64 {
-    let b = Matrix {
-        system: operator,
-        which: Which::Jacobi,
-    };
+    let b = Matrix { system: operator, which: Which::Jacobi };
     let mut v = vec![1.0; operator.len()];
     let mut image = v.clone();
     let mut bound = f64::INFINITY;
     for _ in 0..POWERS {
         multiply(&b, &v, &mut image);
         let quotient = |(y, x): (&f64, &f64)| y / x;
-        let largest = image
-            .par_iter()
-            .zip(&v)
-            .with_min_len(CHUNK)
-            .map(quotient)
-            .reduce(|| 0.0, f64::max);
+        let largest = image.par_iter().zip(&v).with_min_len(CHUNK).map(quotient).reduce(|| 0.0, f64::max);
         bound = bound.min(largest);
         std::mem::swap(&mut v, &mut image);
     }
@@ -249,16 +226,8 @@ fn grown(operator: &Operator, places: &[u32]) -> Vec<u32> {
 }
 
 /// The principal submatrix of the symmetric matrix similar to A or D⁻¹A, but for entries that are not `coupled`.
-fn submatrix(
-    operator: &Operator,
-    which: Which,
-    vertices: &[u32],
-    coupled: impl Fn(usize, usize) -> bool,
-) -> Csr {
-    let weight = Matrix {
-        system: operator,
-        which,
-    };
+fn submatrix(operator: &Operator, which: Which, vertices: &[u32], coupled: impl Fn(usize, usize) -> bool) -> Csr {
+    let weight = Matrix { system: operator, which };
     let mut number = vec![NONE; operator.len()];
     for (k, &v) in (0..).zip(vertices) {
         number[v as usize] = k;

@@ -93,13 +93,7 @@ impl SelfAdjoint for Csr {
         1.0
     }
 
-    fn rows(
-        &self,
-        rows: Range<usize>,
-        x: &[f64],
-        _shared: &[f64],
-        mut visit: impl FnMut(usize, f64),
-    ) {
+    fn rows(&self, rows: Range<usize>, x: &[f64], _shared: &[f64], mut visit: impl FnMut(usize, f64)) {
         for (k, i) in rows.enumerate() {
             visit(k, self.row_times_scalar(i, x));
         }
@@ -147,21 +141,13 @@ impl Scalar for Operator {
         self.all_sums(x, shared);
     }
 
-    fn rows(
-        &self,
-        rows: Range<usize>,
-        x: &[f64],
-        shared: &[f64],
-        mut visit: impl FnMut(usize, f64),
-    ) {
+    fn rows(&self, rows: Range<usize>, x: &[f64], shared: &[f64], mut visit: impl FnMut(usize, f64)) {
         let mut end = 0;
         let next = |count| {
             end += count;
             end - count..end
         };
-        Operator::rows(self, rows, (x, 0), (shared, 0), next, |k, _, ax| {
-            visit(k, ax)
-        });
+        Operator::rows(self, rows, (x, 0), (shared, 0), next, |k, _, ax| visit(k, ax));
     }
 }
 
@@ -190,19 +176,12 @@ impl<T: Scalar> SelfAdjoint for Matrix<'_, T> {
         self.system.prepare(x, shared);
     }
 
-    fn rows(
-        &self,
-        rows: Range<usize>,
-        x: &[f64],
-        shared: &[f64],
-        mut visit: impl FnMut(usize, f64),
-    ) {
+    fn rows(&self, rows: Range<usize>, x: &[f64], shared: &[f64], mut visit: impl FnMut(usize, f64)) {
         match self.which {
             Which::A => self.system.rows(rows, x, shared, visit),
             Which::Jacobi => {
                 let diagonal = &self.system.diagonal()[rows.start..];
-                self.system
-                    .rows(rows, x, shared, |k, ax| visit(k, ax / diagonal[k]));
+                self.system.rows(rows, x, shared, |k, ax| visit(k, ax / diagonal[k]));
             }
         }
     }
@@ -214,11 +193,7 @@ pub fn rayleigh(s: &impl SelfAdjoint, x: &[f64]) -> (f64, f64) {
     s.prepare(x, &mut shared);
     // Σ g x², Σ g x·Bx and Σ g (Bx)² would lose half of the residual's digits, so B x is kept.
     let mut image = vec![0.0; s.len()];
-    let sums = |parts: Vec<(f64, f64)>| {
-        parts
-            .iter()
-            .fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1))
-    };
+    let sums = |parts: Vec<(f64, f64)>| parts.iter().fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
     let parts = image.par_chunks_mut(CHUNK).enumerate().map(|(c, image)| {
         let first = c * CHUNK;
         let (mut square, mut product) = (0.0, 0.0);
@@ -257,9 +232,7 @@ pub fn extremes(s: &impl SelfAdjoint, start: Vec<f64>, limits: Limits) -> Result
     // The vectors are kept as they come, each with its norm.
     let mut norm = weighted_norm(s, &v);
     if !(norm > 0.0 && norm.is_finite()) {
-        return Err(Error::Computation(
-            "the start of the Lanczos process must be finite and not zero".into(),
-        ));
+        return Err(Error::Computation("the start of the Lanczos process must be finite and not zero".into()));
     }
     let mut w = vec![0.0; n];
     let mut norm_before = f64::INFINITY;
@@ -275,9 +248,7 @@ pub fn extremes(s: &impl SelfAdjoint, start: Vec<f64>, limits: Limits) -> Result
         alphas.push(alpha);
         betas.push(beta);
         if !beta.is_finite() {
-            return Err(Error::Computation(
-                "the matrix holds entries that are not finite".into(),
-            ));
+            return Err(Error::Computation("the matrix holds entries that are not finite".into()));
         }
         let steps = alphas.len();
         let scale = alphas.iter().fold(0.0f64, |m, a| m.max(a.abs()));
@@ -293,15 +264,9 @@ pub fn extremes(s: &impl SelfAdjoint, start: Vec<f64>, limits: Limits) -> Result
                     && (r.value - old).abs() <= allowed
             };
             let settled = before.is_some_and(|(l, h)| {
-                (limits.ends == Wanted::Highest || good(low, l))
-                    && (limits.ends == Wanted::Lowest || good(high, h))
+                (limits.ends == Wanted::Highest || good(low, l)) && (limits.ends == Wanted::Lowest || good(high, h))
             });
-            let run = Run {
-                low,
-                high,
-                steps,
-                converged: settled || closed,
-            };
+            let run = Run { low, high, steps, converged: settled || closed };
             if run.converged || steps >= limits.max_steps {
                 return Ok(run);
             }
@@ -314,12 +279,7 @@ pub fn extremes(s: &impl SelfAdjoint, start: Vec<f64>, limits: Limits) -> Result
 
 /// `w ← B v − β u` for the unit vectors v and u along `v` and `w`, β = ‖`v`‖, and the inner product of v and w, in
 /// one pass.
-fn product(
-    s: &impl SelfAdjoint,
-    (v, norm): (&[f64], f64),
-    (w, norm_before): (&mut [f64], f64),
-    shared: &[f64],
-) -> f64 {
+fn product(s: &impl SelfAdjoint, (v, norm): (&[f64], f64), (w, norm_before): (&mut [f64], f64), shared: &[f64]) -> f64 {
     // In the first step there is no vector before, and its norm is infinite.
     let (unit, back) = (1.0 / norm, norm / norm_before);
     let parts: Vec<f64> = w
@@ -361,10 +321,7 @@ fn orthogonalize(s: &impl SelfAdjoint, (v, norm): (&[f64], f64), w: &mut [f64], 
 /// The extreme eigenvalues of the tridiagonal matrix so far.
 fn projected(alphas: &[f64], betas: &[f64], least_weight: f64) -> Result<(Ritz, Ritz)> {
     let k = alphas.len();
-    let t = Tridiagonal {
-        alphas,
-        betas: &betas[..k - 1],
-    };
+    let t = Tridiagonal { alphas, betas: &betas[..k - 1] };
     let end = |from_below: bool| {
         let index = |j: usize| if from_below { j } else { k - 1 - j };
         for j in 0..k {
@@ -385,16 +342,9 @@ fn projected(alphas: &[f64], betas: &[f64], least_weight: f64) -> Result<(Ritz, 
                 error = error.min(width + residual * residual / gap);
                 width = gap;
             }
-            return Ok(Ritz {
-                value,
-                residual,
-                error,
-                weight,
-            });
+            return Ok(Ritz { value, residual, error, weight });
         }
-        Err(Error::Computation(
-            "no Ritz value has the least weight asked for".into(),
-        ))
+        Err(Error::Computation("no Ritz value has the least weight asked for".into()))
     };
     Ok((end(true)?, end(false)?))
 }
@@ -424,12 +374,7 @@ mod tests {
         Csr::new(Arc::new(pattern), values.to_vec())
     }
 
-    const LIMITS: Limits = Limits {
-        tolerance: 1e-12,
-        max_steps: 300,
-        least_weight: 0.0,
-        ends: Wanted::Both,
-    };
+    const LIMITS: Limits = Limits { tolerance: 1e-12, max_steps: 300, least_weight: 0.0, ends: Wanted::Both };
 
     #[test]
     fn finds_both_ends_of_a_known_spectrum() {
@@ -446,11 +391,7 @@ mod tests {
         let values: Vec<f64> = (0..4000).map(|i| (i as f64 / 4000.0).powi(2)).collect();
         let start: Vec<f64> = (0..4000).map(|i| 1.0 + (i % 7) as f64).collect();
         for max_steps in [40, 80, 160, 320, 640] {
-            let limits = Limits {
-                max_steps,
-                tolerance: 1e-15,
-                ..LIMITS
-            };
+            let limits = Limits { max_steps, tolerance: 1e-15, ..LIMITS };
             let run = extremes(&diagonal(&values), start.clone(), limits).expect("a good start");
             assert!(run.low.residual >= run.low.error);
             assert!(run.low.value <= run.low.residual, "{run:?}");
@@ -460,10 +401,7 @@ mod tests {
     #[test]
     fn sees_only_what_the_start_excites() {
         let start = vec![0.0, 1.0, 1.0, 1.0, 0.0];
-        let limits = Limits {
-            least_weight: 1e-20,
-            ..LIMITS
-        };
+        let limits = Limits { least_weight: 1e-20, ..LIMITS };
         let run = extremes(&diagonal(&[0.1, 0.2, 0.5, 0.7, 3.0]), start, limits).expect("a start");
         assert!((run.low.value - 0.2).abs() < 1e-12 && (run.high.value - 0.7).abs() < 1e-12);
     }

@@ -140,15 +140,8 @@ impl<'a> Preconditioner<'a> {
             }
         }
         let irregular = (0..system.len()).filter(|&v| !regularity.regular[v]);
-        let stars = irregular
-            .map(|v| Star::new(&system.m, v))
-            .collect::<Result<_>>()?;
-        Ok(Preconditioner {
-            m: &system.m,
-            regularity,
-            places,
-            stars,
-        })
+        let stars = irregular.map(|v| Star::new(&system.m, v)).collect::<Result<_>>()?;
+        Ok(Preconditioner { m: &system.m, regularity, places, stars })
     }
 
     /// B r.
@@ -157,9 +150,7 @@ impl<'a> Preconditioner<'a> {
         for star in &self.stars {
             star.relax(self.m, r, &mut x);
         }
-        let rest: Vec<DVec3> = (0..r.len())
-            .map(|i| r[i] - self.m.row_times(i, &x))
-            .collect();
+        let rest: Vec<DVec3> = (0..r.len()).map(|i| r[i] - self.m.row_times(i, &x)).collect();
         for (x, z) in x.iter_mut().zip(self.lines(&rest)) {
             *x += z;
         }
@@ -176,8 +167,7 @@ impl<'a> Preconditioner<'a> {
             chains
                 .map(|(k, (line, closed))| {
                     let places = (0..).map(|i| (k as u32, i));
-                    let mut x: Vec<DVec3> =
-                        line.iter().zip(places).map(|(&v, p)| value(v, p)).collect();
+                    let mut x: Vec<DVec3> = line.iter().zip(places).map(|(&v, p)| value(v, p)).collect();
                     solve_line(&mut x, *closed);
                     x
                 })
@@ -215,17 +205,10 @@ impl Star {
         let entry = |i, j| m.get(vertices[i] as usize, vertices[j] as usize);
         let factor = DMatrix::from_fn(k, k, entry).cholesky();
         // The pivots are squares of the factor's diagonal; those of a singular matrix end at rounding.
-        let least = factor
-            .as_ref()
-            .map_or(0.0, |f| f.l_dirty().diagonal().min());
+        let least = factor.as_ref().map_or(0.0, |f| f.l_dirty().diagonal().min());
         match factor {
-            Some(factor) if least > SINGULAR => Ok(Star {
-                vertices,
-                inverse: factor.inverse(),
-            }),
-            _ => Err(Error::Computation(format!(
-                "the matrix around vertex {centre} is singular"
-            ))),
+            Some(factor) if least > SINGULAR => Ok(Star { vertices, inverse: factor.inverse() }),
+            _ => Err(Error::Computation(format!("the matrix around vertex {centre} is singular"))),
         }
     }
 
@@ -333,18 +316,12 @@ pub fn count(
         betas.extend(last.map(|(_, before)| beta.sqrt() / before));
         last = Some((rho, step));
     }
-    let lanczos = Tridiagonal {
-        alphas: &alphas,
-        betas: &betas,
-    };
+    let lanczos = Tridiagonal { alphas: &alphas, betas: &betas };
     let kappa = match alphas.len() {
         0 => 1.0,
         k => lanczos.eigenvalue(k - 1) / lanczos.eigenvalue(0),
     };
-    Ok(Count {
-        iterations: alphas.len(),
-        kappa,
-    })
+    Ok(Count { iterations: alphas.len(), kappa })
 }
 
 #[cfg(test)]
@@ -436,8 +413,7 @@ mod tests {
             let b = Preconditioner::new(&system, &regularity).unwrap();
             let x = &mesh.positions;
             let y: Vec<DVec3> = x.iter().rev().copied().collect();
-            let dot =
-                |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
+            let dot = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
             let (bx, by) = (b.apply(x), b.apply(&y));
             assert!((dot(&y, &bx) - dot(x, &by)).abs() < 1e-12 * dot(x, &bx));
             if name.starts_with("torus") {
@@ -452,10 +428,7 @@ mod tests {
     fn few_iterations_where_irregular_vertices_are_apart() {
         let mesh = noisy("quad-sphere:4");
         let (_, regularity, system) = parts(&mesh);
-        let stop = Stop {
-            tolerance: 1e-10 * mesh.diagonal(),
-            max_iterations: 100,
-        };
+        let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 100 };
         let b = Preconditioner::new(&system, &regularity).unwrap();
         let plain = |r: &[DVec3]| r.iter().zip(&system.h).map(|(r, h)| *r * *h).collect();
         let [plain, lines] = [
@@ -464,10 +437,7 @@ mod tests {
         ];
         assert!((20..35).contains(&plain.iterations) && (8.0..9.1).contains(&plain.kappa));
         assert!(lines.iterations <= 3 && lines.kappa < 1.01, "{lines:?}");
-        let less = Stop {
-            max_iterations: lines.iterations - 1,
-            ..stop
-        };
+        let less = Stop { max_iterations: lines.iterations - 1, ..stop };
         assert!(count(&system, &mesh.positions, &less, |r| b.apply(r)).is_err());
     }
 

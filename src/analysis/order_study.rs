@@ -48,15 +48,8 @@ pub struct Row {
 }
 
 /// The orders that do not depend on chance.
-pub const ORDERS: [Order; 7] = [
-    Order::File,
-    Order::Reverse,
-    Order::Bfs,
-    Order::Rcm,
-    Order::Morton,
-    Order::Valence,
-    Order::Multicolour,
-];
+pub const ORDERS: [Order; 7] =
+    [Order::File, Order::Reverse, Order::Bfs, Order::Rcm, Order::Morton, Order::Valence, Order::Multicolour];
 
 /// SOR at each ω in each of [`ORDERS`] and in `random` random orders (seeds 1, 2, …), then Gauss-Southwell once.
 ///
@@ -72,14 +65,9 @@ pub fn order_study(
     random: u64,
     stop: &Stop,
 ) -> Result<Vec<Row>> {
-    let orders: Vec<Order> = ORDERS
-        .into_iter()
-        .chain((1..=random).map(Order::Random))
-        .collect();
-    let jobs: Vec<(f64, Order)> = omegas
-        .iter()
-        .flat_map(|&omega| orders.iter().map(move |&order| (omega, order)))
-        .collect();
+    let orders: Vec<Order> = ORDERS.into_iter().chain((1..=random).map(Order::Random)).collect();
+    let jobs: Vec<(f64, Order)> =
+        omegas.iter().flat_map(|&omega| orders.iter().map(move |&order| (omega, order))).collect();
     let points = &mesh.positions;
     let rows: Result<Vec<Row>> = jobs
         .into_par_iter()
@@ -87,13 +75,7 @@ pub fn order_study(
             let vertices = order.order(mesh, &topology.incidence);
             let zero = vec![DVec3::ZERO; system.len()];
             let rho = sweep_radius(system, |x| {
-                sweep(
-                    system,
-                    &zero,
-                    omega,
-                    vertices.iter().map(|&i| i as usize),
-                    x,
-                );
+                sweep(system, &zero, omega, vertices.iter().map(|&i| i as usize), x);
             })?;
             let mut method = Sor::new(system, points, omega, Some(&vertices));
             let report = solve(&mut method, stop, &mut |_| ControlFlow::Continue(()));
@@ -132,10 +114,7 @@ pub struct Spread {
 
 /// The spread of the random orders among `rows` at one ω; `None` if there are none.
 pub fn random_spread(rows: &[Row], omega: f64) -> Option<Spread> {
-    let random = || {
-        rows.iter()
-            .filter(move |r| r.order.starts_with("random:") && r.omega == omega)
-    };
+    let random = || rows.iter().filter(move |r| r.order.starts_with("random:") && r.omega == omega);
     let runs = random().count();
     if runs == 0 {
         return None;
@@ -149,12 +128,7 @@ pub fn random_spread(rows: &[Row], omega: f64) -> Option<Spread> {
         }
         [least, sum / runs as f64, greatest]
     };
-    Some(Spread {
-        omega,
-        runs,
-        rho: of(&|r| r.rho.unwrap_or(f64::NAN)),
-        iterations: of(&|r| r.iterations),
-    })
+    Some(Spread { omega, runs, rho: of(&|r| r.rho.unwrap_or(f64::NAN)), iterations: of(&|r| r.iterations) })
 }
 
 /// The result of a greedy run.
@@ -192,9 +166,7 @@ impl PartialOrd for Candidate {
 impl Ord for Candidate {
     fn cmp(&self, other: &Self) -> Ordering {
         // Ties by the smaller vertex, so that the run is determined.
-        self.size
-            .total_cmp(&other.size)
-            .then(other.vertex.cmp(&self.vertex))
+        self.size.total_cmp(&other.size).then(other.vertex.cmp(&self.vertex))
     }
 }
 
@@ -209,13 +181,8 @@ pub fn gauss_southwell(system: &LimitSystem, points: &[DVec3], stop: &Stop) -> G
     let mut x = points.to_vec();
     let mut e: Vec<DVec3> = (0..n).map(|i| points[i] - system.row(i, &x)).collect();
     let mut version = vec![0u32; n];
-    let mut heap: BinaryHeap<Candidate> = (0..n)
-        .map(|i| Candidate {
-            size: e[i].length(),
-            vertex: i as u32,
-            version: 0,
-        })
-        .collect();
+    let mut heap: BinaryHeap<Candidate> =
+        (0..n).map(|i| Candidate { size: e[i].length(), vertex: i as u32, version: 0 }).collect();
     let most = stop.max_iterations.saturating_mul(n);
     let mut updates = 0;
     let outcome = loop {
@@ -242,24 +209,13 @@ pub fn gauss_southwell(system: &LimitSystem, points: &[DVec3], stop: &Stop) -> G
         for (j, m) in system.m.row(i) {
             e[j] -= system.h[j] * m * step;
             version[j] = version[j].wrapping_add(1);
-            heap.push(Candidate {
-                size: e[j].length(),
-                vertex: j as u32,
-                version: version[j],
-            });
+            heap.push(Candidate { size: e[j].length(), vertex: j as u32, version: version[j] });
         }
         // Outdated candidates are dropped before they outnumber the vertices by far.
         if heap.len() > 16 * n.max(64) {
             heap.retain(|c| c.version == version[c.vertex as usize]);
         }
     };
-    let max_error = (0..n)
-        .map(|i| (points[i] - system.row(i, &x)).length())
-        .fold(0.0, f64::max);
-    Greedy {
-        points: x,
-        updates,
-        outcome,
-        max_error,
-    }
+    let max_error = (0..n).map(|i| (points[i] - system.row(i, &x)).length()).fold(0.0, f64::max);
+    Greedy { points: x, updates, outcome, max_error }
 }

@@ -17,19 +17,10 @@ use crate::solvers::ssor::symmetric_sweep;
 ///
 /// # Errors
 /// If the spectral radius of a sweep cannot be computed.
-pub fn predicted_rate(
-    system: &LimitSystem,
-    spectrum: &Spectrum,
-    setup: Setup,
-) -> Result<Option<f64>> {
+pub fn predicted_rate(system: &LimitSystem, spectrum: &Spectrum, setup: Setup) -> Result<Option<f64>> {
     let zero = || vec![DVec3::ZERO; system.len()];
     Ok(match setup {
-        Setup::Lu
-        | Setup::Cholesky
-        | Setup::SecondCholesky
-        | Setup::Ldlt
-        | Setup::PlainCg
-        | Setup::PcgIc0 => None,
+        Setup::Lu | Setup::Cholesky | Setup::SecondCholesky | Setup::Ldlt | Setup::PlainCg | Setup::PcgIc0 => None,
         Setup::Jacobi { omega } => Some(spectrum.jacobi.radius(omega)),
         Setup::Pia { omega } => Some(spectrum.a.radius(omega)),
         Setup::Sor { omega, order } => {
@@ -53,9 +44,7 @@ pub fn predicted_rate(
                 symmetric_sweep(system, &points, omega, order, x);
             })?)
         }
-        Setup::Chebyshev {
-            spectrum: (min, max),
-        } => Some(Extremes { min, max }.krylov_rate()),
+        Setup::Chebyshev { spectrum: (min, max) } => Some(Extremes { min, max }.krylov_rate()),
         Setup::Cg => Some(spectrum.a.krylov_rate()),
         Setup::PcgJacobi => Some(spectrum.jacobi.krylov_rate()),
         Setup::PcgSsor { omega } => {
@@ -64,10 +53,7 @@ pub fn predicted_rate(
             let radius = sweep_radius(system, |x| {
                 symmetric_sweep(system, &points, omega, None, x);
             })?;
-            let ends = Extremes {
-                min: 1.0 - radius,
-                max: 1.0,
-            };
+            let ends = Extremes { min: 1.0 - radius, max: 1.0 };
             Some(ends.krylov_rate())
         }
     })

@@ -33,14 +33,8 @@ pub struct Counts {
 
 impl Promise {
     pub fn new(b: &SpectralBounds) -> Self {
-        let a = Extremes {
-            min: b.lambda_min,
-            max: b.lambda_max,
-        };
-        let jacobi = Extremes {
-            min: b.jacobi_lambda_min,
-            max: b.jacobi_lambda_max,
-        };
+        let a = Extremes { min: b.lambda_min, max: b.lambda_max };
+        let jacobi = Extremes { min: b.jacobi_lambda_min, max: b.jacobi_lambda_max };
         Promise {
             a,
             jacobi,

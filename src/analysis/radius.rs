@@ -54,10 +54,7 @@ pub fn sweep_radius(system: &LimitSystem, step: impl FnMut(&mut [DVec3])) -> Res
 ///
 /// # Errors
 /// If the dense computation does not converge.
-pub fn spectral_radius(
-    system: &LimitSystem,
-    mut step: impl FnMut(&mut [DVec3]),
-) -> Result<SpectralRadius> {
+pub fn spectral_radius(system: &LimitSystem, mut step: impl FnMut(&mut [DVec3])) -> Result<SpectralRadius> {
     let n = system.len();
     if n <= DENSE {
         return Ok(SpectralRadius {
@@ -69,9 +66,8 @@ pub fn spectral_radius(
     }
     let vectors = (MEMORY / (24 * n)).clamp(FEWEST_VECTORS, VECTORS);
     let mut rng = ChaCha8Rng::seed_from_u64(0x4172_6e6f);
-    let mut x: Vec<DVec3> = (0..n)
-        .map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0))))
-        .collect();
+    let mut x: Vec<DVec3> =
+        (0..n).map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))).collect();
     normalize(&mut x);
     for _ in 0..WARM_UP {
         step(&mut x);
@@ -88,12 +84,7 @@ pub fn spectral_radius(
         let still = (value - before).abs() <= STILL * value;
         let good = found.residual <= TOLERANCE * value || still;
         if good || cycle == CYCLES {
-            return Ok(SpectralRadius {
-                value,
-                residual: found.residual,
-                applications,
-                converged: good,
-            });
+            return Ok(SpectralRadius { value, residual: found.residual, applications, converged: good });
         }
         before = value;
         x = found.restart;
@@ -102,12 +93,7 @@ pub fn spectral_radius(
 }
 
 fn exact(value: f64, applications: usize) -> SpectralRadius {
-    SpectralRadius {
-        value,
-        residual: 0.0,
-        applications,
-        converged: true,
-    }
+    SpectralRadius { value, residual: 0.0, applications, converged: true }
 }
 
 struct Cycle {
@@ -149,9 +135,7 @@ fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut impl FnMut(&mut [DVec3]
     let ritz = square
         .complex_eigenvalues()
         .iter()
-        .fold(Complex::new(0.0, 0.0), |best, &z| {
-            if z.norm() > best.norm() { z } else { best }
-        });
+        .fold(Complex::new(0.0, 0.0), |best, &z| if z.norm() > best.norm() { z } else { best });
     let y = eigenvector(&square, ritz);
     let residual = next * y[m - 1].norm();
     let mut restart = vec![DVec3::ZERO; basis[0].len()];
@@ -169,12 +153,7 @@ fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut impl FnMut(&mut [DVec3]
         }
         normalize(&mut restart);
     }
-    Cycle {
-        ritz,
-        residual,
-        steps: m,
-        restart,
-    }
+    Cycle { ritz, residual, steps: m, restart }
 }
 
 /// A unit eigenvector of the computed eigenvalue `z` by inverse iteration.
@@ -183,12 +162,7 @@ fn eigenvector(matrix: &DMatrix<f64>, z: Complex<f64>) -> DVector<Complex<f64>> 
     // Off the eigenvalue by rounding, so that the factors exist.
     let shift = z + Complex::new(1e-14, 1e-14) * z.norm().max(f64::MIN_POSITIVE);
     let lu = DMatrix::from_fn(m, m, |i, j| {
-        Complex::new(matrix[(i, j)], 0.0)
-            - if i == j {
-                shift
-            } else {
-                Complex::new(0.0, 0.0)
-            }
+        Complex::new(matrix[(i, j)], 0.0) - if i == j { shift } else { Complex::new(0.0, 0.0) }
     })
     .lu();
     let mut y = DVector::from_element(m, Complex::new(1.0 / (m as f64).sqrt(), 0.0));

@@ -17,10 +17,7 @@ const FEWEST: usize = 4;
 /// assert!((rate - 0.8).abs() < 1e-4);
 /// ```
 pub fn observed_rate(history: &[f64], floor: f64) -> Option<f64> {
-    let end = history
-        .iter()
-        .position(|&e| !(e > floor && e.is_finite()))
-        .unwrap_or(history.len());
+    let end = history.iter().position(|&e| !(e > floor && e.is_finite())).unwrap_or(history.len());
     let usable = &history[..end];
     if usable.len() < FEWEST {
         return None;
@@ -60,27 +57,22 @@ mod tests {
 
     #[test]
     fn the_slow_mode_counts_not_the_loud_one() {
-        let history: Vec<f64> = (0..120)
-            .map(|k| 1e6 * 0.5f64.powi(k) + 0.95f64.powi(k))
-            .collect();
+        let history: Vec<f64> = (0..120).map(|k| 1e6 * 0.5f64.powi(k) + 0.95f64.powi(k)).collect();
         let rate = observed_rate(&history, 0.0).expect("long enough");
         assert!((rate - 0.95).abs() < 1e-3, "{rate}");
     }
 
     #[test]
     fn rounding_level_does_not_count() {
-        let history: Vec<f64> = (0..200)
-            .map(|k| 0.7f64.powi(k).max(1e-15) * if k % 2 == 0 { 1.0 } else { 1.1 })
-            .collect();
+        let history: Vec<f64> =
+            (0..200).map(|k| 0.7f64.powi(k).max(1e-15) * if k % 2 == 0 { 1.0 } else { 1.1 }).collect();
         let rate = observed_rate(&history, 1e-14).expect("long enough");
         assert!((rate - 0.7).abs() < 1e-2, "{rate}");
     }
 
     #[test]
     fn growth_is_a_rate_above_one() {
-        let history: Vec<f64> = (0..60)
-            .map(|k| 0.3f64.powi(k) + 1e-3 * 1.25f64.powi(k))
-            .collect();
+        let history: Vec<f64> = (0..60).map(|k| 0.3f64.powi(k) + 1e-3 * 1.25f64.powi(k)).collect();
         let rate = observed_rate(&history, 0.0).expect("long enough");
         assert!((rate - 1.25).abs() < 1e-6, "{rate}");
     }

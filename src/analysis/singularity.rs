@@ -72,29 +72,22 @@ impl Singularity {
     /// Decides from the mesh alone. The points are the mesh's positions. O(corners).
     pub fn detect(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Self {
         let (component, components) = topology.components(&mesh.faces);
-        let mut verdict = Singularity {
-            components,
-            singular: Vec::new(),
-            colouring: vec![0; mesh.len()],
-            excited: false,
-        };
+        let mut verdict =
+            Singularity { components, singular: Vec::new(), colouring: vec![0; mesh.len()], excited: false };
         if scheme != Scheme::CatmullClark {
             return verdict;
         }
         let mut colour = colour(mesh, topology);
         let mut regular = vec![false; components];
         for v in 0..mesh.len() {
-            let bad = topology.incidence.face_count(v) != 3
-                || neighbours(mesh, topology, v).any(|w| colour[w] == colour[v]);
+            let bad =
+                topology.incidence.face_count(v) != 3 || neighbours(mesh, topology, v).any(|w| colour[w] == colour[v]);
             if bad {
                 regular[component[v] as usize] = true;
             }
         }
         let mut found: Vec<Option<usize>> = vec![None; components];
-        let largest = mesh
-            .positions
-            .iter()
-            .fold(0.0f64, |m, p| m.max(p.abs().max_element()));
+        let largest = mesh.positions.iter().fold(0.0f64, |m, p| m.max(p.abs().max_element()));
         for v in 0..mesh.len() {
             let c = component[v] as usize;
             if regular[c] {
@@ -102,11 +95,7 @@ impl Singularity {
                 continue;
             }
             let at = *found[c].get_or_insert_with(|| {
-                verdict.singular.push(SingularComponent {
-                    first_vertex: v,
-                    vertices: 0,
-                    unreachable: DVec3::ZERO,
-                });
+                verdict.singular.push(SingularComponent { first_vertex: v, vertices: 0, unreachable: DVec3::ZERO });
                 verdict.singular.len() - 1
             });
             let here = &mut verdict.singular[at];
@@ -174,11 +163,7 @@ pub(super) fn colour(mesh: &Mesh, topology: &Topology) -> Vec<i8> {
 }
 
 /// The other ends of the edges at `v`; on closed meshes each comes twice.
-fn neighbours<'a>(
-    mesh: &'a Mesh,
-    topology: &'a Topology,
-    v: usize,
-) -> impl Iterator<Item = usize> + 'a {
+fn neighbours<'a>(mesh: &'a Mesh, topology: &'a Topology, v: usize) -> impl Iterator<Item = usize> + 'a {
     let corners = mesh.faces.corners();
     topology.incidence.corners_at(v).iter().flat_map(move |&c| {
         let range = mesh.faces.range(topology.incidence.face_of(c));
@@ -218,12 +203,7 @@ pub struct Mode {
 ///
 /// # Errors
 /// As [`eigen::extreme`] and [`dense::eigenpairs`].
-pub fn modes(
-    system: &LimitSystem,
-    operator: Operator,
-    end: End,
-    count: usize,
-) -> Result<Vec<Mode>> {
+pub fn modes(system: &LimitSystem, operator: Operator, end: End, count: usize) -> Result<Vec<Mode>> {
     let s = symmetric(system, operator);
     let pairs: Vec<(Eigenvalue, Vec<f64>)> = if system.len() <= dense::LARGEST {
         let (values, vectors) = dense::eigenpairs(&s)?;
@@ -237,14 +217,7 @@ pub fn modes(
             .map(|(value, x)| {
                 let (_, residual) = super::lanczos::rayleigh(&s, &x);
                 let error = residual;
-                (
-                    Eigenvalue {
-                        value,
-                        residual,
-                        error,
-                    },
-                    x,
-                )
+                (Eigenvalue { value, residual, error }, x)
             })
             .collect()
     } else {
@@ -253,12 +226,7 @@ pub fn modes(
             Operator::A => (b.lambda_min, b.lambda_max),
             Operator::Jacobi => (b.jacobi_lambda_min, b.jacobi_lambda_max),
         };
-        let request = Request {
-            end,
-            count,
-            tolerance: 1e-9,
-            spectrum,
-        };
+        let request = Request { end, count, tolerance: 1e-9, spectrum };
         let found = eigen::extreme(&s, &request)?;
         found.values.into_iter().zip(found.vectors).collect()
     };
@@ -269,15 +237,9 @@ pub fn modes(
             let squares: f64 = x.iter().map(|x| x * x).sum();
             let fourth: f64 = x.iter().map(|x| x.powi(4)).sum();
             let mut values: Vec<f64> = x.iter().zip(&scale).map(|(x, s)| x * s).collect();
-            let largest = values
-                .iter()
-                .fold(0.0f64, |m, &v| if v.abs() > m.abs() { v } else { m });
+            let largest = values.iter().fold(0.0f64, |m, &v| if v.abs() > m.abs() { v } else { m });
             values.iter_mut().for_each(|v| *v /= largest);
-            Mode {
-                eigenvalue,
-                values,
-                participation: squares * squares / (x.len() as f64 * fourth),
-            }
+            Mode { eigenvalue, values, participation: squares * squares / (x.len() as f64 * fourth) }
         })
         .collect())
 }

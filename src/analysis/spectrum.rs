@@ -29,9 +29,7 @@ pub struct Extremes {
 impl Extremes {
     /// max |1 − ωλ| over the interval: the rate of relaxation by ω.
     pub fn radius(self, omega: f64) -> f64 {
-        (1.0 - omega * self.min)
-            .abs()
-            .max((1.0 - omega * self.max).abs())
+        (1.0 - omega * self.min).abs().max((1.0 - omega * self.max).abs())
     }
 
     /// 2/(λ_min + λ_max), where the rate is best.
@@ -149,10 +147,7 @@ pub struct Ends {
 impl Ends {
     /// The values alone.
     pub fn spectrum(&self) -> Spectrum {
-        let pair = |min: Estimate, max: Estimate| Extremes {
-            min: min.value,
-            max: max.value,
-        };
+        let pair = |min: Estimate, max: Estimate| Extremes { min: min.value, max: max.value };
         Spectrum {
             a: pair(self.lambda_min, self.lambda_max),
             jacobi: pair(self.jacobi_lambda_min, self.jacobi_lambda_max),
@@ -169,14 +164,9 @@ impl Ends {
     }
 
     pub fn converged(&self) -> bool {
-        [
-            self.lambda_min,
-            self.lambda_max,
-            self.jacobi_lambda_min,
-            self.jacobi_lambda_max,
-        ]
-        .iter()
-        .all(|e| e.source != Source::Unconverged)
+        [self.lambda_min, self.lambda_max, self.jacobi_lambda_min, self.jacobi_lambda_max]
+            .iter()
+            .all(|e| e.source != Source::Unconverged)
     }
 }
 
@@ -212,12 +202,7 @@ pub fn ends(system: &LimitSystem) -> Result<Ends> {
         });
     }
     let (signs, components) = alternating(&system.m);
-    let known = Known {
-        bounds: system.bounds,
-        signs,
-        alternation_is_all: false,
-        components,
-    };
+    let known = Known { bounds: system.bounds, signs, alternation_is_all: false, components };
     known.ends(system, |_, _| Ok(None))
 }
 
@@ -249,8 +234,7 @@ pub fn mesh_ends(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Result<End
         return ends(&LimitSystem::new(mesh, topology, scheme)?);
     }
     let fronts = in_fronts(&mesh.faces, &topology.incidence);
-    let operator =
-        crate::assemble::Operator::in_order(&mesh.faces, topology, scheme, Some(&fronts))?;
+    let operator = crate::assemble::Operator::in_order(&mesh.faces, topology, scheme, Some(&fronts))?;
     let signs: Vec<f64> = colour(mesh, topology).into_iter().map(f64::from).collect();
     let known = Known {
         bounds: operator.bounds(),
@@ -265,10 +249,7 @@ pub fn mesh_ends(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Result<End
             residual: found.width,
             error: found.width,
             source: Source::Bracketed,
-            multiplicity: Some(Multiplicity {
-                count: found.multiplicity,
-                within: found.width / found.value.abs(),
-            }),
+            multiplicity: Some(Multiplicity { count: found.multiplicity, within: found.width / found.value.abs() }),
         }))
     })?;
     if mesh.len() <= COUNTED {
@@ -292,10 +273,7 @@ fn count(s: &Csr, end: End, estimate: &mut Estimate) {
     let within = 2.0 * ACCURACY;
     let slack = (within * estimate.value.abs()).max(ZERO);
     let below = |sigma: f64| inertia(s, sigma).ok().map(|i| i.below);
-    let (lower, upper) = rayon::join(
-        || below(estimate.value - slack),
-        || below(estimate.value + slack),
-    );
+    let (lower, upper) = rayon::join(|| below(estimate.value - slack), || below(estimate.value + slack));
     if let (Some(lower), Some(upper)) = (lower, upper) {
         let beyond = match end {
             End::Lowest => lower,
@@ -322,10 +300,7 @@ fn dense_ends(ascending: &[f64]) -> (Estimate, Estimate) {
             residual: error,
             error,
             source: Source::Dense,
-            multiplicity: Some(Multiplicity {
-                count: ascending.iter().filter(equal).count(),
-                within: ACCURACY,
-            }),
+            multiplicity: Some(Multiplicity { count: ascending.iter().filter(equal).count(), within: ACCURACY }),
         }
     };
     (estimate(ascending.first()), estimate(ascending.last()))
@@ -343,27 +318,17 @@ struct Known {
 
 impl Known {
     /// The ends of both operators; `enclose` may know an end that attains no bound.
-    fn ends<T: Scalar>(
-        &self,
-        system: &T,
-        enclose: impl Fn(Operator, End) -> Result<Option<Estimate>>,
-    ) -> Result<Ends> {
+    fn ends<T: Scalar>(&self, system: &T, enclose: impl Fn(Operator, End) -> Result<Option<Estimate>>) -> Result<Ends> {
         let b = &self.bounds;
         let mut applications = 0;
         let a = self.operator_ends(
-            &Matrix {
-                system,
-                which: Operator::A,
-            },
+            &Matrix { system, which: Operator::A },
             (b.lambda_min, b.lambda_max),
             &enclose,
             &mut applications,
         )?;
         let jacobi = self.operator_ends(
-            &Matrix {
-                system,
-                which: Operator::Jacobi,
-            },
+            &Matrix { system, which: Operator::Jacobi },
             (b.jacobi_lambda_min, b.jacobi_lambda_max),
             &enclose,
             &mut applications,
@@ -393,13 +358,7 @@ impl Known {
             // Within rounding of the bound, as a value and as an eigenvector.
             let rounding = 64.0 * f64::EPSILON;
             let attains = (value - bound).abs() <= rounding && residual <= rounding.sqrt() * 1e-3;
-            attains.then_some(Estimate {
-                value,
-                residual,
-                error: rounding,
-                source: Source::Proven,
-                multiplicity,
-            })
+            attains.then_some(Estimate { value, residual, error: rounding, source: Source::Proven, multiplicity })
         };
         let once = exactly(self.components);
         let low = attained(least, &self.signs, self.alternation_is_all.then_some(once));
@@ -412,8 +371,7 @@ impl Known {
                 return Ok(known);
             }
             let enclosed = enclose(matrix.which, end)?;
-            if let Some(enclosed) = enclosed.filter(|e| e.error <= 1.01 * ACCURACY * e.value.abs())
-            {
+            if let Some(enclosed) = enclosed.filter(|e| e.error <= 1.01 * ACCURACY * e.value.abs()) {
                 return Ok(enclosed);
             }
             let (ends, start) = match end {
@@ -427,12 +385,7 @@ impl Known {
                 // component; and of all the symmetries that this one has, which leaves fewer values near it.
                 End::Highest => (lanczos::Wanted::Highest, constant.clone()),
             };
-            let limits = lanczos::Limits {
-                tolerance: ACCURACY,
-                max_steps: STEPS,
-                least_weight: 0.0,
-                ends,
-            };
+            let limits = lanczos::Limits { tolerance: ACCURACY, max_steps: STEPS, least_weight: 0.0, ends };
             let run = lanczos::extremes(matrix, start, limits)?;
             *applications += run.steps;
             let found = match end {
@@ -443,11 +396,7 @@ impl Known {
                 value: found.value,
                 residual: found.residual,
                 error: found.error,
-                source: if run.converged {
-                    Source::Lanczos
-                } else {
-                    Source::Unconverged
-                },
+                source: if run.converged { Source::Lanczos } else { Source::Unconverged },
                 multiplicity: enclosed.and_then(|e| e.multiplicity),
             })
         };
@@ -494,19 +443,12 @@ fn alternating(m: &Csr) -> (Vec<f64>, usize) {
 ///
 /// # Panics
 /// If there is not one point a vertex.
-pub fn excited(
-    system: &(impl System + Scalar),
-    points: &[DVec3],
-    operator: Operator,
-) -> Result<Option<Extremes>> {
+pub fn excited(system: &(impl System + Scalar), points: &[DVec3], operator: Operator) -> Result<Option<Extremes>> {
     let n = points.len();
     let mut e = vec![DVec3::ZERO; n];
     let errors = Rows::new(n).residual(system, points, points, &mut e, |_, e, out, _| *out = e);
     let largest = errors.errors.max;
-    let matrix = Matrix {
-        system,
-        which: operator,
-    };
+    let matrix = Matrix { system, which: operator };
     let mut found: Option<Extremes> = None;
     for axis in 0..3 {
         if e.iter().all(|e| e[axis].abs() <= 1e-12 * largest) {
@@ -515,11 +457,7 @@ pub fn excited(
         // The residual of A V = P, or of D⁻¹A V = D⁻¹P.
         let start: Vec<f64> = match operator {
             Operator::A => e.iter().map(|e| e[axis]).collect(),
-            Operator::Jacobi => e
-                .iter()
-                .zip(Scalar::diagonal(system))
-                .map(|(e, a)| e[axis] / a)
-                .collect(),
+            Operator::Jacobi => e.iter().zip(Scalar::diagonal(system)).map(|(e, a)| e[axis] / a).collect(),
         };
         let limits = lanczos::Limits {
             tolerance: ACCURACY,
@@ -528,16 +466,10 @@ pub fn excited(
             ends: lanczos::Wanted::Both,
         };
         let run = lanczos::extremes(&matrix, start, limits)?;
-        let here = Extremes {
-            min: run.low.value,
-            max: run.high.value,
-        };
+        let here = Extremes { min: run.low.value, max: run.high.value };
         found = Some(match found {
             None => here,
-            Some(f) => Extremes {
-                min: f.min.min(here.min),
-                max: f.max.max(here.max),
-            },
+            Some(f) => Extremes { min: f.min.min(here.min), max: f.max.max(here.max) },
         });
     }
     Ok(found)
@@ -554,11 +486,6 @@ pub fn scales(system: &LimitSystem, operator: Operator) -> Vec<f64> {
     match operator {
         Operator::A => system.h.iter().map(|h| h.sqrt()).collect(),
         // m_ii = a_ii/h_i
-        Operator::Jacobi => system
-            .diagonal
-            .iter()
-            .zip(&system.h)
-            .map(|(a, h)| (h / a).sqrt())
-            .collect(),
+        Operator::Jacobi => system.diagonal.iter().zip(&system.h).map(|(a, h)| (h / a).sqrt()).collect(),
     }
 }

@@ -46,14 +46,9 @@ pub struct Sweep {
 impl Sweep {
     /// The ω with the fewest iterations among the converged rows of `method`, ties by smaller final error.
     pub fn best(&self, method: Method) -> Option<&Row> {
-        self.rows
-            .iter()
-            .filter(|r| r.method == method && r.outcome == Outcome::Converged)
-            .min_by(|a, b| {
-                (a.iterations, a.errors.max)
-                    .partial_cmp(&(b.iterations, b.errors.max))
-                    .unwrap_or(std::cmp::Ordering::Equal)
-            })
+        self.rows.iter().filter(|r| r.method == method && r.outcome == Outcome::Converged).min_by(|a, b| {
+            (a.iterations, a.errors.max).partial_cmp(&(b.iterations, b.errors.max)).unwrap_or(std::cmp::Ordering::Equal)
+        })
     }
 }
 
@@ -89,16 +84,10 @@ pub fn sweep(
             Method::Pia => (Operator::A, spectrum.a),
             _ => continue,
         };
-        thresholds.push(Thresholds {
-            method: *method,
-            matrix,
-            data: excited(system, points, operator)?,
-        });
+        thresholds.push(Thresholds { method: *method, matrix, data: excited(system, points, operator)? });
     }
-    let jobs: Vec<(Method, f64)> = grids
-        .iter()
-        .flat_map(|(method, omegas)| omegas.iter().map(|&omega| (*method, omega)))
-        .collect();
+    let jobs: Vec<(Method, f64)> =
+        grids.iter().flat_map(|(method, omegas)| omegas.iter().map(|&omega| (*method, omega))).collect();
     let rows: Result<Vec<Row>> = jobs
         .par_iter()
         .map(|&(method, omega)| {
@@ -111,10 +100,7 @@ pub fn sweep(
             let report = run(system, points, setup, stop).report;
             let predicted = predicted_rate(system, &spectrum, setup)?;
             let maxima: Vec<f64> = report.history.iter().map(|e| e.max).collect();
-            let data = thresholds
-                .iter()
-                .find(|t| t.method == method)
-                .and_then(|t| t.data);
+            let data = thresholds.iter().find(|t| t.method == method).and_then(|t| t.data);
             done();
             Ok(Row {
                 method,
@@ -128,9 +114,5 @@ pub fn sweep(
             })
         })
         .collect();
-    Ok(Sweep {
-        spectrum,
-        thresholds,
-        rows: rows?,
-    })
+    Ok(Sweep { spectrum, thresholds, rows: rows? })
 }

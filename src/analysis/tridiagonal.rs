@@ -22,10 +22,7 @@ impl Tridiagonal<'_> {
         let beta = |i: usize| self.betas.get(i).map_or(0.0, |b| b.abs());
         (0..k).fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), i| {
             let radius = beta(i) + if i > 0 { beta(i - 1) } else { 0.0 };
-            (
-                lo.min(self.alphas[i] - radius),
-                hi.max(self.alphas[i] + radius),
-            )
+            (lo.min(self.alphas[i] - radius), hi.max(self.alphas[i] + radius))
         })
     }
 
@@ -69,28 +66,16 @@ impl Tridiagonal<'_> {
     pub fn vector_ends(&self, theta: f64) -> VectorEnds {
         let k = self.alphas.len();
         let safe = |d: f64| {
-            if d == 0.0 {
-                f64::EPSILON * f64::EPSILON
-            } else {
-                d
-            }
+            if d == 0.0 { f64::EPSILON * f64::EPSILON } else { d }
         };
         let mut down = vec![0.0; k];
         let mut up = vec![0.0; k];
         for i in 0..k {
-            let before = if i > 0 {
-                self.betas[i - 1].powi(2) / down[i - 1]
-            } else {
-                0.0
-            };
+            let before = if i > 0 { self.betas[i - 1].powi(2) / down[i - 1] } else { 0.0 };
             down[i] = safe(self.alphas[i] - theta - before);
         }
         for i in (0..k).rev() {
-            let after = if i + 1 < k {
-                self.betas[i].powi(2) / up[i + 1]
-            } else {
-                0.0
-            };
+            let after = if i + 1 < k { self.betas[i].powi(2) / up[i + 1] } else { 0.0 };
             up[i] = safe(self.alphas[i] - theta - after);
         }
         let gamma = |i: usize| (down[i] + up[i] - (self.alphas[i] - theta)).abs();
@@ -107,10 +92,7 @@ impl Tridiagonal<'_> {
             squares += z * z;
         }
         let norm = squares.sqrt();
-        VectorEnds {
-            first: first / norm,
-            last: z / norm,
-        }
+        VectorEnds { first: first / norm, last: z / norm }
     }
 }
 
@@ -125,20 +107,14 @@ mod tests {
     fn the_second_difference_in_closed_form() {
         let k = 57;
         let (alphas, betas) = (vec![2.0; k], vec![-1.0; k - 1]);
-        let t = Tridiagonal {
-            alphas: &alphas,
-            betas: &betas,
-        };
+        let t = Tridiagonal { alphas: &alphas, betas: &betas };
         for j in [0, 1, 28, 56] {
             let angle = (j + 1) as f64 * std::f64::consts::PI / (k + 1) as f64;
             let value = t.eigenvalue(j);
             assert!((value - (2.0 - 2.0 * angle.cos())).abs() < 1e-14);
             let ends = t.vector_ends(value);
             let expected = (2.0 / (k + 1) as f64).sqrt() * angle.sin();
-            assert!(
-                (ends.first.abs() - expected.abs()).abs() < 1e-12,
-                "{ends:?}"
-            );
+            assert!((ends.first.abs() - expected.abs()).abs() < 1e-12, "{ends:?}");
             assert!((ends.last.abs() - expected.abs()).abs() < 1e-12);
         }
     }
@@ -149,10 +125,7 @@ mod tests {
         for k in 1..40 {
             let alphas: Vec<f64> = (0..k).map(|_| rng.random_range(-1.0..1.0)).collect();
             let betas: Vec<f64> = (1..k).map(|_| rng.random_range(-1.0..1.0)).collect();
-            let t = Tridiagonal {
-                alphas: &alphas,
-                betas: &betas,
-            };
+            let t = Tridiagonal { alphas: &alphas, betas: &betas };
             let dense = DMatrix::from_fn(k, k, |i, j| match i.abs_diff(j) {
                 0 => alphas[i],
                 1 => betas[i.min(j)],
@@ -166,14 +139,8 @@ mod tests {
                 assert!((value - eigen.eigenvalues[at]).abs() < 1e-13);
                 let ends = t.vector_ends(value);
                 let exact = eigen.eigenvectors.column(at);
-                assert!(
-                    (ends.first.abs() - exact[0].abs()).abs() < 1e-8,
-                    "{k} {index}"
-                );
-                assert!(
-                    (ends.last.abs() - exact[k - 1].abs()).abs() < 1e-8,
-                    "{k} {index}"
-                );
+                assert!((ends.first.abs() - exact[0].abs()).abs() < 1e-8, "{k} {index}");
+                assert!((ends.last.abs() - exact[k - 1].abs()).abs() < 1e-8, "{k} {index}");
             }
         }
     }

@@ -32,10 +32,7 @@ pub fn regular_band(scheme: Scheme) -> Band {
         Scheme::Nasri => (0.25, 9.0 / 16.0),
         Scheme::ZhengCai => (0.5, 0.625),
     };
-    Band {
-        a: (least, 1.0),
-        jacobi: (least / diagonal, 1.0 / diagonal),
-    }
+    Band { a: (least, 1.0), jacobi: (least / diagonal, 1.0 / diagonal) }
 }
 
 /// What one valence does.
@@ -72,11 +69,8 @@ pub struct Located {
 /// with valence 6 around ([`builtin::star`]), or quads with valence 4 around, on which Euler's formula puts 2k
 /// vertices of valence 3 half-way between (and none else).
 pub fn star_mesh(scheme: Scheme, k: usize) -> (Mesh, [usize; 2]) {
-    let mesh = if scheme.needs_triangles() {
-        builtin::star(k)
-    } else {
-        quad_split(&quad_split(&builtin::bipyramid(k)))
-    };
+    let mesh =
+        if scheme.needs_triangles() { builtin::star(k) } else { quad_split(&quad_split(&builtin::bipyramid(k))) };
     (mesh, [k, k + 1])
 }
 
@@ -96,10 +90,7 @@ fn row(scheme: Scheme, valence: usize) -> Result<Row> {
     let band = regular_band(scheme);
     let outside = |values: &[f64], (lo, hi): (f64, f64)| {
         let tolerance = 1e-9;
-        values
-            .iter()
-            .filter(|&&x| x < lo - tolerance || x > hi + tolerance)
-            .count()
+        values.iter().filter(|&&x| x < lo - tolerance || x > hi + tolerance).count()
     };
     let mut near = vec![false; mesh.len()];
     for pole in poles {
@@ -112,26 +103,10 @@ fn row(scheme: Scheme, valence: usize) -> Result<Row> {
     let locate = |operator, end| -> Result<Located> {
         let mode = modes(&system, operator, end, 1)?.remove(0);
         let total: f64 = mode.values.iter().map(|x| x * x).sum();
-        let inside: f64 = mode
-            .values
-            .iter()
-            .zip(&near)
-            .filter(|(_, near)| **near)
-            .map(|(x, _)| x * x)
-            .sum();
-        let peak = (0..mesh.len()).fold(0, |best, i| {
-            if mode.values[i].abs() > mode.values[best].abs() {
-                i
-            } else {
-                best
-            }
-        });
-        Ok(Located {
-            near_star: inside / total,
-            peak,
-            peak_valence: topology.incidence.face_count(peak),
-            mode,
-        })
+        let inside: f64 = mode.values.iter().zip(&near).filter(|(_, near)| **near).map(|(x, _)| x * x).sum();
+        let peak =
+            (0..mesh.len()).fold(0, |best, i| if mode.values[i].abs() > mode.values[best].abs() { i } else { best });
+        Ok(Located { near_star: inside / total, peak, peak_valence: topology.incidence.face_count(peak), mode })
     };
     Ok(Row {
         valence,

@@ -27,11 +27,7 @@ impl SpectralBounds {
     /// `λ(A) ≥ min (2a_ii − 1)`, `λ(A) ≤ 1`, `2 − max 1/a_ii ≤ λ(D⁻¹A) ≤ max 1/a_ii`.
     pub fn gershgorin(diagonal: &[f64]) -> Self {
         // Both are attained at the least entry.
-        let least = diagonal
-            .par_iter()
-            .with_min_len(CHUNK)
-            .copied()
-            .reduce(|| 1.0, f64::min);
+        let least = diagonal.par_iter().with_min_len(CHUNK).copied().reduce(|| 1.0, f64::min);
         let jacobi_lambda_max = 1.0 / least;
         SpectralBounds {
             lambda_min: 2.0 * least - 1.0,
@@ -43,26 +39,16 @@ impl SpectralBounds {
 
     /// The bounds on a closed mesh. All schemes have `M ⪰ H⁻¹ diag(b)` with b_i = [`lambda_min_at`] of the valence,
     /// so `λ(A) ≥ min b_i` and, D being `H diag M`, `λ(D⁻¹A) ≥ min b_i/a_ii`. O(N).
-    pub fn closed(
-        scheme: Scheme,
-        valences: &[u32],
-        triangles_only: bool,
-        diagonal: &[f64],
-    ) -> Self {
+    pub fn closed(scheme: Scheme, valences: &[u32], triangles_only: bool, diagonal: &[f64]) -> Self {
         let mut bounds = Self::gershgorin(diagonal);
         let greatest = valences.iter().copied().max().unwrap_or(0) as usize;
-        let at: Vec<f64> = (0..=greatest)
-            .map(|n| lambda_min_at(scheme, n, triangles_only))
-            .collect();
+        let at: Vec<f64> = (0..=greatest).map(|n| lambda_min_at(scheme, n, triangles_only)).collect();
         let (a, jacobi) = valences
             .par_iter()
             .zip(diagonal)
             .with_min_len(CHUNK)
             .map(|(&n, a_ii)| (at[n as usize], at[n as usize] / a_ii))
-            .reduce(
-                || (f64::INFINITY, f64::INFINITY),
-                |(a, b), (c, d)| (a.min(c), b.min(d)),
-            );
+            .reduce(|| (f64::INFINITY, f64::INFINITY), |(a, b), (c, d)| (a.min(c), b.min(d)));
         bounds.lambda_min = a.min(1.0);
         bounds.jacobi_lambda_min = jacobi.min(bounds.jacobi_lambda_max);
         bounds

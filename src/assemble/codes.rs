@@ -82,14 +82,8 @@ impl Codes {
         assert!(offsets.first() == Some(&0), "offsets from 0");
         let near = encode(&offsets, &fill).map(|(reach, near)| (reach, Neighbours::Near(near)));
         let far = || encode(&offsets, &fill).map(|(reach, far)| (reach, Neighbours::Far(far)));
-        let (reach, neighbours) = near
-            .or_else(far)
-            .expect("every distance has a code of 32 bits");
-        Codes {
-            offsets,
-            neighbours,
-            reach: reach as usize,
-        }
+        let (reach, neighbours) = near.or_else(far).expect("every distance has a code of 32 bits");
+        Codes { offsets, neighbours, reach: reach as usize }
     }
 
     pub(super) fn rows(&self) -> usize {
@@ -123,12 +117,7 @@ impl Codes {
     ///
     /// # Panics
     /// If a row may reach beyond the points.
-    pub(super) fn window<'a, P>(
-        &'a self,
-        rows: Range<usize>,
-        points: &'a [P],
-        start: usize,
-    ) -> Windows<'a, P> {
+    pub(super) fn window<'a, P>(&'a self, rows: Range<usize>, points: &'a [P], start: usize) -> Windows<'a, P> {
         let low = rows.start.saturating_sub(self.reach);
         let high = (rows.end + self.reach).min(self.rows());
         assert!(
@@ -138,31 +127,14 @@ impl Codes {
         );
         let offsets = &self.offsets;
         match &self.neighbours {
-            Neighbours::Near(codes) => Windows::Near(Window {
-                offsets,
-                codes,
-                rows,
-                points,
-                start,
-                reach: self.reach,
-            }),
-            Neighbours::Far(codes) => Windows::Far(Window {
-                offsets,
-                codes,
-                rows,
-                points,
-                start,
-                reach: self.reach,
-            }),
+            Neighbours::Near(codes) => Windows::Near(Window { offsets, codes, rows, points, start, reach: self.reach }),
+            Neighbours::Far(codes) => Windows::Far(Window { offsets, codes, rows, points, start, reach: self.reach }),
         }
     }
 }
 
 /// The neighbours of all rows in one kind of code, and the greatest distance; `None` if that has no code.
-fn encode<C: Code>(
-    offsets: &[u32],
-    fill: &(impl Fn(usize, &mut [u32]) + Sync),
-) -> Option<(u32, Vec<C>)> {
+fn encode<C: Code>(offsets: &[u32], fill: &(impl Fn(usize, &mut [u32]) + Sync)) -> Option<(u32, Vec<C>)> {
     let n = offsets.len() - 1;
     let mut codes = large(vec![C::default(); offsets[n] as usize]);
     let mut tasks = Vec::with_capacity(n.div_ceil(CHUNK));
@@ -270,12 +242,7 @@ impl<'a, P: Point, C: Code> Window<'a, P, C> {
 
     /// `visit(slot, own)` for rows of which no neighbour is asked for.
     #[inline(always)]
-    pub(super) fn alone<T>(
-        &self,
-        rows: Range<usize>,
-        slots: impl Iterator<Item = T>,
-        mut visit: impl FnMut(T, P),
-    ) {
+    pub(super) fn alone<T>(&self, rows: Range<usize>, slots: impl Iterator<Item = T>, mut visit: impl FnMut(T, P)) {
         let own = &self.points[rows.start - self.start..][..rows.len()];
         slots.zip(own).for_each(|(slot, &own)| visit(slot, own));
     }
@@ -289,16 +256,9 @@ impl<'a, P: Point, C: Code> Window<'a, P, C> {
         slots: impl Iterator<Item = T>,
         mut visit: impl FnMut(T, P, usize, &[C]),
     ) {
-        assert!(
-            self.rows.start <= rows.start && rows.end <= self.rows.end,
-            "rows of the window"
-        );
+        assert!(self.rows.start <= rows.start && rows.end <= self.rows.end, "rows of the window");
         let codes = &self.codes[self.offsets[rows.start] as usize..self.offsets[rows.end] as usize];
-        assert_eq!(
-            codes.len(),
-            rows.len() * length,
-            "rows of {length} neighbours"
-        );
+        assert_eq!(codes.len(), rows.len() * length, "rows of {length} neighbours");
         let first = rows.start - self.start;
         let own = &self.points[first..][..rows.len()];
         let lists = codes.chunks_exact(length);

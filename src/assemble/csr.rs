@@ -20,14 +20,8 @@ impl Pattern {
     /// # Panics
     /// If the arrays do not describe a square matrix with ascending columns in every row.
     pub fn new(offsets: Vec<u32>, columns: Vec<u32>) -> Self {
-        assert!(
-            offsets.first() == Some(&0) && offsets.is_sorted(),
-            "row offsets ascend from 0"
-        );
-        assert!(
-            offsets.last().map(|&l| l as usize) == Some(columns.len()),
-            "row offsets end at the number of entries"
-        );
+        assert!(offsets.first() == Some(&0) && offsets.is_sorted(), "row offsets ascend from 0");
+        assert!(offsets.last().map(|&l| l as usize) == Some(columns.len()), "row offsets end at the number of entries");
         let n = offsets.len() - 1;
         let pattern = Pattern { offsets, columns };
         (0..n).into_par_iter().with_min_len(CHUNK).for_each(|i| {
@@ -66,10 +60,7 @@ impl Pattern {
 
     /// The largest |i − j| of a stored entry.
     pub fn bandwidth(&self) -> usize {
-        (0..self.len())
-            .flat_map(|i| self.row(i).iter().map(move |&j| i.abs_diff(j as usize)))
-            .max()
-            .unwrap_or(0)
+        (0..self.len()).flat_map(|i| self.row(i).iter().map(move |&j| i.abs_diff(j as usize))).max().unwrap_or(0)
     }
 }
 
@@ -84,11 +75,7 @@ impl Csr {
     /// # Panics
     /// If there is not one value for every stored entry.
     pub fn new(pattern: Arc<Pattern>, values: Vec<f64>) -> Self {
-        assert_eq!(
-            pattern.columns.len(),
-            values.len(),
-            "one value for every entry"
-        );
+        assert_eq!(pattern.columns.len(), values.len(), "one value for every entry");
         Csr { pattern, values }
     }
 
@@ -116,10 +103,7 @@ impl Csr {
     /// The stored entries of row `i` as (column, value).
     pub fn row(&self, i: usize) -> impl ExactSizeIterator<Item = (usize, f64)> + '_ {
         let range = self.pattern.range(i);
-        self.pattern.columns[range.clone()]
-            .iter()
-            .zip(&self.values[range])
-            .map(|(&j, &a)| (j as usize, a))
+        self.pattern.columns[range.clone()].iter().zip(&self.values[range]).map(|(&j, &a)| (j as usize, a))
     }
 
     /// The entry (i, j); 0 where none is stored. O(log of the row's length).
@@ -133,11 +117,7 @@ impl Csr {
 
     /// The main diagonal.
     pub fn diagonal(&self) -> Vec<f64> {
-        (0..self.len())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(|i| self.get(i, i))
-            .collect()
+        (0..self.len()).into_par_iter().with_min_len(CHUNK).map(|i| self.get(i, i)).collect()
     }
 
     /// `diag(scale) · self`, on the same pattern.
@@ -166,10 +146,7 @@ impl Csr {
                 part = after;
             }
         });
-        Csr {
-            pattern: Arc::clone(&self.pattern),
-            values,
-        }
+        Csr { pattern: Arc::clone(&self.pattern), values }
     }
 
     /// `diag(scale) · self · diag(scale)`, on the same pattern; symmetric to the last bit if `self` is.
@@ -182,10 +159,7 @@ impl Csr {
         for (i, &s) in scale.iter().enumerate() {
             values.extend(self.row(i).map(|(j, v)| v * (s * scale[j])));
         }
-        Csr {
-            pattern: Arc::clone(&self.pattern),
-            values,
-        }
+        Csr { pattern: Arc::clone(&self.pattern), values }
     }
 
     /// Row `i` times the points `x`: Σ_j a_ij x_j.
@@ -193,10 +167,7 @@ impl Csr {
     pub fn row_times(&self, i: usize, x: &[DVec3]) -> DVec3 {
         let range = self.pattern.range(i);
         let mut sum = DVec3::ZERO;
-        for (&j, &a) in self.pattern.columns[range.clone()]
-            .iter()
-            .zip(&self.values[range])
-        {
+        for (&j, &a) in self.pattern.columns[range.clone()].iter().zip(&self.values[range]) {
             sum += a * x[j as usize];
         }
         sum
@@ -207,10 +178,6 @@ impl Csr {
     pub fn row_times_scalar(&self, i: usize, x: &[f64]) -> f64 {
         let range = self.pattern.range(i);
         let columns = &self.pattern.columns[range.clone()];
-        columns
-            .iter()
-            .zip(&self.values[range])
-            .map(|(&j, &a)| a * x[j as usize])
-            .sum()
+        columns.iter().zip(&self.values[range]).map(|(&j, &a)| a * x[j as usize]).sum()
     }
 }

@@ -56,21 +56,10 @@ impl Operator {
     ///
     /// # Panics
     /// If the numbering is of another number of vertices.
-    pub fn in_order(
-        faces: &Faces,
-        topology: &Topology,
-        scheme: Scheme,
-        numbering: Option<&Numbering>,
-    ) -> Result<Self> {
+    pub fn in_order(faces: &Faces, topology: &Topology, scheme: Scheme, numbering: Option<&Numbering>) -> Result<Self> {
         check_boundary(topology, scheme)?;
         let open = (topology.boundary_edges() > 0).then_some(topology);
-        Self::build(
-            faces,
-            (&topology.incidence, open),
-            topology.is_closed(),
-            scheme,
-            numbering,
-        )
+        Self::build(faces, (&topology.incidence, open), topology.is_closed(), scheme, numbering)
     }
 
     /// As [`in_order`](Self::in_order), on a mesh that is [closed](Incidence::is_closed): a topology is not needed.
@@ -100,22 +89,13 @@ impl Operator {
         let source = Source::new(faces, sides, scheme, numbering);
         let kinds = source.kinds();
         let greatest = source.valences.iter().copied().max().unwrap_or(0);
-        let h: Vec<f64> = (0..=greatest)
-            .map(|n| scheme.h(n.max(1) as usize))
-            .collect();
+        let h: Vec<f64> = (0..=greatest).map(|n| scheme.h(n.max(1) as usize)).collect();
         let polygons = source.polygons(&kinds);
         let offsets = source.offsets(&kinds)?;
         let runs = runs(&kinds, &source.valences);
         let codes = source.codes(&kinds, offsets);
         let double = source.rings();
-        let stencil = Stencil {
-            runs,
-            codes,
-            kinds,
-            single: double.single(),
-            double,
-            polygons,
-        };
+        let stencil = Stencil { runs, codes, kinds, single: double.single(), double, polygons };
         // The rows of a run are alike, but for the sizes of faces that are summed: there the extremes tell all.
         let (valences, diagonal): (Vec<u32>, Vec<f64>) = (0..stencil.runs.len())
             .into_par_iter()
@@ -158,8 +138,7 @@ impl Operator {
 
     /// diag A.
     pub fn diagonal(&self) -> &[f64] {
-        self.diagonal
-            .get_or_init(|| self.by_row(|i| self.stencil.diagonal(i)))
+        self.diagonal.get_or_init(|| self.by_row(|i| self.stencil.diagonal(i)))
     }
 
     fn by_row(&self, value: impl Fn(usize) -> f64 + Send + Sync) -> Vec<f64> {
@@ -270,10 +249,6 @@ impl Operator {
 
     /// Neighbours of all rows together, but for those by faces that are summed.
     pub fn entries(&self) -> usize {
-        self.stencil
-            .codes
-            .offsets()
-            .last()
-            .map_or(0, |&end| end as usize)
+        self.stencil.codes.offsets().last().map_or(0, |&end| end as usize)
     }
 }

@@ -77,16 +77,14 @@ impl Polygons {
         let sorted = all.sort(&mut numbers, kinds.len().div_ceil(BLOCK));
         all.measure(faces, scheme, &sorted);
         all.corners = large(vec![0; all.offsets.last().map_or(0, |&end| end as usize)]);
-        split_rows(&all.offsets, CHUNK, &mut all.corners)
-            .into_par_iter()
-            .for_each(|(some, mut rest)| {
-                for &f in &sorted[some] {
-                    let face = faces.face(f as usize);
-                    let (corners, after) = rest.split_at_mut(face.len());
-                    corners.iter_mut().zip(face).for_each(|(c, &v)| *c = row(v));
-                    rest = after;
-                }
-            });
+        split_rows(&all.offsets, CHUNK, &mut all.corners).into_par_iter().for_each(|(some, mut rest)| {
+            for &f in &sorted[some] {
+                let face = faces.face(f as usize);
+                let (corners, after) = rest.split_at_mut(face.len());
+                corners.iter_mut().zip(face).for_each(|(c, &v)| *c = row(v));
+                rest = after;
+            }
+        });
         all.list(faces, incidence, numbering, (kinds, valences), &numbers);
         all
     }
@@ -183,14 +181,11 @@ impl Polygons {
         self.starts = large(Vec::with_capacity(kinds.len() + 1));
         self.starts.push(0);
         let mut end = 0;
-        self.starts
-            .extend(kinds.iter().zip(valences).map(|(&kind, n)| {
-                end += if kind == Kind::Polygons { *n } else { 0 };
-                end
-            }));
-        let listed = self.table(faces, incidence, numbering, |c| {
-            numbers[incidence.face_of(c)]
-        });
+        self.starts.extend(kinds.iter().zip(valences).map(|(&kind, n)| {
+            end += if kind == Kind::Polygons { *n } else { 0 };
+            end
+        }));
+        let listed = self.table(faces, incidence, numbering, |c| numbers[incidence.face_of(c)]);
         if self.parts > 1 {
             let places = self.table(faces, incidence, numbering, |c| {
                 let range = faces.range(incidence.face_of(c));
@@ -211,22 +206,18 @@ impl Polygons {
     ) -> Vec<u32> {
         let count = self.starts.last().map_or(0, |&end| end as usize);
         let mut table = large(vec![0; count]);
-        split_rows(&self.starts, CHUNK, &mut table)
-            .into_par_iter()
-            .for_each(|(rows, mut rest)| {
-                for i in rows.filter(|&i| !self.at(i).is_empty()) {
-                    if let Some(numbering) = numbering {
-                        incidence.fetch_ahead(faces, numbering.order(), i);
-                    }
-                    let v = numbering.map_or(i, |numbering| numbering.order()[i] as usize);
-                    let corners = incidence.corners_at(v);
-                    let (at, after) = rest.split_at_mut(corners.len());
-                    at.iter_mut()
-                        .zip(corners)
-                        .for_each(|(slot, &c)| *slot = value(c));
-                    rest = after;
+        split_rows(&self.starts, CHUNK, &mut table).into_par_iter().for_each(|(rows, mut rest)| {
+            for i in rows.filter(|&i| !self.at(i).is_empty()) {
+                if let Some(numbering) = numbering {
+                    incidence.fetch_ahead(faces, numbering.order(), i);
                 }
-            });
+                let v = numbering.map_or(i, |numbering| numbering.order()[i] as usize);
+                let corners = incidence.corners_at(v);
+                let (at, after) = rest.split_at_mut(corners.len());
+                at.iter_mut().zip(corners).for_each(|(slot, &c)| *slot = value(c));
+                rest = after;
+            }
+        });
         table
     }
 
@@ -248,13 +239,7 @@ impl Polygons {
 
     /// Bytes that one sweep reads.
     pub(super) fn bytes(&self) -> usize {
-        let lists = [
-            &self.offsets,
-            &self.corners,
-            &self.starts,
-            &self.faces,
-            &self.places,
-        ];
+        let lists = [&self.offsets, &self.corners, &self.starts, &self.faces, &self.places];
         4 * lists.into_iter().map(Vec::len).sum::<usize>()
     }
 
@@ -262,9 +247,7 @@ impl Polygons {
     /// to the last.
     pub(super) fn sums_of(&self, rows: Range<usize>) -> Range<usize> {
         let first = |row: usize| {
-            debug_assert!(
-                row.is_multiple_of(BLOCK) || row.div_ceil(BLOCK) + 1 == self.blocks.len()
-            );
+            debug_assert!(row.is_multiple_of(BLOCK) || row.div_ceil(BLOCK) + 1 == self.blocks.len());
             match self.blocks.get(row.div_ceil(BLOCK)) {
                 Some(&face) => self.parts * face as usize,
                 None => 0,
@@ -297,10 +280,7 @@ impl Polygons {
         let corners = self.corners_of(self.faces[e] as usize);
         let size = corners.len();
         let first = self.first_turn[size] as usize;
-        let place = self
-            .places
-            .get(e)
-            .map_or(0, |&place| place as usize - first);
+        let place = self.places.get(e).map_or(0, |&place| place as usize - first);
         let circulant = &self.circulants[2 * first + size - 1 - place..];
         (corners, &circulant[..size])
     }
@@ -309,11 +289,7 @@ impl Polygons {
     pub(super) fn entries(&self, i: usize, mut visit: impl FnMut(usize, f64)) {
         for e in self.at(i) {
             let (corners, weights) = self.block(e);
-            for (&j, &m) in corners
-                .iter()
-                .zip(weights)
-                .filter(|&(&j, _)| j as usize != i)
-            {
+            for (&j, &m) in corners.iter().zip(weights).filter(|&(&j, _)| j as usize != i) {
                 visit(j as usize, m);
             }
         }
@@ -331,12 +307,7 @@ impl Polygons {
     }
 
     /// The sums from number `first` on, of whole faces. `points` holds x from row `start` on, as far as these reach.
-    pub(super) fn sum<P: Point>(
-        &self,
-        first: usize,
-        (points, start): (&[P], usize),
-        sums: &mut [P],
-    ) {
+    pub(super) fn sum<P: Point>(&self, first: usize, (points, start): (&[P], usize), sums: &mut [P]) {
         if sums.is_empty() {
             return;
         }
@@ -344,10 +315,7 @@ impl Polygons {
         let mut next = self.runs.partition_point(|&r| r as usize <= faces.start);
         let (mut from, mut rest) = (faces.start, sums);
         while from < faces.end {
-            let to = self
-                .runs
-                .get(next)
-                .map_or(faces.end, |&r| faces.end.min(r as usize));
+            let to = self.runs.get(next).map_or(faces.end, |&r| faces.end.min(r as usize));
             next += 1;
             let corners = self.offsets[from] as usize..self.offsets[to] as usize;
             let (sums, after) = rest.split_at_mut(self.parts * (to - from));
@@ -365,19 +333,10 @@ impl Polygons {
 
     /// The sums of faces of one size.
     #[inline(always)]
-    fn sum_run<P: Point>(
-        &self,
-        size: usize,
-        corners: Range<usize>,
-        (points, start): (&[P], usize),
-        sums: &mut [P],
-    ) {
+    fn sum_run<P: Point>(&self, size: usize, corners: Range<usize>, (points, start): (&[P], usize), sums: &mut [P]) {
         let point = |&v: &u32| points[(v as usize).wrapping_sub(start)];
         let far = is_far(points);
-        let ahead = self
-            .corners
-            .get(corners.start + AHEAD..)
-            .unwrap_or_default();
+        let ahead = self.corners.get(corners.start + AHEAD..).unwrap_or_default();
         let mut ahead = ahead.chunks_exact(size);
         let mut fetch = || {
             for &v in ahead.next().unwrap_or_default() {

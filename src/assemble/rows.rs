@@ -142,11 +142,7 @@ impl Short {
 
 /// Moves rows that are shorter than their place together by `shift(from, to)`, in ascending order, and returns the
 /// new end.
-fn close_gaps(
-    offsets: &mut [u32],
-    lengths: &[u32],
-    mut shift: impl FnMut(Range<usize>, usize),
-) -> usize {
+fn close_gaps(offsets: &mut [u32], lengths: &[u32], mut shift: impl FnMut(Range<usize>, usize)) -> usize {
     let mut end = 0;
     for (offset, &length) in offsets.iter_mut().zip(lengths) {
         let start = *offset as usize;
@@ -168,14 +164,7 @@ impl<'a> Rows<'a> {
         by_valence: &'a [[f64; 2]],
         valence: &'a [u32],
     ) -> Self {
-        Rows {
-            faces,
-            topology,
-            blocks,
-            by_valence,
-            valence,
-            closed: topology.is_closed(),
-        }
+        Rows { faces, topology, blocks, by_valence, valence, closed: topology.is_closed() }
     }
 
     /// All rows.
@@ -208,11 +197,7 @@ impl<'a> Rows<'a> {
             });
             edges + 1 + others.sum::<u32>()
         };
-        (0..self.valence.len())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(length)
-            .collect()
+        (0..self.valence.len()).into_par_iter().with_min_len(CHUNK).map(length).collect()
     }
 
     /// All rows, if their lengths are at most these; otherwise their true lengths.
@@ -276,17 +261,7 @@ impl<'a> Rows<'a> {
             m.truncate(filled);
             a.truncate(filled);
         }
-        Ok(if fit {
-            Ok(Arrays {
-                offsets,
-                columns,
-                m,
-                a,
-                diagonal,
-            })
-        } else {
-            Err(lengths)
-        })
+        Ok(if fit { Ok(Arrays { offsets, columns, m, a, diagonal }) } else { Err(lengths) })
     }
 
     /// Row `v` of M on a closed mesh, if it is short and no vertex occurs twice in the faces at `v` but by their common
@@ -382,9 +357,7 @@ mod tests {
         assert!(topology.is_closed());
         let valence = valences(&mesh.faces, &topology);
         let most = valence.iter().max().map_or(0, |&n| n as usize);
-        let by_valence: Vec<[f64; 2]> = (0..=most)
-            .map(|n| [scheme.h(n), scheme.vertex_weight(n)])
-            .collect();
+        let by_valence: Vec<[f64; 2]> = (0..=most).map(|n| [scheme.h(n), scheme.vertex_weight(n)]).collect();
         let blocks = FaceBlocks::new(&mesh.faces, &scheme);
         let mut rows = Rows::new(&mesh.faces, &topology, &blocks, &by_valence, &valence);
         rows.closed = false;

@@ -59,13 +59,7 @@ pub struct PaperNames {
 }
 
 impl Scheme {
-    pub const ALL: [Scheme; 5] = [
-        Scheme::CatmullClark,
-        Scheme::Loop,
-        Scheme::Sqrt3,
-        Scheme::Nasri,
-        Scheme::ZhengCai,
-    ];
+    pub const ALL: [Scheme; 5] = [Scheme::CatmullClark, Scheme::Loop, Scheme::Sqrt3, Scheme::Nasri, Scheme::ZhengCai];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -85,11 +79,7 @@ impl Scheme {
             Scheme::Sqrt3 | Scheme::ZhengCai => ("A", "H", "M"),
             Scheme::Nasri => ("[C]", "H", "M"),
         };
-        PaperNames {
-            system,
-            diagonal,
-            symmetric,
-        }
+        PaperNames { system, diagonal, symmetric }
     }
 
     /// What a face of `size` corners adds to M.
@@ -101,11 +91,7 @@ impl Scheme {
             Scheme::Nasri => (0.25, 0.75 / m, 0.5 / m),
             Scheme::ZhengCai => (0.0, 1.0 / m, 0.0),
         };
-        Modes {
-            identity,
-            constant,
-            cosine,
-        }
+        Modes { identity, constant, cosine }
     }
 
     /// Whether the scheme is defined on triangles only.
@@ -115,20 +101,12 @@ impl Scheme {
 
     /// Whether a mesh with these faces can be used, and if not, the first face that forbids it.
     pub fn first_unsuitable_face(self, faces: &Faces) -> Option<usize> {
-        if self.needs_triangles() {
-            faces.iter().position(|f| f.len() != 3)
-        } else {
-            None
-        }
+        if self.needs_triangles() { faces.iter().position(|f| f.len() != 3) } else { None }
     }
 
     /// The scheme that is meant when none is named: Loop on triangles, else Catmull-Clark.
     pub fn default_for(faces: &Faces) -> Scheme {
-        if faces.uniform_size() == Some(3) {
-            Scheme::Loop
-        } else {
-            Scheme::CatmullClark
-        }
+        if faces.uniform_size() == Some(3) { Scheme::Loop } else { Scheme::CatmullClark }
     }
 }
 
@@ -142,13 +120,10 @@ impl FromStr for Scheme {
     type Err = Error;
 
     fn from_str(s: &str) -> Result<Self, Error> {
-        Scheme::ALL
-            .into_iter()
-            .find(|scheme| scheme.name() == s)
-            .ok_or_else(|| {
-                let names = Scheme::ALL.map(Scheme::name).join(", ");
-                Error::Unknown(format!("unknown scheme \"{s}\"; the schemes are {names}"))
-            })
+        Scheme::ALL.into_iter().find(|scheme| scheme.name() == s).ok_or_else(|| {
+            let names = Scheme::ALL.map(Scheme::name).join(", ");
+            Error::Unknown(format!("unknown scheme \"{s}\"; the schemes are {names}"))
+        })
     }
 }
 

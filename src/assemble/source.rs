@@ -41,10 +41,7 @@ impl<'a> Source<'a> {
     ) -> Self {
         let n = incidence.vertices();
         let order = numbering.map(Numbering::order);
-        assert!(
-            order.is_none_or(|order| order.len() == n),
-            "one entry a vertex"
-        );
+        assert!(order.is_none_or(|order| order.len() == n), "one entry a vertex");
         let vertex = |k: usize| order.map_or(k, |order| order[k] as usize);
         let valences = (0..n)
             .into_par_iter()
@@ -54,20 +51,12 @@ impl<'a> Source<'a> {
                 Some(topology) => topology.edge_valence(faces, vertex(k)) as u32,
             })
             .collect();
-        Source {
-            faces,
-            incidence,
-            open,
-            numbering,
-            scheme,
-            valences,
-        }
+        Source { faces, incidence, open, numbering, scheme, valences }
     }
 
     /// The vertex of a row.
     fn vertex(&self, k: usize) -> usize {
-        self.numbering
-            .map_or(k, |numbering| numbering.order()[k] as usize)
+        self.numbering.map_or(k, |numbering| numbering.order()[k] as usize)
     }
 
     /// Fetches what rows after `k` will read, where they are not in the file's order.
@@ -80,8 +69,7 @@ impl<'a> Source<'a> {
 
     /// The row of a vertex.
     fn row(&self, v: u32) -> u32 {
-        self.numbering
-            .map_or(v, |numbering| numbering.place()[v as usize])
+        self.numbering.map_or(v, |numbering| numbering.place()[v as usize])
     }
 
     /// The kind of every row.
@@ -123,13 +111,7 @@ impl<'a> Source<'a> {
     /// The faces that are summed, and the rows that read them.
     pub(super) fn polygons(&self, kinds: &[Kind]) -> Polygons {
         let rows = (kinds, self.valences.as_slice());
-        Polygons::new(
-            self.faces,
-            self.incidence,
-            self.scheme,
-            self.numbering,
-            rows,
-        )
+        Polygons::new(self.faces, self.incidence, self.scheme, self.numbering, rows)
     }
 
     /// Where the neighbours of each row start, and the end.
@@ -149,8 +131,7 @@ impl<'a> Source<'a> {
             };
             end = end.checked_add(length).ok_or_else(|| {
                 Error::Computation(
-                    "the operator would have more neighbours than 32-bit indices reach; use a smaller mesh"
-                        .into(),
+                    "the operator would have more neighbours than 32-bit indices reach; use a smaller mesh".into(),
                 )
             })?;
             offsets.push(end);
@@ -164,19 +145,12 @@ impl<'a> Source<'a> {
         match self.faces.uniform_size() {
             Some(3) => self.codes_by(kinds, offsets, |c| c / 3 * 3..c / 3 * 3 + 3),
             Some(4) => self.codes_by(kinds, offsets, |c| c / 4 * 4..c / 4 * 4 + 4),
-            _ => self.codes_by(kinds, offsets, |c| {
-                self.faces.range(self.incidence.face_of(c as u32))
-            }),
+            _ => self.codes_by(kinds, offsets, |c| self.faces.range(self.incidence.face_of(c as u32))),
         }
     }
 
     /// `corners_by` tells the corners of the face of a corner.
-    fn codes_by(
-        &self,
-        kinds: &[Kind],
-        offsets: Vec<u32>,
-        corners_by: impl Fn(usize) -> Range<usize> + Sync,
-    ) -> Codes {
+    fn codes_by(&self, kinds: &[Kind], offsets: Vec<u32>, corners_by: impl Fn(usize) -> Range<usize> + Sync) -> Codes {
         let incidence = self.incidence;
         let corners = self.faces.corners();
         Codes::new(offsets, |k, row| {
@@ -232,11 +206,7 @@ impl<'a> Source<'a> {
                 let at = |steps| s.face_weight(size, steps);
                 ([at(0), at(1), at(size - 1)], at(2))
             };
-            Ring::new(
-                h * (own + x * face[0]),
-                h * (s.edge_weight() + face[1] + face[2]),
-                h * across,
-            )
+            Ring::new(h * (own + x * face[0]), h * (s.edge_weight() + face[1] + face[2]), h * across)
         };
         let rings = |size| (0..=greatest).map(|n| ring(n, size)).collect();
         // Of any size: the part of the faces that is no part of their sums does not depend on it.
@@ -244,10 +214,6 @@ impl<'a> Source<'a> {
             let (h, own, x) = weights(n);
             Ring::new(h * (own + x * s.modes(4).identity), h * s.edge_weight(), h)
         };
-        Rings {
-            quads: rings(4),
-            edges: rings(3),
-            polygons: (0..=greatest).map(polygons).collect(),
-        }
+        Rings { quads: rings(4), edges: rings(3), polygons: (0..=greatest).map(polygons).collect() }
     }
 }

@@ -137,20 +137,10 @@ impl Rings<f64> {
         let single = |rings: &[Ring<f64>]| {
             rings
                 .iter()
-                .map(|r| {
-                    Ring::new(
-                        Vec3A::weight(r.own),
-                        Vec3A::weight(r.edge),
-                        Vec3A::weight(r.across),
-                    )
-                })
+                .map(|r| Ring::new(Vec3A::weight(r.own), Vec3A::weight(r.edge), Vec3A::weight(r.across)))
                 .collect()
         };
-        Rings {
-            quads: single(&self.quads),
-            edges: single(&self.edges),
-            polygons: single(&self.polygons),
-        }
+        Rings { quads: single(&self.quads), edges: single(&self.edges), polygons: single(&self.polygons) }
     }
 }
 
@@ -181,19 +171,13 @@ pub struct Stencil {
 /// The first rows of the runs of rows of equal kind and valence.
 pub(super) fn runs(kinds: &[Kind], valences: &[u32]) -> Vec<u32> {
     let key = |i: usize| (kinds[i], valences[i]);
-    (0..kinds.len())
-        .filter(|&i| i == 0 || key(i) != key(i - 1))
-        .map(|i| i as u32)
-        .collect()
+    (0..kinds.len()).filter(|&i| i == 0 || key(i) != key(i - 1)).map(|i| i as u32).collect()
 }
 
 impl Stencil {
     /// The rows of run `k`.
     pub(super) fn run(&self, k: usize) -> Range<usize> {
-        let end = self
-            .runs
-            .get(k + 1)
-            .map_or(self.kinds.len(), |&r| r as usize);
+        let end = self.runs.get(k + 1).map_or(self.kinds.len(), |&r| r as usize);
         self.runs[k] as usize..end
     }
 
@@ -275,16 +259,9 @@ impl Stencil {
         let mut next = self.runs.partition_point(|&r| r as usize <= rows.start);
         let mut from = rows.start;
         while from < rows.end {
-            let to = self
-                .runs
-                .get(next)
-                .map_or(rows.end, |&r| rows.end.min(r as usize));
+            let to = self.runs.get(next).map_or(rows.end, |&r| rows.end.min(r as usize));
             next += 1;
-            let run = Run {
-                window,
-                rows: from..to,
-                slots: slots(to - from),
-            };
+            let run = Run { window, rows: from..to, slots: slots(to - from) };
             match (self.kinds[from], self.valence(from)) {
                 (Kind::Quads, 4) => run.quads::<4>(rings, &mut visit),
                 (Kind::Quads, 3) => run.quads::<3>(rings, &mut visit),
@@ -339,11 +316,7 @@ impl Stencil {
             Kind::Quads => {
                 let n = codes.len() / 2;
                 let (near, across) = codes.split_at(n);
-                rings.quads[n].value(
-                    window[row],
-                    sum(near, window, row, start),
-                    sum(across, window, row, start),
-                )
+                rings.quads[n].value(window[row], sum(near, window, row, start), sum(across, window, row, start))
             }
             Kind::Edges => {
                 let edge = sum(codes, window, row, start);
@@ -407,30 +380,20 @@ struct Run<'w, 'a, P, C, I> {
 impl<P: Point, C: Code, I: Iterator> Run<'_, '_, P, C, I> {
     /// Rows of valence N among quads.
     #[inline(always)]
-    fn quads<const N: usize>(
-        self,
-        rings: &Rings<P::Weight>,
-        visit: &mut impl FnMut(I::Item, P, P),
-    ) {
+    fn quads<const N: usize>(self, rings: &Rings<P::Weight>, visit: &mut impl FnMut(I::Item, P, P)) {
         let ring = rings.quads[N];
-        self.window
-            .halves::<N, _>(self.rows, self.slots, |slot, own, edge, across| {
-                visit(slot, own, ring.value(own, edge, across));
-            });
+        self.window.halves::<N, _>(self.rows, self.slots, |slot, own, edge, across| {
+            visit(slot, own, ring.value(own, edge, across));
+        });
     }
 
     /// Rows of N edge neighbours.
     #[inline(always)]
-    fn edges<const N: usize>(
-        self,
-        rings: &Rings<P::Weight>,
-        visit: &mut impl FnMut(I::Item, P, P),
-    ) {
+    fn edges<const N: usize>(self, rings: &Rings<P::Weight>, visit: &mut impl FnMut(I::Item, P, P)) {
         let ring = rings.edges[N];
-        self.window
-            .wholes::<N, _>(self.rows, self.slots, |slot, own, edge| {
-                visit(slot, own, ring.value_of_edges(own, edge));
-            });
+        self.window.wholes::<N, _>(self.rows, self.slots, |slot, own, edge| {
+            visit(slot, own, ring.value_of_edges(own, edge));
+        });
     }
 
     /// Rows of N faces that are summed.
@@ -451,11 +414,10 @@ impl<P: Point, C: Code, I: Iterator> Run<'_, '_, P, C, I> {
                 visit(slot, own, ring.value_alone(own, across));
             });
         } else {
-            self.window
-                .wholes::<N, _>(self.rows, slots, |(slot, e), own, edge| {
-                    let across = polygons.gather::<N, P>(e, sums);
-                    visit(slot, own, ring.value(own, edge, across));
-                });
+            self.window.wholes::<N, _>(self.rows, slots, |(slot, e), own, edge| {
+                let across = polygons.gather::<N, P>(e, sums);
+                visit(slot, own, ring.value(own, edge, across));
+            });
         }
     }
 }

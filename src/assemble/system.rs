@@ -78,9 +78,7 @@ impl LimitSystem {
     pub fn with_masks(mesh: &Mesh, topology: &Topology, masks: &impl Masks) -> Result<Self> {
         let valence = valences(&mesh.faces, topology);
         let largest = valence.par_iter().copied().max().unwrap_or(0) as usize;
-        let by_valence: Vec<[f64; 2]> = (0..=largest)
-            .map(|n| [masks.h(n), masks.vertex_weight(n)])
-            .collect();
+        let by_valence: Vec<[f64; 2]> = (0..=largest).map(|n| [masks.h(n), masks.vertex_weight(n)]).collect();
         let blocks = FaceBlocks::new(&mesh.faces, masks);
         let rows = Rows::new(&mesh.faces, topology, &blocks, &by_valence, &valence);
         let arrays = rows.arrays()?;
@@ -185,10 +183,6 @@ impl FaceBlocks {
             Some(size) => add(size),
             None => faces.iter().for_each(|face| add(face.len())),
         }
-        FaceBlocks {
-            by_size,
-            half_edge,
-            sides_only: masks.edges_only(),
-        }
+        FaceBlocks { by_size, half_edge, sides_only: masks.edges_only() }
     }
 }

@@ -15,11 +15,7 @@ use crate::mesh::io;
 /// What is no number, and a vertex that the mesh lacks, with the line in a file.
 pub fn vertex_marks(text: &str, vertices: usize) -> Result<Vec<bool>> {
     let path = Path::new(text);
-    let (content, path) = if path.is_file() {
-        (read(path)?, Some(path))
-    } else {
-        (text.to_owned(), None)
-    };
+    let (content, path) = if path.is_file() { (read(path)?, Some(path)) } else { (text.to_owned(), None) };
     let mut marks = vec![false; vertices];
     for (number, line) in content.lines().enumerate() {
         let refuse = |what: String| match path {
@@ -64,10 +60,7 @@ pub fn normals(path: &Path, vertices: usize) -> Result<Vec<Option<DVec3>>> {
         ));
     };
     if normals.len() != vertices {
-        let what = format!(
-            "holds {} normals for a mesh of {vertices} vertices: one a vertex is needed",
-            normals.len()
-        );
+        let what = format!("holds {} normals for a mesh of {vertices} vertices: one a vertex is needed", normals.len());
         return Err(Error::parse(path, None, what));
     }
     let some = |n: DVec3| (n != DVec3::ZERO).then_some(n);
@@ -104,14 +97,10 @@ fn rows<const K: usize>(path: &Path, vertices: usize, form: &str) -> Result<Vec<
             return refuse(format!("`{}` is not of the form `{form}`", line.trim()));
         };
         let Some(place) = rows.get_mut(vertex) else {
-            return refuse(format!(
-                "vertex {vertex} is not in the mesh: it has {vertices}, numbered from 0"
-            ));
+            return refuse(format!("vertex {vertex} is not in the mesh: it has {vertices}, numbered from 0"));
         };
         if place.replace(row).is_some_and(|before| before != row) {
-            return refuse(format!(
-                "vertex {vertex} is given twice, and differently: keep one"
-            ));
+            return refuse(format!("vertex {vertex} is given twice, and differently: keep one"));
         }
     }
     Ok(rows)
@@ -156,18 +145,12 @@ mod tests {
     fn rows_are_read_once_a_vertex_and_errors_name_the_line() {
         let good = file("2 0 0 1 # up\n\n0 1e-3 2 -3\n2 0 0 1\n");
         let found = normals(good.path(), 3).unwrap();
-        assert_eq!(
-            found,
-            [Some(DVec3::new(1e-3, 2.0, -3.0)), None, Some(DVec3::Z)]
-        );
+        assert_eq!(found, [Some(DVec3::new(1e-3, 2.0, -3.0)), None, Some(DVec3::Z)]);
         for (text, what) in [
             ("0 1 2\n", ", line 1: `0 1 2` is not of the form"),
             ("0 1 2 3 4\n", ", line 1: `0 1 2 3 4` is not of the form"),
             ("\n-1 1 2 3\n", ", line 2: `-1 1 2 3` is not of the form"),
-            (
-                "0 0 0 1\n3 1 2 3\n",
-                ", line 2: vertex 3 is not in the mesh",
-            ),
+            ("0 0 0 1\n3 1 2 3\n", ", line 2: vertex 3 is not in the mesh"),
             ("1 0 0 1\n1 0 0 2\n", ", line 2: vertex 1 is given twice"),
         ] {
             let error = normals(file(text).path(), 3).unwrap_err().to_string();
@@ -176,10 +159,7 @@ mod tests {
         assert!(normals(Path::new("/nowhere/normals.txt"), 3).is_err());
         assert_eq!(numbers("0.5", 3, 1.0).unwrap(), [0.5; 3]);
         let few = file("1 2.5\n");
-        assert_eq!(
-            numbers(few.path().to_str().unwrap(), 3, 1.0).unwrap(),
-            [1.0, 2.5, 1.0]
-        );
+        assert_eq!(numbers(few.path().to_str().unwrap(), 3, 1.0).unwrap(), [1.0, 2.5, 1.0]);
     }
 
     #[test]
@@ -194,20 +174,10 @@ mod tests {
             let found = normals(&path, 4).unwrap();
             assert_eq!(found[0], Some(given[0]));
             assert_eq!(found[2], None);
-            assert!(
-                normals(&path, 5)
-                    .unwrap_err()
-                    .to_string()
-                    .contains("4 normals for a mesh of 5")
-            );
+            assert!(normals(&path, 5).unwrap_err().to_string().contains("4 normals for a mesh of 5"));
         }
         let path = folder.path().join("plain.obj");
         io::write(&path, &mesh, None).unwrap();
-        assert!(
-            normals(&path, 4)
-                .unwrap_err()
-                .to_string()
-                .contains("holds no normals")
-        );
+        assert!(normals(&path, 4).unwrap_err().to_string().contains("holds no normals"));
     }
 }

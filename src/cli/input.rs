@@ -50,18 +50,14 @@ pub struct Input {
 }
 
 /// The noise that built-in meshes carry where they stand in for real ones.
-pub const STAND_IN_NOISE: Noise = Noise {
-    amplitude: 0.1,
-    seed: 1,
-};
+pub const STAND_IN_NOISE: Noise = Noise { amplitude: 0.1, seed: 1 };
 
 /// Endings that mark a MESH argument as a file.
 const ENDINGS: [&str; 3] = ["obj", "off", "ply"];
 
 /// Whether a name ends as mesh files do.
 pub(super) fn has_mesh_ending(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|e| ENDINGS.iter().any(|known| e.eq_ignore_ascii_case(known)))
+    path.extension().is_some_and(|e| ENDINGS.iter().any(|known| e.eq_ignore_ascii_case(known)))
 }
 
 impl MeshFlags {
@@ -106,8 +102,7 @@ impl MeshFlags {
         }
         let (report, renumbered) = self.report(&loaded);
         if self.defects {
-            let json = serde_json::to_string_pretty(&report)
-                .map_err(|e| Error::Computation(format!("{name}: {e}")))?;
+            let json = serde_json::to_string_pretty(&report).map_err(|e| Error::Computation(format!("{name}: {e}")))?;
             super::print(&json)?;
             return Ok(None);
         }
@@ -122,9 +117,7 @@ impl MeshFlags {
         let mesh = loaded.mesh;
         let scheme = self.scheme.unwrap_or_else(|| {
             let scheme = Scheme::default_for(&mesh.faces);
-            common.remark(format_args!(
-                "{name}: scheme {scheme} (choose with --scheme)"
-            ));
+            common.remark(format_args!("{name}: scheme {scheme} (choose with --scheme)"));
             scheme
         });
         let label = match self.noise {
@@ -154,10 +147,7 @@ impl MeshFlags {
                 return (report, Some(moved));
             }
         }
-        let lines = loaded
-            .lines
-            .as_ref()
-            .map(|l| (l.vertices.as_slice(), l.faces.as_slice()));
+        let lines = loaded.lines.as_ref().map(|l| (l.vertices.as_slice(), l.faces.as_slice()));
         (validate(mesh, lines, self.boundary), None)
     }
 }
@@ -165,36 +155,20 @@ impl MeshFlags {
 impl Input {
     /// The topology of the mesh; found when it is first asked for, if the validator looked at a renumbered mesh.
     pub fn topology(&self) -> &Topology {
-        self.topology
-            .get_or_init(|| Topology::new(&self.mesh.faces, self.mesh.len()))
+        self.topology.get_or_init(|| Topology::new(&self.mesh.faces, self.mesh.len()))
     }
 
     /// The mesh along a space-filling curve and the topology of that, where the file is scattered.
     pub fn renumbered(&self) -> Option<(&Renumbered, &Topology)> {
-        self.renumbered
-            .as_ref()
-            .map(|(mesh, topology)| (mesh, topology))
+        self.renumbered.as_ref().map(|(mesh, topology)| (mesh, topology))
     }
 
     /// A stem for file names: the program's `prefix`, the mesh's own name without folder and ending, the scheme.
     pub fn stem(&self, prefix: &str) -> String {
         let path = Path::new(&self.name);
-        let name = if has_mesh_ending(path) {
-            path.file_stem()
-        } else {
-            path.file_name()
-        };
+        let name = if has_mesh_ending(path) { path.file_stem() } else { path.file_name() };
         let name = name.unwrap_or_default().to_string_lossy();
-        let plain: String = name
-            .chars()
-            .map(|c| {
-                if c.is_alphanumeric() || c == '_' {
-                    c
-                } else {
-                    '-'
-                }
-            })
-            .collect();
+        let plain: String = name.chars().map(|c| if c.is_alphanumeric() || c == '_' { c } else { '-' }).collect();
         format!("{prefix}-{plain}-{}", self.scheme)
     }
 
@@ -221,7 +195,6 @@ impl Input {
     /// # Errors
     /// As [`LimitSystem::new`], with the mesh's name.
     pub fn system(&self) -> Result<LimitSystem> {
-        LimitSystem::new(&self.mesh, self.topology(), self.scheme)
-            .map_err(|e| Error::mesh(&self.name, e.to_string()))
+        LimitSystem::new(&self.mesh, self.topology(), self.scheme).map_err(|e| Error::mesh(&self.name, e.to_string()))
     }
 }

@@ -68,10 +68,7 @@ pub struct StopFlags {
 impl StopFlags {
     /// The rule for one mesh.
     pub fn stop(&self, mesh: &Mesh) -> Stop {
-        Stop {
-            tolerance: self.tol_absolute.unwrap_or(self.tol * mesh.diagonal()),
-            max_iterations: self.max_iter,
-        }
+        Stop { tolerance: self.tol_absolute.unwrap_or(self.tol * mesh.diagonal()), max_iterations: self.max_iter }
     }
 }
 
@@ -126,17 +123,10 @@ impl std::str::FromStr for Grid {
         // Both ends belong to the grid, though (b − a)/step may round below a whole number.
         let steps = ((to - from) / step + 1e-9).floor();
         if !(step > 0.0 && from <= to && from > 0.0 && steps < MOST_POINTS) {
-            return Err(
-                "a grid A:B:STEP needs 0 < A ≤ B, a positive STEP and fewer than 100000 points"
-                    .into(),
-            );
+            return Err("a grid A:B:STEP needs 0 < A ≤ B, a positive STEP and fewer than 100000 points".into());
         }
         // Rounded to what was typed: 0.05 + 15·0.05 is 0.8.
-        Ok(Grid(
-            (0..=steps as usize)
-                .map(|k| ((from + k as f64 * step) * 1e12).round() / 1e12)
-                .collect(),
-        ))
+        Ok(Grid((0..=steps as usize).map(|k| ((from + k as f64 * step) * 1e12).round() / 1e12).collect()))
     }
 }
 
@@ -178,14 +168,8 @@ pub fn exit(body: impl FnOnce() -> Result<()>) -> ExitCode {
 pub fn print(text: &str) -> Result<()> {
     use std::io::{ErrorKind, Write};
     let mut out = std::io::stdout().lock();
-    match out
-        .write_all(text.as_bytes())
-        .and_then(|()| out.write_all(b"\n"))
-        .and_then(|()| out.flush())
-    {
-        Err(e) if e.kind() != ErrorKind::BrokenPipe => {
-            Err(Error::io("standard output".as_ref(), "write", e))
-        }
+    match out.write_all(text.as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::io("standard output".as_ref(), "write", e)),
         _ => Ok(()),
     }
 }
@@ -225,9 +209,7 @@ mod tests {
         assert_eq!(grid.0.len(), 24);
         assert_eq!((grid.0[0], grid.0[15], grid.0[23]), (0.05, 0.8, 1.2));
         assert_eq!("0.5:0.5:1".parse::<Grid>().expect("one point").0, [0.5]);
-        for bad in [
-            "", "1", "1:2", "1:2:0", "2:1:0.1", "a:b:c", "0:1:0.1", "1:2:1e-9", "1:nan:1",
-        ] {
+        for bad in ["", "1", "1:2", "1:2:0", "2:1:0.1", "a:b:c", "0:1:0.1", "1:2:1e-9", "1:nan:1"] {
             assert!(bad.parse::<Grid>().is_err(), "{bad}");
         }
     }

@@ -42,12 +42,9 @@ impl Progress {
     }
 
     fn styled(title: &str, template: &str, quiet: bool) -> Self {
-        let style = ProgressStyle::with_template(template)
-            .unwrap_or_else(|_| ProgressStyle::default_spinner());
+        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_spinner());
         Progress {
-            bar: ProgressBar::hidden()
-                .with_style(style)
-                .with_prefix(title.to_owned()),
+            bar: ProgressBar::hidden().with_style(style).with_prefix(title.to_owned()),
             quiet,
             start: Instant::now(),
             count: AtomicU64::new(0),

@@ -72,12 +72,7 @@ pub struct Automatic {
 /// assert_eq!(found.report.outcome, Outcome::Converged);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn control_points(
-    mesh: &Mesh,
-    topology: Option<&Topology>,
-    scheme: Scheme,
-    stop: &Stop,
-) -> Result<Automatic> {
+pub fn control_points(mesh: &Mesh, topology: Option<&Topology>, scheme: Scheme, stop: &Stop) -> Result<Automatic> {
     let start = Instant::now();
     let Some(moved) = renumbered(mesh) else {
         return in_order(mesh, topology, scheme, stop);
@@ -110,12 +105,7 @@ impl Renumbered {
     ///
     /// # Errors
     /// As [`Operator::new`].
-    pub fn control_points(
-        &self,
-        topology: Option<&Topology>,
-        scheme: Scheme,
-        stop: &Stop,
-    ) -> Result<Automatic> {
+    pub fn control_points(&self, topology: Option<&Topology>, scheme: Scheme, stop: &Stop) -> Result<Automatic> {
         let mut found = in_order(&self.mesh, topology, scheme, stop)?;
         let start = Instant::now();
         found.points = self.numbering.back(&found.points);
@@ -124,12 +114,7 @@ impl Renumbered {
     }
 }
 
-fn in_order(
-    mesh: &Mesh,
-    topology: Option<&Topology>,
-    scheme: Scheme,
-    stop: &Stop,
-) -> Result<Automatic> {
+fn in_order(mesh: &Mesh, topology: Option<&Topology>, scheme: Scheme, stop: &Stop) -> Result<Automatic> {
     let start = Instant::now();
     let (operator, numbering) = operator(mesh, topology, scheme)?;
     let setup_seconds = start.elapsed().as_secs_f64();
@@ -155,11 +140,7 @@ fn in_order(
 }
 
 /// The operator, and the order of its rows where that is not the mesh's.
-fn operator(
-    mesh: &Mesh,
-    topology: Option<&Topology>,
-    scheme: Scheme,
-) -> Result<(Operator, Option<Numbering>)> {
+fn operator(mesh: &Mesh, topology: Option<&Topology>, scheme: Scheme) -> Result<(Operator, Option<Numbering>)> {
     let own;
     let incidence = match topology {
         Some(topology) => &topology.incidence,
@@ -169,8 +150,7 @@ fn operator(
         }
     };
     // Among mixed faces the search costs twice as much.
-    let few = usual_lambda_min(scheme)
-        >= std::env::var("LL_FEW").map_or(FEW, |x| x.parse().unwrap())
+    let few = usual_lambda_min(scheme) >= std::env::var("LL_FEW").map_or(FEW, |x| x.parse().unwrap())
         && mesh.faces.uniform_size().is_none();
     let number = || {
         if mesh.len() >= ORDERED && !few {
@@ -180,9 +160,7 @@ fn operator(
         }
     };
     // The search occupies one thread.
-    let (numbering, closed) = rayon::join(number, || {
-        topology.is_some() || incidence.is_closed(&mesh.faces)
-    });
+    let (numbering, closed) = rayon::join(number, || topology.is_some() || incidence.is_closed(&mesh.faces));
     let rows = numbering.as_ref();
     let operator = match topology {
         Some(topology) => Operator::in_order(&mesh.faces, topology, scheme, rows)?,

@@ -31,9 +31,7 @@ pub fn control_points(
     Ok(match interpolated {
         None => run(&system, points, setup, stop),
         Some(marks) => {
-            Restriction::new(&system, marks)?.solve(&system, points, setup, stop, &mut |_| {
-                ControlFlow::Continue(())
-            })
+            Restriction::new(&system, marks)?.solve(&system, points, setup, stop, &mut |_| ControlFlow::Continue(()))
         }
     })
 }

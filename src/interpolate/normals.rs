@@ -28,11 +28,7 @@ pub struct Rotation {
 
 impl Default for Rotation {
     fn default() -> Self {
-        Rotation {
-            threshold: 0.0,
-            tolerance: 0.0,
-            levels: 1,
-        }
+        Rotation { threshold: 0.0, tolerance: 0.0, levels: 1 }
     }
 }
 
@@ -88,10 +84,7 @@ pub fn rotate_rings(
     rotation: Rotation,
 ) -> Result<Rotated> {
     assert!(
-        matches!(
-            scheme,
-            Refinement::CatmullClark | Refinement::Loop | Refinement::Sqrt3
-        ),
+        matches!(scheme, Refinement::CatmullClark | Refinement::Loop | Refinement::Sqrt3),
         "a primal approximating scheme"
     );
     assert_eq!(normals.len(), control.len(), "one entry a vertex");
@@ -117,28 +110,14 @@ pub fn rotate_rings(
                 continue;
             };
             let turn = part * (angle(from, target) - rotation.tolerance);
-            rotate_ring(
-                &mut mesh,
-                &topology,
-                v,
-                limits[v],
-                DQuat::from_axis_angle(axis, turn),
-            );
+            rotate_ring(&mut mesh, &topology, v, limits[v], DQuat::from_axis_angle(axis, turn));
         }
     }
-    Ok(Rotated {
-        mesh,
-        refinements: rotation.levels + 1,
-        turned,
-    })
+    Ok(Rotated { mesh, refinements: rotation.levels + 1, turned })
 }
 
 /// The vertices whose normal is off by more than allowed, with the angle to turn.
-fn deviating(
-    wanted: &[Option<DVec3>],
-    found: &[DVec3],
-    rotation: &Rotation,
-) -> Result<Vec<(u32, f64)>> {
+fn deviating(wanted: &[Option<DVec3>], found: &[DVec3], rotation: &Rotation) -> Result<Vec<(u32, f64)>> {
     let mut turned = Vec::new();
     for (v, target) in wanted.iter().enumerate() {
         let Some(target) = *target else { continue };
@@ -154,9 +133,7 @@ fn deviating(
         if off > OPPOSITE {
             return Err(Error::mesh(
                 "normals",
-                format!(
-                    "vertex {v}: the given normal is opposite to the surface's: turn it round, or all faces"
-                ),
+                format!("vertex {v}: the given normal is opposite to the surface's: turn it round, or all faces"),
             ));
         }
         if off > rotation.threshold.max(rotation.tolerance) {

@@ -24,17 +24,9 @@ pub struct Passes {
 /// # Panics
 /// If there is not one point a vertex.
 pub fn passes(system: &LimitSystem, points: &[DVec3], tolerance: f64, limit: usize) -> Passes {
-    let stop = Stop {
-        tolerance,
-        max_iterations: limit,
-    };
+    let stop = Stop { tolerance, max_iterations: limit };
     let report = run(system, points, Setup::Pia { omega: 1.0 }, &stop).report;
-    Passes {
-        outcome: report.outcome,
-        updates: report.iterations,
-        passes: report.iterations + 1,
-        errors: report.last(),
-    }
+    Passes { outcome: report.outcome, updates: report.iterations, passes: report.iterations + 1, errors: report.last() }
 }
 
 /// The masks behind the printed errors of the paper's Mushroom, whose 32 triangles are no quads: weights n², 4 an
@@ -96,9 +88,7 @@ mod tests {
         let mut v = mesh.positions.clone();
         let mut k = 0;
         let largest = loop {
-            let e: Vec<DVec3> = (0..v.len())
-                .map(|i| mesh.positions[i] - system.a.row_times(i, &v))
-                .collect();
+            let e: Vec<DVec3> = (0..v.len()).map(|i| mesh.positions[i] - system.a.row_times(i, &v)).collect();
             let largest = e.iter().map(|e| e.length()).fold(0.0, f64::max);
             k += 1;
             if largest <= 1e-3 {

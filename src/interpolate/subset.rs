@@ -58,16 +58,7 @@ impl Restriction {
         let h: Vec<f64> = vertices.iter().map(|&v| full.h[v as usize]).collect();
         let m = Csr::new(Arc::new(Pattern::new(offsets, columns)), values);
         let a = m.scale_rows(&h);
-        Ok(Restriction {
-            system: LimitSystem {
-                diagonal: a.diagonal(),
-                bounds: full.bounds,
-                h,
-                m,
-                a,
-            },
-            vertices,
-        })
+        Ok(Restriction { system: LimitSystem { diagonal: a.diagonal(), bounds: full.bounds, h, m, a }, vertices })
     }
 
     /// A vertex order of the whole mesh as an order of the rows here.
@@ -101,9 +92,8 @@ impl Restriction {
         watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
     ) -> Solution {
         assert_eq!(points.len(), full.len(), "one point a vertex");
-        let differences: Vec<DVec3> = (self.vertices.iter())
-            .map(|&v| points[v as usize] - full.a.row_times(v as usize, points))
-            .collect();
+        let differences: Vec<DVec3> =
+            (self.vertices.iter()).map(|&v| points[v as usize] - full.a.row_times(v as usize, points)).collect();
         let mut solution = run_watched(&self.system, &differences, setup, stop, watch);
         let mut control = points.to_vec();
         for (&v, x) in self.vertices.iter().zip(&solution.points) {

@@ -84,8 +84,7 @@ pub fn surface<'a>(
             Surface::plain(control)
         }
         Some(rule) => {
-            let corrected =
-                rule == Rule::ZhengCai || given.normals.is_some() || given.handles.is_some();
+            let corrected = rule == Rule::ZhengCai || given.normals.is_some() || given.handles.is_some();
             if corrected {
                 let first = FirstRefinement::new(&control, topology(), rule, points, given)?;
                 Surface {
@@ -134,12 +133,7 @@ pub fn surface<'a>(
 impl Surface {
     /// A mesh with nothing else to tell.
     pub fn plain(mesh: Mesh) -> Self {
-        Surface {
-            mesh,
-            normals: None,
-            normals_set: 0,
-            not_flattened: Vec::new(),
-        }
+        Surface { mesh, normals: None, normals_set: 0, not_flattened: Vec::new() }
     }
 }
 
@@ -154,11 +148,7 @@ fn primal(control: Mesh, scheme: Refinement, request: &Request) -> Result<Surfac
     let Some(normals) = given.normals else {
         // A control mesh that stays is not copied: it may be as large as memory allows.
         let stays = request.levels == 0;
-        return Ok(Surface::plain(if stays {
-            control
-        } else {
-            scheme.refine_n(&control, request.levels)?
-        }));
+        return Ok(Surface::plain(if stays { control } else { scheme.refine_n(&control, request.levels)? }));
     };
     let needed = request.rotation.levels + 1;
     if request.levels < needed {
@@ -166,19 +156,10 @@ fn primal(control: Mesh, scheme: Refinement, request: &Request) -> Result<Surfac
     }
     let rotated = rotate_rings(&control, scheme, normals, request.rotation)?;
     let further = request.levels - rotated.refinements;
-    let mesh = if further == 0 {
-        rotated.mesh
-    } else {
-        scheme.refine_n(&rotated.mesh, further)?
-    };
-    Ok(Surface {
-        normals_set: rotated.turned.len(),
-        ..Surface::plain(mesh)
-    })
+    let mesh = if further == 0 { rotated.mesh } else { scheme.refine_n(&rotated.mesh, further)? };
+    Ok(Surface { normals_set: rotated.turned.len(), ..Surface::plain(mesh) })
 }
 
 fn too_few(what: &str, levels: usize) -> Error {
-    Error::Computation(format!(
-        "{what} a refined mesh: use --subdivide {levels} or more"
-    ))
+    Error::Computation(format!("{what} a refined mesh: use --subdivide {levels} or more"))
 }

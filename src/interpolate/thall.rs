@@ -61,10 +61,7 @@ impl<'a> LocalIteration<'a> {
     /// # Panics
     /// If `topology` is not that of `mesh`.
     pub fn new(mesh: &'a Mesh, topology: &'a Topology, inverse: Inverse) -> Self {
-        assert!(
-            topology.incidence.vertices() == mesh.len(),
-            "the topology is that of the mesh"
-        );
+        assert!(topology.incidence.vertices() == mesh.len(), "the topology is that of the mesh");
         let weight = |v: usize| {
             let star = topology.incidence.corners_at(v);
             let n = star.len() as f64;
@@ -80,10 +77,7 @@ impl<'a> LocalIteration<'a> {
             debug_assert!(n >= 2.0);
             own + opposite * through_faces
         };
-        let inverse = (0..mesh.len())
-            .into_par_iter()
-            .map(|v| THALL_OMEGA / weight(v))
-            .collect();
+        let inverse = (0..mesh.len()).into_par_iter().map(|v| THALL_OMEGA / weight(v)).collect();
         LocalIteration {
             mesh,
             topology,
@@ -156,10 +150,7 @@ impl Iterate for LocalIteration<'_> {
 /// # Panics
 /// If the three do not have one entry a vertex.
 pub fn scaled_distances(surface: &[DVec3], given: &[DVec3], radius: &[f64]) -> Vec<f64> {
-    assert!(
-        surface.len() == given.len() && given.len() == radius.len(),
-        "one entry a vertex"
-    );
+    assert!(surface.len() == given.len() && given.len() == radius.len(), "one entry a vertex");
     let pairs = surface.iter().zip(given).zip(radius);
     pairs.map(|((s, g), r)| s.distance(*g) / r).collect()
 }
@@ -215,10 +206,7 @@ impl MedialAtom {
             return None;
         }
         let radius = along / spread;
-        Some(MedialAtom {
-            position: point - radius * normal,
-            radius,
-        })
+        Some(MedialAtom { position: point - radius * normal, radius })
     }
 }
 
@@ -238,9 +226,7 @@ pub fn medial_shifts(
     given: (&[DVec3], &[DVec3]),
 ) -> Vec<Option<f64>> {
     let atom = |vertices: &[u32], (points, normals): (&[DVec3], &[DVec3])| {
-        let boundary = vertices
-            .iter()
-            .map(|&v| (points[v as usize], normals[v as usize]));
+        let boundary = vertices.iter().map(|&v| (points[v as usize], normals[v as usize]));
         MedialAtom::fit(boundary)
     };
     involutes

@@ -38,11 +38,7 @@ pub struct PhaseOne<'a> {
 impl Default for PhaseOne<'_> {
     /// The settings of §3.4 and §3.5: Gauss-Seidel in file order, five sweeps at most, 0.3 %.
     fn default() -> Self {
-        PhaseOne {
-            sweep: Sweep::GaussSeidel(None),
-            max_iterations: 5,
-            eps: 0.003,
-        }
+        PhaseOne { sweep: Sweep::GaussSeidel(None), max_iterations: 5, eps: 0.003 }
     }
 }
 
@@ -65,35 +61,26 @@ impl Constraints<'_> {
     /// Lists of the right length, at least one interpolated vertex, positive handles, normals and handles at
     /// interpolated vertices only.
     pub(super) fn check(&self, vertices: usize) -> Result<()> {
-        let lengths = [
-            self.interpolated.map(<[_]>::len),
-            self.normals.map(<[_]>::len),
-            self.handles.map(<[_]>::len),
-        ];
-        assert!(
-            lengths.iter().flatten().all(|&n| n == vertices),
-            "one entry a vertex"
-        );
+        let lengths = [self.interpolated.map(<[_]>::len), self.normals.map(<[_]>::len), self.handles.map(<[_]>::len)];
+        assert!(lengths.iter().flatten().all(|&n| n == vertices), "one entry a vertex");
         if !(0..vertices).any(|v| self.is_interpolated(v)) {
             return Err(nothing());
         }
-        let refuse =
-            |v: usize, what: String| Err(Error::mesh("constraints", format!("vertex {v}: {what}")));
+        let refuse = |v: usize, what: String| Err(Error::mesh("constraints", format!("vertex {v}: {what}")));
         for v in 0..vertices {
             let free = !self.is_interpolated(v);
             if free && self.normals.is_some_and(|n| n[v].is_some()) {
-                return refuse(v, "a normal is given where no point is interpolated: interpolate the vertex, or leave the normal out".into());
+                return refuse(
+                    v,
+                    "a normal is given where no point is interpolated: interpolate the vertex, or leave the normal out"
+                        .into(),
+                );
             }
             let Some(s) = self.handles.map(|h| h[v]) else {
                 continue;
             };
             if !(s > 0.0 && s.is_finite()) {
-                return refuse(
-                    v,
-                    format!(
-                        "the shape handle {s} is no positive number: 1 leaves the shape as it is"
-                    ),
-                );
+                return refuse(v, format!("the shape handle {s} is no positive number: 1 leaves the shape as it is"));
             }
             if free && s != 1.0 {
                 return refuse(v, "a shape handle is given where no point is interpolated: interpolate the vertex, or leave the handle at 1".into());
@@ -131,10 +118,7 @@ pub fn auxiliary(
     interpolated: Option<&[bool]>,
     phase: &PhaseOne,
 ) -> Result<Auxiliary> {
-    let constraints = Constraints {
-        interpolated,
-        ..Constraints::default()
-    };
+    let constraints = Constraints { interpolated, ..Constraints::default() };
     constraints.check(mesh.len())?;
     let tolerance = phase.eps * mesh.diagonal();
     let mut system = LocalSystem::new(mesh, topology);
@@ -148,9 +132,7 @@ pub fn auxiliary(
         system.sum_faces();
         let moves = |v: &usize| constraints.is_interpolated(*v);
         let largest = match phase.sweep {
-            Sweep::GaussSeidel(Some(order)) => {
-                system.sweep(order.iter().map(|&v| v as usize).filter(moves))
-            }
+            Sweep::GaussSeidel(Some(order)) => system.sweep(order.iter().map(|&v| v as usize).filter(moves)),
             Sweep::GaussSeidel(None) => system.sweep((0..mesh.len()).filter(moves)),
             Sweep::Jacobi => {
                 let fixed = &system;
@@ -172,11 +154,7 @@ pub fn auxiliary(
         updates.push(largest);
         passed = largest <= tolerance;
     }
-    Ok(Auxiliary {
-        mesh: Mesh::new(system.points, mesh.faces.clone()),
-        updates,
-        passed,
-    })
+    Ok(Auxiliary { mesh: Mesh::new(system.points, mesh.faces.clone()), updates, passed })
 }
 
 /// Eq. 6 as sums over faces.
@@ -190,12 +168,7 @@ struct LocalSystem<'a> {
 
 impl<'a> LocalSystem<'a> {
     fn new(mesh: &'a Mesh, topology: &'a Topology) -> Self {
-        LocalSystem {
-            mesh,
-            topology,
-            points: mesh.positions.clone(),
-            sums: vec![DVec3::ZERO; mesh.faces.len()],
-        }
+        LocalSystem { mesh, topology, points: mesh.positions.clone(), sums: vec![DVec3::ZERO; mesh.faces.len()] }
     }
 
     /// Anew in every sweep, so that rounding does not add up.
@@ -304,11 +277,7 @@ impl FirstRefinement {
                 mesh.positions[c as usize] = point + scale * flat;
             }
         }
-        Ok(FirstRefinement {
-            mesh,
-            first_vertex_face,
-            not_flattened,
-        })
+        Ok(FirstRefinement { mesh, first_vertex_face, not_flattened })
     }
 
     /// The mesh at `level`: 1 is the first refinement itself, each further one a Doo-Sabin step. The type-V face of
@@ -355,21 +324,10 @@ pub struct TwoPhase {
 /// assert!(centroid.distance(mesh.positions[7]) < 1e-14);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn interpolate(
-    mesh: &Mesh,
-    topology: &Topology,
-    constraints: &Constraints,
-    phase: &PhaseOne,
-) -> Result<TwoPhase> {
+pub fn interpolate(mesh: &Mesh, topology: &Topology, constraints: &Constraints, phase: &PhaseOne) -> Result<TwoPhase> {
     constraints.check(mesh.len())?;
     let auxiliary = auxiliary(mesh, topology, constraints.interpolated, phase)?;
-    let first = FirstRefinement::new(
-        &auxiliary.mesh,
-        topology,
-        Rule::ZhengCai,
-        &mesh.positions,
-        constraints,
-    )?;
+    let first = FirstRefinement::new(&auxiliary.mesh, topology, Rule::ZhengCai, &mesh.positions, constraints)?;
     Ok(TwoPhase { auxiliary, first })
 }
 
@@ -381,9 +339,7 @@ fn vector_area(ring: &[DVec3]) -> (DVec3, f64) {
     let next = ring.iter().cycle().skip(1);
     ring.iter()
         .zip(next)
-        .fold((DVec3::ZERO, 0.0), |(area, scale), (w, x)| {
-            (area + w.cross(*x), scale + w.length() * x.length())
-        })
+        .fold((DVec3::ZERO, 0.0), |(area, scale), (w, x)| (area + w.cross(*x), scale + w.length() * x.length()))
 }
 
 /// Eq. 10; `None` where there is none.

@@ -6,9 +6,7 @@ use std::str::FromStr;
 
 use glam::DVec3;
 
-use super::generate::{
-    dual, flip_edges, merge_faces, midpoint_split, quad_split, ring_sphere, union,
-};
+use super::generate::{dual, flip_edges, merge_faces, midpoint_split, quad_split, ring_sphere, union};
 use super::incidence::next_in;
 use super::topology::Topology;
 use super::{Faces, Mesh};
@@ -24,48 +22,18 @@ pub const NAMES: [(&str, &str); 17] = [
     ("octahedron", "6 vertices"),
     ("icosahedron", "12 vertices"),
     ("dodecahedron", "20 vertices, 12 pentagons"),
-    (
-        "truncated-octahedron",
-        "24 vertices of valence 3, 6 quads and 8 hexagons",
-    ),
-    (
-        "prism:K",
-        "2K vertices of valence 3, K quads and two K-gons",
-    ),
-    (
-        "bipyramid:K",
-        "K+2 vertices, 2K triangles: two apexes of valence K, the others of valence 4",
-    ),
-    (
-        "star:K",
-        "16K+2 vertices, triangles: two of valence K, K of valence 4, the others regular",
-    ),
-    (
-        "torus:NxM",
-        "NM vertices, quads, all of valence 4: N around the axis, M around the tube",
-    ),
+    ("truncated-octahedron", "24 vertices of valence 3, 6 quads and 8 hexagons"),
+    ("prism:K", "2K vertices of valence 3, K quads and two K-gons"),
+    ("bipyramid:K", "K+2 vertices, 2K triangles: two apexes of valence K, the others of valence 4"),
+    ("star:K", "16K+2 vertices, triangles: two of valence K, K of valence 4, the others regular"),
+    ("torus:NxM", "NM vertices, quads, all of valence 4: N around the axis, M around the tube"),
     ("tri-torus:NxM", "NM vertices, triangles, all of valence 6"),
-    (
-        "icosphere:K",
-        "icosahedron after K midpoint splits, on the unit sphere: 10*4^K+2 vertices",
-    ),
-    (
-        "quad-sphere:K",
-        "cube after K quad splits, on the unit sphere: 6*4^K+2 vertices",
-    ),
+    ("icosphere:K", "icosahedron after K midpoint splits, on the unit sphere: 10*4^K+2 vertices"),
+    ("quad-sphere:K", "cube after K quad splits, on the unit sphere: 6*4^K+2 vertices"),
     ("cubes:K", "K separate cubes"),
-    (
-        "irregular-tri:N[:SEED]",
-        "N vertices, a sphere of triangles with edges flipped at random",
-    ),
-    (
-        "irregular-quad:N[:SEED]",
-        "N (even) vertices, a sphere of quads with valences from 3",
-    ),
-    (
-        "irregular-poly:N[:SEED]",
-        "N vertices, a sphere of triangles to octagons",
-    ),
+    ("irregular-tri:N[:SEED]", "N vertices, a sphere of triangles with edges flipped at random"),
+    ("irregular-quad:N[:SEED]", "N (even) vertices, a sphere of quads with valences from 3"),
+    ("irregular-poly:N[:SEED]", "N vertices, a sphere of triangles to octagons"),
 ];
 
 /// The names in one line, for messages and help texts.
@@ -88,20 +56,13 @@ pub fn builtin(name: &str) -> Result<Mesh> {
         Some((kind, parameters)) => (kind, Some(parameters)),
         None => (name, None),
     };
-    let Some(&(pattern, _)) = NAMES
-        .iter()
-        .find(|(pattern, _)| pattern.split(':').next() == Some(kind))
-    else {
+    let Some(&(pattern, _)) = NAMES.iter().find(|(pattern, _)| pattern.split(':').next() == Some(kind)) else {
         return Err(Error::Unknown(format!(
             "no file and no built-in mesh is called `{name}`; built-in are {}",
             names()
         )));
     };
-    let request = Request {
-        name,
-        pattern,
-        parameters,
-    };
+    let request = Request { name, pattern, parameters };
     match kind {
         "cube" => request.plain(cube),
         "tetrahedron" => request.plain(tetrahedron),
@@ -117,9 +78,7 @@ pub fn builtin(name: &str) -> Result<Mesh> {
         "icosphere" => Ok(icosphere(request.number(0, levels(60))?)),
         "quad-sphere" => Ok(quad_sphere(request.number(0, levels(24))?)),
         "cubes" => Ok(cubes(request.number(1, MAX_CORNERS / 24)?)),
-        "irregular-tri" => request
-            .number_and_seed(5, MAX_CORNERS / 6)
-            .map(|(n, seed)| irregular_tri(n, seed)),
+        "irregular-tri" => request.number_and_seed(5, MAX_CORNERS / 6).map(|(n, seed)| irregular_tri(n, seed)),
         "irregular-quad" => {
             let (n, seed) = request.number_and_seed(26, MAX_CORNERS / 4)?;
             if n % 2 == 1 {
@@ -131,9 +90,7 @@ pub fn builtin(name: &str) -> Result<Mesh> {
             }
             Ok(mesh)
         }
-        "irregular-poly" => request
-            .number_and_seed(5, MAX_CORNERS / 6)
-            .map(|(n, seed)| irregular_poly(n, seed)),
+        "irregular-poly" => request.number_and_seed(5, MAX_CORNERS / 6).map(|(n, seed)| irregular_poly(n, seed)),
         _ => unreachable!("every name listed has its arm"),
     }
 }
@@ -152,10 +109,7 @@ struct Request<'a> {
 
 impl Request<'_> {
     fn refuse(&self, why: &str) -> Error {
-        Error::Unknown(format!(
-            "built-in mesh `{}`: {why}; write {}",
-            self.name, self.pattern
-        ))
+        Error::Unknown(format!("built-in mesh `{}`: {why}; write {}", self.name, self.pattern))
     }
 
     fn plain(&self, make: fn() -> Mesh) -> Result<Mesh> {
@@ -168,15 +122,12 @@ impl Request<'_> {
     fn in_range(&self, text: &str, symbol: &str, min: u64, max: u64) -> Result<usize> {
         match u64::from_str(text) {
             Ok(n) if (min..=max).contains(&n) => Ok(n as usize),
-            _ => Err(self.refuse(&format!(
-                "{symbol} is `{text}`, but must be a whole number from {min} to {max}"
-            ))),
+            _ => Err(self.refuse(&format!("{symbol} is `{text}`, but must be a whole number from {min} to {max}"))),
         }
     }
 
     fn text(&self) -> Result<&str> {
-        self.parameters
-            .ok_or_else(|| self.refuse("it needs its parameter"))
+        self.parameters.ok_or_else(|| self.refuse("it needs its parameter"))
     }
 
     fn number(&self, min: u64, max: u64) -> Result<usize> {
@@ -190,18 +141,15 @@ impl Request<'_> {
             None => (text, None),
         };
         let n = self.in_range(n, "N", min, max)?;
-        let seed = seed.map_or(Ok(1), u64::from_str).map_err(|_| {
-            self.refuse("SEED must be a whole number from 0 to 18446744073709551615")
-        })?;
+        let seed = seed
+            .map_or(Ok(1), u64::from_str)
+            .map_err(|_| self.refuse("SEED must be a whole number from 0 to 18446744073709551615"))?;
         Ok((n, seed))
     }
 
     /// N and M of a grid with so many corners a vertex.
     fn grid(&self, corners: u64) -> Result<(usize, usize)> {
-        let (n, m) = self
-            .text()?
-            .split_once('x')
-            .ok_or_else(|| self.refuse("it needs two parameters"))?;
+        let (n, m) = self.text()?.split_once('x').ok_or_else(|| self.refuse("it needs two parameters"))?;
         let max = MAX_CORNERS / corners;
         let n = self.in_range(n, "N", 3, max / 3)?;
         let m = self.in_range(m, "M", 3, max / 3)?;
@@ -213,40 +161,20 @@ impl Request<'_> {
 }
 
 fn mesh<const F: usize, const K: usize>(positions: &[[f64; 3]], faces: [[u32; K]; F]) -> Mesh {
-    Mesh::new(
-        positions.iter().map(|&p| DVec3::from_array(p)).collect(),
-        Faces::from_lists(faces),
-    )
+    Mesh::new(positions.iter().map(|&p| DVec3::from_array(p)).collect(), Faces::from_lists(faces))
 }
 
 /// The cube [−1, 1]³, vertex k at the signs of the bits of k.
 pub fn cube() -> Mesh {
     let sign = |bit: usize| if bit == 0 { -1.0 } else { 1.0 };
-    let positions: Vec<[f64; 3]> = (0..8)
-        .map(|k| [sign(k & 1), sign(k & 2), sign(k & 4)])
-        .collect();
-    mesh(
-        &positions,
-        [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ],
-    )
+    let positions: Vec<[f64; 3]> = (0..8).map(|k| [sign(k & 1), sign(k & 2), sign(k & 4)]).collect();
+    mesh(&positions, [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
 }
 
 /// Four alternate corners of the cube [−1, 1]³.
 pub fn tetrahedron() -> Mesh {
     mesh(
-        &[
-            [1.0, 1.0, 1.0],
-            [1.0, -1.0, -1.0],
-            [-1.0, 1.0, -1.0],
-            [-1.0, -1.0, 1.0],
-        ],
+        &[[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]],
         [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
     )
 }
@@ -254,24 +182,8 @@ pub fn tetrahedron() -> Mesh {
 /// The six unit vectors along the axes: vertices 2k and 2k + 1 on axis k.
 pub fn octahedron() -> Mesh {
     mesh(
-        &[
-            [1.0, 0.0, 0.0],
-            [-1.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0],
-            [0.0, -1.0, 0.0],
-            [0.0, 0.0, 1.0],
-            [0.0, 0.0, -1.0],
-        ],
-        [
-            [0, 2, 4],
-            [2, 1, 4],
-            [1, 3, 4],
-            [3, 0, 4],
-            [2, 0, 5],
-            [1, 2, 5],
-            [3, 1, 5],
-            [0, 3, 5],
-        ],
+        &[[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]],
+        [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]],
     )
 }
 
@@ -343,11 +255,8 @@ pub fn truncated_octahedron() -> Mesh {
         .collect();
     let mut cut = Faces::default();
     for f in 0..faces.len() {
-        let hexagon: Vec<u32> = faces
-            .range(f)
-            .flat_map(|c| [Some(c as u32), topology.twin(c as u32)])
-            .flatten()
-            .collect();
+        let hexagon: Vec<u32> =
+            faces.range(f).flat_map(|c| [Some(c as u32), topology.twin(c as u32)]).flatten().collect();
         cut.push(&hexagon);
     }
     let mut star = Vec::new();
@@ -416,9 +325,7 @@ fn torus_positions(n: usize, m: usize) -> Vec<DVec3> {
 /// The corners (i, j), (i+1, j), (i+1, j+1), (i, j+1) of all cells of a torus grid.
 fn torus_cells(n: usize, m: usize) -> impl Iterator<Item = [u32; 4]> {
     let at = move |i: usize, j: usize| ((i % n) * m + j % m) as u32;
-    (0..n).flat_map(move |i| {
-        (0..m).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)])
-    })
+    (0..n).flat_map(move |i| (0..m).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]))
 }
 
 /// A regular grid of n × m quads on a torus, n and m at least 3.
@@ -494,12 +401,7 @@ pub fn irregular_quad(n: usize, seed: u64) -> Mesh {
     let edges = (n - 2) / 2;
     let vertices = (edges * 5 / 4 + 6) / 3;
     let removals = 3 * vertices - 6 - edges;
-    quad_split(&merge_faces(
-        &irregular_tri(vertices, seed),
-        removals,
-        8,
-        seed,
-    ))
+    quad_split(&merge_faces(&irregular_tri(vertices, seed), removals, 8, seed))
 }
 
 #[cfg(test)]

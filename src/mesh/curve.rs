@@ -31,13 +31,8 @@ pub fn along_curve(mesh: &Mesh) -> Option<(Mesh, Numbering)> {
     let n = mesh.len();
     let numbering = Numbering::new(morton_cells(&mesh.positions));
     let place = numbering.place();
-    let corners: Option<Vec<u32>> = mesh
-        .faces
-        .corners()
-        .par_iter()
-        .with_min_len(8192)
-        .map(|&v| place.get(v as usize).copied())
-        .collect();
+    let corners: Option<Vec<u32>> =
+        mesh.faces.corners().par_iter().with_min_len(8192).map(|&v| place.get(v as usize).copied()).collect();
     let moved = Faces::from_parts(mesh.faces.offsets().to_vec(), corners?);
     let smallest: Vec<u32> = (0..moved.len())
         .into_par_iter()
@@ -93,9 +88,7 @@ pub(super) fn morton(positions: &[DVec3]) -> Vec<u32> {
     let codes = morton_codes(positions, |code| code);
     let highest = morton_codes(positions, |code| (code >> (3 * (21 - FIRST))) as u32);
     let mut order = counting_sort(&highest, 1 << (3 * FIRST));
-    let mut lists: Vec<&mut [u32]> = order
-        .chunk_by_mut(|&v, &w| highest[v as usize] == highest[w as usize])
-        .collect();
+    let mut lists: Vec<&mut [u32]> = order.chunk_by_mut(|&v, &w| highest[v as usize] == highest[w as usize]).collect();
     lists.par_iter_mut().for_each(|list| {
         list.sort_unstable_by_key(|&v| (codes[v as usize], v));
     });

@@ -38,32 +38,18 @@ impl DefectKind {
             DefectKind::NoVertices => return "no vertices".into(),
             DefectKind::NoFaces => return "no faces".into(),
             DefectKind::IndexOutOfRange => ("index out of range", "indices out of range"),
-            DefectKind::TooFewCorners => (
-                "face with fewer than three corners",
-                "faces with fewer than three corners",
-            ),
-            DefectKind::RepeatedVertex => (
-                "face with a repeated vertex",
-                "faces with a repeated vertex",
-            ),
-            DefectKind::NonFiniteCoordinate => (
-                "vertex with a coordinate that is not finite",
-                "vertices with a coordinate that is not finite",
-            ),
-            DefectKind::NonManifoldEdge => (
-                "edge with more than two faces",
-                "edges with more than two faces",
-            ),
-            DefectKind::InconsistentOrientation => (
-                "edge with two faces in the same direction",
-                "edges with two faces in the same direction",
-            ),
+            DefectKind::TooFewCorners => ("face with fewer than three corners", "faces with fewer than three corners"),
+            DefectKind::RepeatedVertex => ("face with a repeated vertex", "faces with a repeated vertex"),
+            DefectKind::NonFiniteCoordinate => {
+                ("vertex with a coordinate that is not finite", "vertices with a coordinate that is not finite")
+            }
+            DefectKind::NonManifoldEdge => ("edge with more than two faces", "edges with more than two faces"),
+            DefectKind::InconsistentOrientation => {
+                ("edge with two faces in the same direction", "edges with two faces in the same direction")
+            }
             DefectKind::NonManifoldVertex => ("non-manifold vertex", "non-manifold vertices"),
             DefectKind::IsolatedVertex => ("isolated vertex", "isolated vertices"),
-            DefectKind::LowValence => (
-                "vertex of valence below three",
-                "vertices of valence below three",
-            ),
+            DefectKind::LowValence => ("vertex of valence below three", "vertices of valence below three"),
             DefectKind::BoundaryEdge => ("boundary edge", "boundary edges"),
         };
         format!("{count} {}", if count == 1 { one } else { many })
@@ -110,25 +96,15 @@ impl Defect {
     }
 
     pub(super) fn at_vertex(kind: DefectKind, vertex: u32) -> Self {
-        Defect {
-            vertex: Some(vertex),
-            ..Defect::new(kind)
-        }
+        Defect { vertex: Some(vertex), ..Defect::new(kind) }
     }
 
     pub(super) fn at_face(kind: DefectKind, face: usize) -> Self {
-        Defect {
-            face: Some(face as u32),
-            ..Defect::new(kind)
-        }
+        Defect { face: Some(face as u32), ..Defect::new(kind) }
     }
 
     pub(super) fn at_edge(kind: DefectKind, face: usize, ends: [u32; 2]) -> Self {
-        Defect {
-            vertex: Some(ends[0]),
-            other_vertex: Some(ends[1]),
-            ..Defect::at_face(kind, face)
-        }
+        Defect { vertex: Some(ends[0]), other_vertex: Some(ends[1]), ..Defect::at_face(kind, face) }
     }
 }
 

@@ -42,11 +42,7 @@ pub(super) fn remarks(mesh: &Mesh) -> Vec<String> {
 /// Zeros of either sign are equal; vertices that are not finite do not count. O(n log n).
 fn duplicate_positions(positions: &[DVec3]) -> Vec<(u32, u32)> {
     // Adding +0 makes −0 to +0.
-    let bits = |v: u32| {
-        (positions[v as usize] + DVec3::ZERO)
-            .to_array()
-            .map(f64::to_bits)
-    };
+    let bits = |v: u32| (positions[v as usize] + DVec3::ZERO).to_array().map(f64::to_bits);
     let key = |v: u32| {
         let is_finite = positions[v as usize].is_finite();
         is_finite.then(|| bits(v).into_iter().fold(0, |h, b| mix(h ^ b)))
@@ -81,11 +77,7 @@ fn duplicate_faces(faces: &Faces, vertices: usize, same: &[(u32, u32)]) -> Vec<(
 /// have equal keys; few unequal ones may. Items without a key have no equals.
 ///
 /// Only items that share a bit of a table with another are sorted, an eighth if all are different.
-fn copies<T: Ord>(
-    count: u32,
-    key: impl Fn(u32) -> Option<u64> + Sync,
-    value: impl Fn(u32) -> T,
-) -> Vec<(u32, u32)> {
+fn copies<T: Ord>(count: u32, key: impl Fn(u32) -> Option<u64> + Sync, value: impl Fn(u32) -> T) -> Vec<(u32, u32)> {
     const BITS_PER_ITEM: usize = 16;
     const BLOCK: usize = 64;
     let bits = (BITS_PER_ITEM * count as usize).next_power_of_two().max(64);
@@ -124,10 +116,8 @@ fn copies<T: Ord>(
         let (word, bit) = place(key);
         met_again[word].load(Ordering::Relaxed) & bit != 0
     };
-    let mut keys: Vec<(u64, u32)> = blocks()
-        .with_min_len(BLOCK)
-        .flat_map_iter(|k| block(k, &met_again).filter(shares_a_bit))
-        .collect();
+    let mut keys: Vec<(u64, u32)> =
+        blocks().with_min_len(BLOCK).flat_map_iter(|k| block(k, &met_again).filter(shares_a_bit)).collect();
     keys.par_sort_unstable();
     let mut copies = Vec::new();
     for run in keys.chunk_by(|a, b| a.0 == b.0).filter(|run| run.len() > 1) {
@@ -176,16 +166,7 @@ mod tests {
     #[test]
     fn duplicates_are_found_in_order_and_zeros_of_either_sign_are_one() {
         let p = |x: f64| DVec3::new(x, 0.0, 1.0);
-        let positions = [
-            p(1.0),
-            p(-0.0),
-            p(2.0),
-            p(0.0),
-            p(1.0),
-            p(f64::NAN),
-            p(f64::NAN),
-            p(1.0),
-        ];
+        let positions = [p(1.0), p(-0.0), p(2.0), p(0.0), p(1.0), p(f64::NAN), p(f64::NAN), p(1.0)];
         assert_eq!(duplicate_positions(&positions), [(3, 1), (4, 0), (7, 0)]);
     }
 
@@ -208,13 +189,8 @@ mod tests {
             // Far from collinear compared with rounding, though small.
             DVec3::new(1e-9, 2e-9, 3e-9 + 1e-20),
         ];
-        let faces = Faces::from_lists(vec![
-            vec![0, 1, 2],
-            vec![0, 1, 3],
-            vec![3, 3, 1],
-            vec![0, 1, 3, 2],
-            vec![0, 1, 4],
-        ]);
+        let faces =
+            Faces::from_lists(vec![vec![0, 1, 2], vec![0, 1, 3], vec![3, 3, 1], vec![0, 1, 3, 2], vec![0, 1, 4]]);
         let flat = zero_area_faces(&Mesh::new(positions, faces));
         assert_eq!(flat, [0, 2]);
     }

@@ -43,11 +43,7 @@ impl<'a> EdgeNumbers<'a> {
 
     /// The first half-edges, ascending.
     pub(crate) fn firsts(&self) -> impl IndexedParallelIterator<Item = u32> + '_ {
-        let start = || Cursor {
-            next: u32::MAX,
-            word: 0,
-            bits: 0,
-        };
+        let start = || Cursor { next: u32::MAX, word: 0, bits: 0 };
         (0..self.twins.len() as u32 / 2)
             .into_par_iter()
             .with_min_len(CHUNK)
@@ -91,12 +87,7 @@ mod tests {
     #[test]
     fn edges_are_numbered_by_their_first_half_edges() {
         // Several words, several tasks, and a word without any first half-edge.
-        for name in [
-            "tetrahedron",
-            "irregular-poly:500",
-            "torus:150x130",
-            "tri-torus:80x80",
-        ] {
+        for name in ["tetrahedron", "irregular-poly:500", "torus:150x130", "tri-torus:80x80"] {
             let mesh = crate::mesh::builtin::builtin(name).unwrap();
             let topology = Topology::new(&mesh.faces, mesh.len());
             let twins = topology.twins().to_vec();

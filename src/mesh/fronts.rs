@@ -39,11 +39,7 @@ pub fn breadth_first(faces: &Faces, incidence: &Incidence) -> Vec<u32> {
     }
 }
 
-fn search(
-    faces: &Faces,
-    incidence: &Incidence,
-    face_at: impl Fn(usize) -> (usize, Range<usize>),
-) -> Vec<u32> {
+fn search(faces: &Faces, incidence: &Incidence, face_at: impl Fn(usize) -> (usize, Range<usize>)) -> Vec<u32> {
     let n = incidence.vertices();
     let (mut vertices, mut opened) = (Met::new(n), Met::new(faces.len()));
     // One place more, for what is written there and not kept.
@@ -141,9 +137,7 @@ mod tests {
             let kind = |v: &u32| {
                 let at = incidence.corners_at(*v as usize);
                 let size = |c: u32| mesh.faces.face(incidence.face_of(c)).len();
-                let alike = [3, 4]
-                    .into_iter()
-                    .find(|&m| at.iter().all(|&c| size(c) == m));
+                let alike = [3, 4].into_iter().find(|&m| at.iter().all(|&c| size(c) == m));
                 (at.len(), alike)
             };
             let changes = |order: &[u32]| {

@@ -31,8 +31,7 @@ fn number_edges(faces: &Faces, topology: &Topology) -> (Vec<u32>, Vec<[u32; 2]>)
 }
 
 fn midpoints(positions: &[DVec3], ends: &[[u32; 2]]) -> impl Iterator<Item = DVec3> {
-    ends.iter()
-        .map(|&[a, b]| (positions[a as usize] + positions[b as usize]) / 2.0)
+    ends.iter().map(|&[a, b]| (positions[a as usize] + positions[b as usize]) / 2.0)
 }
 
 fn centroid(mesh: &Mesh, f: usize) -> DVec3 {
@@ -56,12 +55,7 @@ pub fn quad_split(mesh: &Mesh) -> Mesh {
         let range = mesh.faces.range(f);
         for c in range.clone() {
             let before = prev_in(&range, c as u32) as usize;
-            faces.push(&[
-                mesh.faces.corners()[c],
-                v + edge[c],
-                v + e + f as u32,
-                v + edge[before],
-            ]);
+            faces.push(&[mesh.faces.corners()[c], v + edge[c], v + e + f as u32, v + edge[before]]);
         }
     }
     Mesh::new(positions, faces)
@@ -130,11 +124,7 @@ pub fn union(meshes: &[Mesh]) -> Mesh {
 /// If a mesh has no faces or its last face is not a triangle.
 pub fn connected_sum(a: &Mesh, b: &Mesh) -> Mesh {
     let last = |mesh: &Mesh| -> [u32; 3] {
-        mesh.faces
-            .iter()
-            .last()
-            .and_then(|f| f.try_into().ok())
-            .expect("the last face is a triangle")
+        mesh.faces.iter().last().and_then(|f| f.try_into().ok()).expect("the last face is a triangle")
     };
     let ([a0, a1, a2], [b0, b1, b2]) = (last(a), last(b));
     // Opposite directions along the seam.
@@ -209,22 +199,15 @@ pub fn flip_edges(mesh: &mut Mesh, attempts: usize, seed: u64) {
     const AHEAD: usize = 64;
     // Keeps slivers away, and with them triangles that look turned round from another side.
     const LEAST_SHARE: f64 = 0.125;
-    assert!(
-        mesh.faces.is_empty() || mesh.faces.uniform_size() == Some(3),
-        "all faces are triangles"
-    );
+    assert!(mesh.faces.is_empty() || mesh.faces.uniform_size() == Some(3), "all faces are triangles");
     let topology = Topology::new(&mesh.faces, mesh.len());
     let positions = &mesh.positions;
     let corners = mesh.faces.corners_mut();
     if corners.is_empty() {
         return;
     }
-    let mut valence: Vec<u32> = (0..positions.len())
-        .map(|v| topology.incidence.face_count(v) as u32)
-        .collect();
-    let mut twin: Vec<u32> = (0..corners.len() as u32)
-        .map(|c| topology.twin(c).unwrap_or(NONE))
-        .collect();
+    let mut valence: Vec<u32> = (0..positions.len()).map(|v| topology.incidence.face_count(v) as u32).collect();
+    let mut twin: Vec<u32> = (0..corners.len() as u32).map(|c| topology.twin(c).unwrap_or(NONE)).collect();
     let next = |c: u32| if c % 3 == 2 { c - 2 } else { c + 1 };
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut drawn = Vec::new();
@@ -249,11 +232,7 @@ pub fn flip_edges(mesh: &mut Mesh, attempts: usize, seed: u64) {
         }
         let joined = {
             // Around the one of x and y with fewer edges, looking for the other.
-            let (start, other) = if valence[x as usize] <= valence[y as usize] {
-                (xa, y)
-            } else {
-                (yb, x)
-            };
+            let (start, other) = if valence[x as usize] <= valence[y as usize] { (xa, y) } else { (yb, x) };
             let mut around = start;
             loop {
                 if corners[next(around) as usize] == other {
@@ -279,24 +258,11 @@ pub fn flip_edges(mesh: &mut Mesh, attempts: usize, seed: u64) {
         }
         let outer = [bx, xa, ay, yb].map(|c| twin[c as usize]);
         let (t, u) = (c - c % 3, d - d % 3);
-        for (at, v) in [
-            (t, a),
-            (t + 1, y),
-            (t + 2, x),
-            (u, y),
-            (u + 1, b),
-            (u + 2, x),
-        ] {
+        for (at, v) in [(t, a), (t + 1, y), (t + 2, x), (u, y), (u + 1, b), (u + 2, x)] {
             corners[at as usize] = v;
         }
         let [from_bx, from_xa, from_ay, from_yb] = outer;
-        for (p, q) in [
-            (t, from_ay),
-            (t + 1, u + 2),
-            (t + 2, from_xa),
-            (u, from_yb),
-            (u + 1, from_bx),
-        ] {
+        for (p, q) in [(t, from_ay), (t + 1, u + 2), (t + 2, from_xa), (u, from_yb), (u + 1, from_bx)] {
             twin[p as usize] = q;
             if q != NONE {
                 twin[q as usize] = p;
@@ -330,9 +296,7 @@ fn read_ahead(drawn: &[u32], twin: &[u32], corners: &[u32], valence: &[u32], pos
 pub fn merge_faces(mesh: &Mesh, removals: usize, max_size: usize, seed: u64) -> Mesh {
     let topology = Topology::new(&mesh.faces, mesh.len());
     let corners = mesh.faces.corners();
-    let mut face_of: Vec<u32> = (0..corners.len() as u32)
-        .map(|c| topology.incidence.face_of(c) as u32)
-        .collect();
+    let mut face_of: Vec<u32> = (0..corners.len() as u32).map(|c| topology.incidence.face_of(c) as u32).collect();
     let (mut next, mut previous) = (vec![0u32; corners.len()], vec![0u32; corners.len()]);
     let mut start: Vec<u32> = mesh.faces.offsets()[..mesh.faces.len()].to_vec();
     let mut size: Vec<usize> = mesh.faces.iter().map(<[u32]>::len).collect();
@@ -343,9 +307,7 @@ pub fn merge_faces(mesh: &Mesh, removals: usize, max_size: usize, seed: u64) -> 
             previous[c] = prev_in(&range, c as u32);
         }
     }
-    let mut valence: Vec<usize> = (0..mesh.len())
-        .map(|v| topology.incidence.face_count(v))
-        .collect();
+    let mut valence: Vec<usize> = (0..mesh.len()).map(|v| topology.incidence.face_count(v)).collect();
     // The attempt at which a vertex was last seen on the first of the two faces.
     let mut seen = vec![usize::MAX; mesh.len()];
     let mut edges: Vec<u32> = topology.edge_sides().collect();
@@ -369,15 +331,11 @@ pub fn merge_faces(mesh: &Mesh, removals: usize, max_size: usize, seed: u64) -> 
                 k = next[k as usize];
             }
         };
-        around(c, &next, &mut |k| {
-            seen[corners[k as usize] as usize] = attempt
-        });
+        around(c, &next, &mut |k| seen[corners[k as usize] as usize] = attempt);
         seen[a] = usize::MAX;
         seen[b] = usize::MAX;
         let mut apart = true;
-        around(d, &next, &mut |k| {
-            apart &= seen[corners[k as usize] as usize] != attempt
-        });
+        around(d, &next, &mut |k| apart &= seen[corners[k as usize] as usize] != attempt);
         if !apart {
             continue;
         }
@@ -418,15 +376,11 @@ pub fn ring_sphere(n: usize) -> Mesh {
     assert!(n >= 5, "two poles and a ring of three");
     // The edge of n even triangles pairs on the sphere: 4π = (2n) (√3/4) h².
     let h = (8.0 * PI / (3f64.sqrt() * n as f64)).sqrt();
-    let rings = ((PI / h).round() as usize)
-        .saturating_sub(1)
-        .clamp(1, (n - 2) / 3);
+    let rings = ((PI / h).round() as usize).saturating_sub(1).clamp(1, (n - 2) / 3);
     let latitude = |k: usize| PI * (k + 1) as f64 / (rings + 1) as f64;
     // Three vertices in every ring, and the others in proportion to what its length asks for beyond.
     let spare = n - 2 - 3 * rings;
-    let wish: Vec<f64> = (0..rings)
-        .map(|k| (TAU * latitude(k).sin() / h - 3.0).max(0.0) + f64::MIN_POSITIVE)
-        .collect();
+    let wish: Vec<f64> = (0..rings).map(|k| (TAU * latitude(k).sin() / h - 3.0).max(0.0) + f64::MIN_POSITIVE).collect();
     let total: f64 = wish.iter().sum();
     let mut granted = 0;
     let mut sum = 0.0;
@@ -435,11 +389,7 @@ pub fn ring_sphere(n: usize) -> Mesh {
         .enumerate()
         .map(|(k, w)| {
             sum += w;
-            let upto = if k + 1 == rings {
-                spare
-            } else {
-                (spare as f64 * (sum / total)).round() as usize
-            };
+            let upto = if k + 1 == rings { spare } else { (spare as f64 * (sum / total)).round() as usize };
             let size = 3 + upto - granted;
             granted = upto;
             size
@@ -449,9 +399,7 @@ pub fn ring_sphere(n: usize) -> Mesh {
     let mut positions = vec![DVec3::Z];
     let mut faces = Faces::with_capacity(6 * n - 12);
     // The angle of vertex j in ring k of the given size; odd rings are turned by half a step.
-    let angle = |k: usize, size: usize, j: usize| {
-        TAU * (j as f64 + if k % 2 == 1 { 0.5 } else { 0.0 }) / size as f64
-    };
+    let angle = |k: usize, size: usize, j: usize| TAU * (j as f64 + if k % 2 == 1 { 0.5 } else { 0.0 }) / size as f64;
     let mut first = 1u32;
     for (k, &size) in sizes.iter().enumerate() {
         let (sin, cos) = latitude(k).sin_cos();
@@ -470,8 +418,8 @@ pub fn ring_sphere(n: usize) -> Mesh {
             let above = |i: usize| first - above_size as u32 + (i % above_size) as u32;
             let (mut i, mut j) = (0, 0);
             while i < above_size || j < size {
-                let advance_above = j == size
-                    || i < above_size && angle(k - 1, above_size, i + 1) < angle(k, size, j + 1);
+                let advance_above =
+                    j == size || i < above_size && angle(k - 1, above_size, i + 1) < angle(k, size, j + 1);
                 if advance_above {
                     faces.push(&[here(j), above(i + 1), above(i)]);
                     i += 1;

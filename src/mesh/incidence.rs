@@ -76,10 +76,7 @@ impl Incidence {
         for v in 0..vertices {
             offsets[v + 1] += offsets[v];
         }
-        assert!(
-            offsets[vertices] as usize == corners.len(),
-            "every corner names a vertex"
-        );
+        assert!(offsets[vertices] as usize == corners.len(), "every corner names a vertex");
         let mut sorted = large(vec![0u32; corners.len()]);
         let parts = split_rows(&offsets, share, &mut sorted);
         parts.into_par_iter().for_each(|(rows, sorted)| {
@@ -98,11 +95,7 @@ impl Incidence {
 
     /// From its arrays.
     pub(crate) fn from_parts(offsets: Vec<u32>, corners: Vec<u32>, faces: &Faces) -> Self {
-        Incidence {
-            offsets,
-            corners,
-            face: FaceOf::new(faces),
-        }
+        Incidence { offsets, corners, face: FaceOf::new(faces) }
     }
 
     /// The number of vertices N.
@@ -196,31 +189,25 @@ impl Incidence {
     /// ```
     pub fn is_closed(&self, faces: &Faces) -> bool {
         let corners = faces.corners();
-        (0..self.vertices())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .all(|v| {
-                let at = self.corners_at(v);
-                let sides = |c: u32| {
-                    let (after, before) = (self.next(faces, c), self.prev(faces, c));
-                    (corners[after as usize], corners[before as usize])
-                };
-                if at.len() > FEW {
-                    let (mut out, mut into): (Vec<u32>, Vec<u32>) =
-                        at.iter().map(|&c| sides(c)).unzip();
-                    out.sort_unstable();
-                    into.sort_unstable();
-                    return out == into
-                        && out.windows(2).all(|w| w[0] != w[1])
-                        && out.binary_search(&(v as u32)).is_err();
-                }
-                // Eight at a time, by one comparison of all: a vertex of more faces is rare.
-                if at.len() <= FEW / 2 {
-                    each_once::<{ FEW / 2 }>(v, at.iter().map(|&c| sides(c)))
-                } else {
-                    each_once::<FEW>(v, at.iter().map(|&c| sides(c)))
-                }
-            })
+        (0..self.vertices()).into_par_iter().with_min_len(CHUNK).all(|v| {
+            let at = self.corners_at(v);
+            let sides = |c: u32| {
+                let (after, before) = (self.next(faces, c), self.prev(faces, c));
+                (corners[after as usize], corners[before as usize])
+            };
+            if at.len() > FEW {
+                let (mut out, mut into): (Vec<u32>, Vec<u32>) = at.iter().map(|&c| sides(c)).unzip();
+                out.sort_unstable();
+                into.sort_unstable();
+                return out == into && out.windows(2).all(|w| w[0] != w[1]) && out.binary_search(&(v as u32)).is_err();
+            }
+            // Eight at a time, by one comparison of all: a vertex of more faces is rare.
+            if at.len() <= FEW / 2 {
+                each_once::<{ FEW / 2 }>(v, at.iter().map(|&c| sides(c)))
+            } else {
+                each_once::<FEW>(v, at.iter().map(|&c| sides(c)))
+            }
+        })
     }
 }
 
@@ -249,9 +236,7 @@ pub(crate) fn split_rows<'a, T>(
     chunk: usize,
     values: &'a mut [T],
 ) -> Vec<(Range<usize>, &'a mut [T])> {
-    split(offsets.len() - 1, chunk, values, |rows| {
-        (offsets[rows.end] - offsets[rows.start]) as usize
-    })
+    split(offsets.len() - 1, chunk, values, |rows| (offsets[rows.end] - offsets[rows.start]) as usize)
 }
 
 /// Cuts `values`, one a corner, after the corners of every `chunk` faces.
@@ -260,9 +245,7 @@ pub(crate) fn split_by_face<'a, T>(
     chunk: usize,
     values: &'a mut [T],
 ) -> Vec<(Range<usize>, &'a mut [T])> {
-    split(faces.len(), chunk, values, |rows| {
-        faces.range(rows.end - 1).end - faces.range(rows.start).start
-    })
+    split(faces.len(), chunk, values, |rows| faces.range(rows.end - 1).end - faces.range(rows.start).start)
 }
 
 fn split<T>(
@@ -285,18 +268,10 @@ fn split<T>(
 
 /// The corner after `c` in its face, whose corners are `range`.
 pub fn next_in(range: &Range<usize>, c: u32) -> u32 {
-    if c as usize + 1 == range.end {
-        range.start as u32
-    } else {
-        c + 1
-    }
+    if c as usize + 1 == range.end { range.start as u32 } else { c + 1 }
 }
 
 /// The corner before `c` in its face, whose corners are `range`.
 pub fn prev_in(range: &Range<usize>, c: u32) -> u32 {
-    if c as usize == range.start {
-        range.end as u32 - 1
-    } else {
-        c - 1
-    }
+    if c as usize == range.start { range.end as u32 - 1 } else { c - 1 }
 }

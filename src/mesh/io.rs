@@ -49,11 +49,7 @@ impl Format {
             "obj" => Ok(Format::Obj),
             "off" => Ok(Format::Off),
             "ply" => Ok(Format::Ply),
-            _ => Err(Error::parse(
-                path,
-                None,
-                "not a known mesh format: the name must end in .obj, .off or .ply",
-            )),
+            _ => Err(Error::parse(path, None, "not a known mesh format: the name must end in .obj, .off or .ply")),
         }
     }
 }
@@ -114,10 +110,7 @@ pub fn write(path: &Path, mesh: &Mesh, normals: Option<&[DVec3]>) -> Result<()> 
 }
 
 pub(super) fn check_normals(mesh: &Mesh, normals: Option<&[DVec3]>) {
-    assert!(
-        normals.is_none_or(|n| n.len() == mesh.len()),
-        "one normal for each vertex"
-    );
+    assert!(normals.is_none_or(|n| n.len() == mesh.len()), "one normal for each vertex");
 }
 
 /// Writes `rows` lines, each filled by `push` into an empty buffer.
@@ -148,12 +141,7 @@ pub(super) struct Builder {
 impl Builder {
     /// `lines` is empty, or `None` where they are not kept.
     pub fn new(lines: Option<Lines>) -> Self {
-        Builder {
-            positions: Vec::new(),
-            offsets: vec![0],
-            corners: Vec::new(),
-            lines,
-        }
+        Builder { positions: Vec::new(), offsets: vec![0], corners: Vec::new(), lines }
     }
 
     /// Makes room for the vertices that a header announces, at most as many as the file can still hold, so that an
@@ -205,9 +193,7 @@ impl Builder {
         if size < 3 {
             let face = self.faces();
             let s = if size == 1 { "" } else { "s" };
-            return Err(format!(
-                "face {face} has {size} corner{s}, a face needs at least 3: remove it"
-            ));
+            return Err(format!("face {face} has {size} corner{s}, a face needs at least 3: remove it"));
         }
         let Ok(end) = u32::try_from(self.corners.len()) else {
             return Err("more face corners than 32-bit indices can name".into());
@@ -222,10 +208,7 @@ impl Builder {
     pub fn finish(self, path: &Path, normals: Option<Vec<DVec3>>, remarks: Vec<String>) -> Loaded {
         Loaded {
             name: path.display().to_string(),
-            mesh: Mesh::new(
-                self.positions,
-                Faces::from_parts(self.offsets, self.corners),
-            ),
+            mesh: Mesh::new(self.positions, Faces::from_parts(self.offsets, self.corners)),
             lines: self.lines,
             normals,
             remarks,
@@ -248,10 +231,7 @@ mod tests {
     #[test]
     fn formats_are_known_by_extension() {
         let folder = tempfile::tempdir().unwrap();
-        let mesh = Mesh::new(
-            vec![DVec3::ZERO, DVec3::X, DVec3::Y],
-            Faces::from_lists([[0, 1, 2]]),
-        );
+        let mesh = Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], Faces::from_lists([[0, 1, 2]]));
         for name in ["a.obj", "a.OFF", "a.Ply"] {
             let path = folder.path().join(name);
             write(&path, &mesh, None).unwrap();

@@ -62,13 +62,7 @@ pub struct Faces {
 
 impl Default for Faces {
     fn default() -> Self {
-        Faces {
-            count: 0,
-            size: Some(0),
-            offsets: Vec::new(),
-            uniform_offsets: OnceLock::new(),
-            corners: Vec::new(),
-        }
+        Faces { count: 0, size: Some(0), offsets: Vec::new(), uniform_offsets: OnceLock::new(), corners: Vec::new() }
     }
 }
 
@@ -89,10 +83,7 @@ impl Faces {
     /// If `offsets` does not start at 0, descends, or does not end at `corners.len()`.
     pub fn from_parts(offsets: Vec<u32>, corners: Vec<u32>) -> Self {
         assert!(offsets.first() == Some(&0), "offsets start at 0");
-        assert!(
-            offsets.last().map(|&l| l as usize) == Some(corners.len()),
-            "offsets end at the number of corners"
-        );
+        assert!(offsets.last().map(|&l| l as usize) == Some(corners.len()), "offsets end at the number of corners");
         // The least size and the greatest.
         let sizes = offsets.par_windows(2).with_min_len(CHUNK).map(|w| {
             assert!(w[0] <= w[1], "offsets ascend");
@@ -101,18 +92,9 @@ impl Faces {
         });
         let sizes = sizes.reduce(|| (u32::MAX, 0), |a, b| (a.0.min(b.0), a.1.max(b.1)));
         let count = offsets.len() - 1;
-        let (size, offsets) = if count == 0 || sizes.0 == sizes.1 {
-            (Some(sizes.1 as usize), Vec::new())
-        } else {
-            (None, offsets)
-        };
-        Faces {
-            count,
-            size,
-            offsets,
-            corners,
-            ..Faces::default()
-        }
+        let (size, offsets) =
+            if count == 0 || sizes.0 == sizes.1 { (Some(sizes.1 as usize), Vec::new()) } else { (None, offsets) };
+        Faces { count, size, offsets, corners, ..Faces::default() }
     }
 
     /// Faces of `size` corners each.
@@ -121,17 +103,9 @@ impl Faces {
     /// If `size` is 0 or does not divide the number of corners, or 32 bits do not number these.
     pub fn of_size(size: usize, corners: Vec<u32>) -> Self {
         assert!(corners.len().is_multiple_of(size), "whole faces");
-        assert!(
-            corners.len() <= u32::MAX as usize,
-            "corners fit 32-bit indices"
-        );
+        assert!(corners.len() <= u32::MAX as usize, "corners fit 32-bit indices");
         let count = corners.len() / size;
-        Faces {
-            count,
-            size: Some(if count == 0 { 0 } else { size }),
-            corners,
-            ..Faces::default()
-        }
+        Faces { count, size: Some(if count == 0 { 0 } else { size }), corners, ..Faces::default() }
     }
 
     /// Faces from a list of index lists.
@@ -168,10 +142,7 @@ impl Faces {
 
     /// Room for so many corners.
     pub fn with_capacity(corners: usize) -> Self {
-        Faces {
-            corners: Vec::with_capacity(corners),
-            ..Faces::default()
-        }
+        Faces { corners: Vec::with_capacity(corners), ..Faces::default() }
     }
 
     /// The number of faces.
@@ -208,8 +179,7 @@ impl Faces {
         let Some(size) = self.size else {
             return &self.offsets;
         };
-        self.uniform_offsets
-            .get_or_init(|| (0..=self.count).map(|f| (size * f) as u32).collect())
+        self.uniform_offsets.get_or_init(|| (0..=self.count).map(|f| (size * f) as u32).collect())
     }
 
     pub fn corners(&self) -> &[u32] {
@@ -249,13 +219,10 @@ impl Mesh {
 
 /// The corners of the smallest axis-parallel box around all finite points.
 pub fn bounding_box(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
-    points
-        .iter()
-        .filter(|p| p.is_finite())
-        .fold(None, |bounds, &p| match bounds {
-            None => Some((p, p)),
-            Some((lo, hi)) => Some((p.min(lo), p.max(hi))),
-        })
+    points.iter().filter(|p| p.is_finite()).fold(None, |bounds, &p| match bounds {
+        None => Some((p, p)),
+        Some((lo, hi)) => Some((p.min(lo), p.max(hi))),
+    })
 }
 
 #[cfg(test)]

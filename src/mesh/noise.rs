@@ -26,9 +26,7 @@ impl FromStr for Noise {
     fn from_str(text: &str) -> Result<Self> {
         let (amplitude, seed) = text.split_once(':').unwrap_or((text, "1"));
         match (amplitude.parse(), seed.parse()) {
-            (Ok(amplitude), Ok(seed)) if (0.0..f64::INFINITY).contains(&amplitude) => {
-                Ok(Noise { amplitude, seed })
-            }
+            (Ok(amplitude), Ok(seed)) if (0.0..f64::INFINITY).contains(&amplitude) => Ok(Noise { amplitude, seed }),
             _ => Err(Error::Unknown(format!(
                 "noise `{text}`: write A[:SEED] with a number A from 0 and a whole number SEED, such as 0.1:7"
             ))),
@@ -52,16 +50,11 @@ pub fn mean_edge_length(mesh: &Mesh) -> f64 {
     let (mut sum, mut count) = (0.0, 0u32);
     for c in topology.edge_sides() {
         let range = faces.range(topology.incidence.face_of(c));
-        let [a, b] =
-            [c, next_in(&range, c)].map(|c| mesh.positions[faces.corners()[c as usize] as usize]);
+        let [a, b] = [c, next_in(&range, c)].map(|c| mesh.positions[faces.corners()[c as usize] as usize]);
         sum += a.distance(b);
         count += 1;
     }
-    if count == 0 {
-        0.0
-    } else {
-        sum / f64::from(count)
-    }
+    if count == 0 { 0.0 } else { sum / f64::from(count) }
 }
 
 /// Adds to every coordinate a Gaussian of mean 0 and standard deviation `amplitude` × the mean edge length. The
@@ -97,10 +90,7 @@ mod tests {
         let expected = (4.0 + 2f64.sqrt()) / 5.0;
         assert!((mean_edge_length(&mesh) - expected).abs() < 4.0 * f64::EPSILON);
         assert_eq!(mean_edge_length(&builtin::cube()), 2.0);
-        assert_eq!(
-            mean_edge_length(&Mesh::new(vec![DVec3::X], Faces::default())),
-            0.0
-        );
+        assert_eq!(mean_edge_length(&Mesh::new(vec![DVec3::X], Faces::default())), 0.0);
     }
 
     #[test]
@@ -120,19 +110,12 @@ mod tests {
         // deviations.
         for (k, mean, variance) in [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)] {
             let bound = 5.0 * f64::sqrt(variance / n);
-            assert!(
-                (moment(k) - mean).abs() < bound,
-                "moment {k}: {}",
-                moment(k)
-            );
+            assert!((moment(k) - mean).abs() < bound, "moment {k}: {}", moment(k));
         }
         // The three coordinates of a vertex, and vertices in a row, are not correlated.
         for lag in 1..7 {
             let products = z.windows(lag + 1).map(|w| w[0] * w[lag]);
-            assert!(
-                (products.sum::<f64>() / n).abs() < 5.0 / n.sqrt(),
-                "lag {lag}"
-            );
+            assert!((products.sum::<f64>() / n).abs() < 5.0 / n.sqrt(), "lag {lag}");
         }
     }
 
@@ -143,11 +126,7 @@ mod tests {
             let length = mean_edge_length(&mesh);
             add_noise(&mut mesh, 0.1, seed);
             let shift = |(p, q): (&DVec3, DVec3)| (*p - q) / length;
-            mesh.positions
-                .iter()
-                .zip(before)
-                .map(shift)
-                .collect::<Vec<_>>()
+            mesh.positions.iter().zip(before).map(shift).collect::<Vec<_>>()
         };
         let (small, large) = (moved(builtin::cube(), 3), moved(builtin::icosahedron(), 3));
         for (p, q) in small.iter().zip(&large) {
@@ -170,9 +149,7 @@ mod tests {
         for n in [noise(0.1, 1), noise(0.25, u64::MAX)] {
             assert_eq!(read(&n.to_string()).unwrap(), n);
         }
-        for bad in [
-            "", "-0.1", "nan", "inf", "0.1:", "0.1:x", "0.1:1:2", "0.1:-1", ":3",
-        ] {
+        for bad in ["", "-0.1", "nan", "inf", "0.1:", "0.1:x", "0.1:1:2", "0.1:-1", ":3"] {
             assert!(read(bad).is_err(), "{bad}");
         }
     }

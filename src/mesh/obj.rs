@@ -16,10 +16,7 @@ const DROPPED: [(&str, &[&[u8]]); 8] = [
     ("normals (vn)", &[b"vn"]),
     ("group names (g, o)", &[b"g", b"o"]),
     ("smoothing groups (s)", &[b"s"]),
-    (
-        "material statements",
-        &[b"usemtl", b"mtllib", b"usemap", b"maplib"],
-    ),
+    ("material statements", &[b"usemtl", b"mtllib", b"usemap", b"maplib"]),
     ("lines (l)", &[b"l"]),
     ("points (p)", &[b"p"]),
     (
@@ -108,10 +105,7 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
                 builder.end_face(line).map_err(at)?;
             }
             keyword => {
-                match DROPPED
-                    .iter()
-                    .position(|(_, words)| words.contains(&keyword))
-                {
+                match DROPPED.iter().position(|(_, words)| words.contains(&keyword)) {
                     Some(kind) => dropped[kind] += 1,
                     None => match &mut unknown {
                         Some((count, _)) => *count += 1,
@@ -134,18 +128,14 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
         .map(|((what, _), count)| format!("{count} {what}"))
         .collect();
     if extended_vertices > 0 {
-        not_kept.push(format!(
-            "weights or colours of {extended_vertices} vertices"
-        ));
+        not_kept.push(format!("weights or colours of {extended_vertices} vertices"));
     }
     let mut remarks = Vec::new();
     if !not_kept.is_empty() {
         remarks.push(format!("not kept: {}", not_kept.join(", ")));
     }
     if let Some((count, first)) = unknown {
-        remarks.push(format!(
-            "{count} unknown statements passed over, the first at {first}"
-        ));
+        remarks.push(format!("{count} unknown statements passed over, the first at {first}"));
     }
     if s.ends_within_a_line() {
         remarks.push("the last line has no end: was the file cut off?".into());
@@ -195,8 +185,7 @@ fn has_more_numbers(s: &mut Scanner, vertex: usize) -> Result<bool> {
         if s.at_line_end() {
             return Ok(found);
         }
-        s.number()
-            .ok_or_else(|| s.unexpected(format_args!("a weight or colour of vertex {vertex}")))?;
+        s.number().ok_or_else(|| s.unexpected(format_args!("a weight or colour of vertex {vertex}")))?;
         found = true;
     }
 }
@@ -215,10 +204,7 @@ fn corner(s: &mut Scanner, builder: &Builder) -> Result<u32> {
     let (number, length) = leading_digits(digits).ok_or_else(refuse)?;
     let references = &digits[length..];
     let plain = references.is_empty()
-        || references[0] == b'/'
-            && references
-                .iter()
-                .all(|b| matches!(b, b'0'..=b'9' | b'/' | b'-'));
+        || references[0] == b'/' && references.iter().all(|b| matches!(b, b'0'..=b'9' | b'/' | b'-'));
     if number == 0 || !plain {
         return Err(refuse());
     }
@@ -297,18 +283,12 @@ mod tests {
                     \tf 1 2/7 3//8\nf 1/1/1 -3/-1/-1 -2//-1 4 # all\nf 1 2\\\n3\n\\\n\\\nv 4 0 0\nf -1 1 2\n\\\n\n\\\n# x";
         let loaded = parse(text).unwrap();
         let faces: Vec<_> = loaded.mesh.faces.iter().collect();
-        assert_eq!(
-            faces,
-            [&[0, 1, 2][..], &[0, 1, 2, 3], &[0, 1, 2], &[4, 0, 1]]
-        );
+        assert_eq!(faces, [&[0, 1, 2][..], &[0, 1, 2, 3], &[0, 1, 2], &[4, 0, 1]]);
         assert_eq!(loaded.mesh.positions[1], DVec3::new(1.0, 0.5, -1e-3));
         let lines = loaded.lines.unwrap();
         assert_eq!(lines.vertices, [2, 5, 6, 7, 14]);
         assert_eq!(lines.faces, [8, 9, 10, 15]);
-        assert_eq!(
-            loaded.remarks,
-            ["the last line has no end: was the file cut off?"]
-        );
+        assert_eq!(loaded.remarks, ["the last line has no end: was the file cut off?"]);
     }
 
     #[test]
@@ -342,15 +322,9 @@ mod tests {
     fn errors_name_the_line_and_what_is_wrong() {
         let with = |statement: &str| refusal(&format!("{TRIANGLE}{statement}\n"));
         for (statement, start) in [
-            (
-                "v 1 2",
-                "the line ends where coordinate z of vertex 3 should be",
-            ),
+            ("v 1 2", "the line ends where coordinate z of vertex 3 should be"),
             ("v 1 2,5 3", "\"2,5\" is not coordinate y of vertex 3"),
-            (
-                "v 1 2 3 red",
-                "\"red\" is not a weight or colour of vertex 3",
-            ),
+            ("v 1 2 3 red", "\"red\" is not a weight or colour of vertex 3"),
             ("f 1 2", "face 0 has 2 corners"),
             ("f 1", "face 0 has 1 corner, a face needs at least 3"),
             ("f", "face 0 has 0 corners"),
@@ -358,24 +332,12 @@ mod tests {
             ("f 1 2 -0", "\"-0\" is not a corner of face 0 ("),
             ("f 1 2 3.5", "\"3.5\" is not a corner of face 0 ("),
             ("f 1 2 3/x", "\"3/x\" is not a corner of face 0 ("),
-            (
-                "f 1 2 -4",
-                "corner -4 of face 0 reaches before the first of the 3 vertices",
-            ),
-            (
-                "f 1 2 4294967297",
-                "\"4294967297\" is not a corner of face 0 (",
-            ),
-            (
-                "f 1 2 99999999999999999999",
-                "\"99999999999999999999\" is not a corner",
-            ),
+            ("f 1 2 -4", "corner -4 of face 0 reaches before the first of the 3 vertices"),
+            ("f 1 2 4294967297", "\"4294967297\" is not a corner of face 0 ("),
+            ("f 1 2 99999999999999999999", "\"99999999999999999999\" is not a corner"),
         ] {
             let text = with(statement);
-            assert!(
-                text.starts_with(&format!("a.obj, line 4: {start}")),
-                "{text}"
-            );
+            assert!(text.starts_with(&format!("a.obj, line 4: {start}")), "{text}");
             assert!(!text.contains('\n'), "{text}");
         }
     }
@@ -383,18 +345,9 @@ mod tests {
     #[test]
     fn a_file_without_vertices_is_none() {
         for (text, message) in [
-            (
-                "",
-                "a.obj, line 1: the file ends where a vertex (v x y z) should be: is it complete?",
-            ),
-            (
-                "# x\ng a\n",
-                "a.obj, line 2: the file ends where a vertex (v x y z) should be: is it complete?",
-            ),
-            (
-                "g a\nPK\u{3}\u{4} x\ny\n",
-                "a.obj, line 2: \"PK\\u{3}\\u{4}\" is not an OBJ statement",
-            ),
+            ("", "a.obj, line 1: the file ends where a vertex (v x y z) should be: is it complete?"),
+            ("# x\ng a\n", "a.obj, line 2: the file ends where a vertex (v x y z) should be: is it complete?"),
+            ("g a\nPK\u{3}\u{4} x\ny\n", "a.obj, line 2: \"PK\\u{3}\\u{4}\" is not an OBJ statement"),
         ] {
             assert_eq!(refusal(text), message);
         }

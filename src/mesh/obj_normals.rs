@@ -54,11 +54,7 @@ pub(super) fn read(bytes: &[u8], path: &Path, vertices: usize) -> Result<Option<
                     let token = s.peek_token();
                     if let Some((vertex, normal)) = corner_references(token) {
                         let place = |reference: i64, count: usize| {
-                            let index = if reference < 0 {
-                                count as i64 + reference
-                            } else {
-                                reference - 1
-                            };
+                            let index = if reference < 0 { count as i64 + reference } else { reference - 1 };
                             u64::try_from(index).unwrap_or(u64::MAX)
                         };
                         corners.push((place(vertex, seen), place(normal, normals.len()), line));
@@ -120,10 +116,7 @@ mod tests {
             ("vn 0 0 1\nf 1//2 2//1 3//1\n", "line 6: a corner refers"),
             ("vn 0 0 1\nf 1//-2 2//1 3//1\n", "line 6: a corner refers"),
             ("vn 0 0 1\nf 1//1 2//1 7//1\n", "line 6: a corner refers"),
-            (
-                "vn 0 0 1\nvn 1 0 0\nf 1//1 2//1 3//1\nf 1//2 2//1 3//1\n",
-                "line 8: vertex 0 has different normals",
-            ),
+            ("vn 0 0 1\nvn 1 0 0\nf 1//1 2//1 3//1\nf 1//2 2//1 3//1\n", "line 8: vertex 0 has different normals"),
         ] {
             let error = parse(text).unwrap_err().to_string();
             assert!(error.contains(what), "{error}");

@@ -50,38 +50,32 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     for v in 0..vertices {
         s.skip_space();
         let line = s.line();
-        let position = s.point().ok_or_else(|| {
-            s.unexpected(format_args!("a coordinate of vertex {v} of {vertices}"))
-        })?;
+        let position =
+            s.point().ok_or_else(|| s.unexpected(format_args!("a coordinate of vertex {v} of {vertices}")))?;
         if let Some(normals) = &mut normals {
-            normals.push(s.point().ok_or_else(|| {
-                s.unexpected(format_args!("the normal of vertex {v} of {vertices}"))
-            })?);
+            normals
+                .push(s.point().ok_or_else(|| s.unexpected(format_args!("the normal of vertex {v} of {vertices}")))?);
         }
         if header.colours || header.texture {
             vertex_extras(&mut s, &header, v)?;
         }
-        builder
-            .vertex(position, line)
-            .map_err(|what| Error::parse(path, Some(line), what))?;
+        builder.vertex(position, line).map_err(|what| Error::parse(path, Some(line), what))?;
     }
 
     let mut coloured = 0;
     for f in 0..faces {
         s.skip_space();
         let line = s.line();
-        let size: u64 = s.unsigned().ok_or_else(|| {
-            s.unexpected(format_args!("the number of corners of face {f} of {faces}"))
-        })?;
+        let size: u64 =
+            s.unsigned().ok_or_else(|| s.unexpected(format_args!("the number of corners of face {f} of {faces}")))?;
         for _ in 0..size {
             s.skip_space();
-            builder.corner(s.unsigned().ok_or_else(|| {
-                s.unexpected(format_args!("a corner (0, 1, 2, …) of face {f} of {faces}"))
-            })?);
+            builder.corner(
+                s.unsigned()
+                    .ok_or_else(|| s.unexpected(format_args!("a corner (0, 1, 2, …) of face {f} of {faces}")))?,
+            );
         }
-        builder
-            .end_face(line)
-            .map_err(|what| Error::parse(path, Some(line), what))?;
+        builder.end_face(line).map_err(|what| Error::parse(path, Some(line), what))?;
         match numbers_to_line_end(&mut s)? {
             0 => {}
             1 | 3 | 4 => coloured += 1,
@@ -126,10 +120,7 @@ fn header(s: &mut Scanner) -> Result<Header> {
         return Ok(header);
     }
     let wanted = "an OFF header (OFF, COFF, NOFF, …) or the number of vertices";
-    let start = word
-        .windows(3)
-        .position(|w| w.eq_ignore_ascii_case(b"OFF"))
-        .ok_or_else(|| s.unexpected(wanted))?;
+    let start = word.windows(3).position(|w| w.eq_ignore_ascii_case(b"OFF")).ok_or_else(|| s.unexpected(wanted))?;
     let (mut letters, counts) = (&word[..start], &word[start + 3..]);
     while let Some(letter) = letters.first() {
         letters = &letters[1..];
@@ -165,13 +156,9 @@ fn header(s: &mut Scanner) -> Result<Header> {
 /// number of faces, or alone on the next; a vertex is never alone there, for it has three numbers.
 fn counts(s: &mut Scanner) -> Result<(u64, u64)> {
     s.skip_space();
-    let vertices = s
-        .unsigned()
-        .ok_or_else(|| s.unexpected("the number of vertices"))?;
+    let vertices = s.unsigned().ok_or_else(|| s.unexpected("the number of vertices"))?;
     s.skip_space();
-    let faces = s
-        .unsigned()
-        .ok_or_else(|| s.unexpected("the number of faces"))?;
+    let faces = s.unsigned().ok_or_else(|| s.unexpected("the number of faces"))?;
     s.skip_blanks();
     if s.at_line_end() {
         let mut ahead = s.clone();
@@ -183,8 +170,7 @@ fn counts(s: &mut Scanner) -> Result<(u64, u64)> {
             }
         }
     } else {
-        s.unsigned::<u64>()
-            .ok_or_else(|| s.unexpected("the number of edges"))?;
+        s.unsigned::<u64>().ok_or_else(|| s.unexpected("the number of edges"))?;
     }
     Ok((vertices, faces))
 }
@@ -213,8 +199,7 @@ fn numbers_to_line_end(s: &mut Scanner) -> Result<usize> {
         if s.at_line_end() {
             return Ok(count);
         }
-        s.number()
-            .ok_or_else(|| s.unexpected("a number or the end of the line"))?;
+        s.number().ok_or_else(|| s.unexpected("a number or the end of the line"))?;
         count += 1;
     }
 }
@@ -310,11 +295,7 @@ mod tests {
             ("COFF", "0.5 .5 .5 1", Some("not kept: vertex colours")),
             ("STOFF", "0.1 0.2", Some("not kept: texture coordinates")),
             ("CNOFF", "0 0 2 1 1 1 1", Some("not kept: vertex colours")),
-            (
-                "STCNOFF",
-                "0 0 2 9 9 9 .1 .2 # x",
-                Some("not kept: vertex colours, texture coordinates"),
-            ),
+            ("STCNOFF", "0 0 2 9 9 9 .1 .2 # x", Some("not kept: vertex colours, texture coordinates")),
         ] {
             let loaded = parse(&format!("{header}{}{face}\n", rows(extra))).unwrap();
             assert_eq!(loaded.mesh.positions, [DVec3::ZERO, DVec3::X, DVec3::Y]);
@@ -324,15 +305,9 @@ mod tests {
             assert_eq!(remarks, Vec::from_iter(remark), "{header}");
         }
         let text = format!("OFF{}{face} 255 0 0\n", rows(""));
-        assert_eq!(
-            parse(&text).unwrap().remarks,
-            ["not kept: colours of 1 faces"]
-        );
+        assert_eq!(parse(&text).unwrap().remarks, ["not kept: colours of 1 faces"]);
         let text = format!("OFF{}{face} 1\n", rows(""));
-        assert_eq!(
-            parse(&text).unwrap().remarks,
-            ["not kept: colours of 1 faces"]
-        );
+        assert_eq!(parse(&text).unwrap().remarks, ["not kept: colours of 1 faces"]);
     }
 
     #[test]
@@ -340,41 +315,17 @@ mod tests {
         let in_space = "is not a mesh in space: its points have other than three coordinates";
         for (text, message) in [
             ("4OFF\n1 1 0\n".into(), format!("1: \"4OFF\" {in_space}")),
-            (
-                "# c\n4nOFF\n1 1 0\n".into(),
-                format!("2: \"4nOFF\" {in_space}"),
-            ),
+            ("# c\n4nOFF\n1 1 0\n".into(), format!("2: \"4nOFF\" {in_space}")),
             ("nOFF\n3\n".into(), format!("1: \"nOFF\" {in_space}")),
-            (
-                "OFF BINARY\n\0\0\0\u{8}".into(),
-                "1: binary OFF is not read".into(),
-            ),
-            (
-                "solid x\n".into(),
-                "1: \"solid\" is not an OFF header".into(),
-            ),
+            ("OFF BINARY\n\0\0\0\u{8}".into(), "1: binary OFF is not read".into()),
+            ("solid x\n".into(), "1: \"solid\" is not an OFF header".into()),
             ("ZOFF\n".into(), "1: \"ZOFF\" is not an OFF header".into()),
-            (
-                "OFFSET\n".into(),
-                "1: \"OFFSET\" is not an OFF header".into(),
-            ),
+            ("OFFSET\n".into(), "1: \"OFFSET\" is not an OFF header".into()),
             (String::new(), "1: the file ends where an OFF header".into()),
-            (
-                "OFF\n-4 2 0\n".into(),
-                "2: \"-4\" is not the number of vertices".into(),
-            ),
-            (
-                "OFF\n4 x 0\n".into(),
-                "2: \"x\" is not the number of faces".into(),
-            ),
-            (
-                "OFF\n4 2 x\n".into(),
-                "2: \"x\" is not the number of edges".into(),
-            ),
-            (
-                format!("OFF\n5 2 0\n{BODY}"),
-                "7: face 0 has 2 corners".into(),
-            ),
+            ("OFF\n-4 2 0\n".into(), "2: \"-4\" is not the number of vertices".into()),
+            ("OFF\n4 x 0\n".into(), "2: \"x\" is not the number of faces".into()),
+            ("OFF\n4 2 x\n".into(), "2: \"x\" is not the number of edges".into()),
+            (format!("OFF\n5 2 0\n{BODY}"), "7: face 0 has 2 corners".into()),
             (
                 format!("OFF\n4 3 0\n{BODY}"),
                 "8: the file ends where the number of corners of face 2 of 3 should be".into(),
@@ -383,40 +334,19 @@ mod tests {
                 format!("OFF\n4 1 0\n{BODY}"),
                 "8: data after the last of 4 vertices and 1 faces: correct the counts".into(),
             ),
-            (
-                "OFF\n1 0 0\n0 zero 0\n".into(),
-                "3: \"zero\" is not a coordinate of vertex 0 of 1".into(),
-            ),
-            (
-                "OFF\n1 1 0\n0 0 0\n2 0 0\n".into(),
-                "4: face 0 has 2 corners".into(),
-            ),
-            (
-                "OFF\n1 1 0\n0 0 0\n3 0 0 -1\n".into(),
-                "4: \"-1\" is not a corner".into(),
-            ),
-            (
-                "OFF\n1 1 0\n0 0 0\n3 0 0 4294967296\n".into(),
-                "4: \"4294967296\" is not a corner".into(),
-            ),
-            (
-                "OFF\n1 1 0\n0 0 0\n3 0 0 0 0 0\n".into(),
-                "4: face 0 has 2 numbers after its 3 corners".into(),
-            ),
-            (
-                "OFF\n1 1 0\n0 0 0\n3 0 0 0 red\n".into(),
-                "4: \"red\" is not a number or the end of the line".into(),
-            ),
+            ("OFF\n1 0 0\n0 zero 0\n".into(), "3: \"zero\" is not a coordinate of vertex 0 of 1".into()),
+            ("OFF\n1 1 0\n0 0 0\n2 0 0\n".into(), "4: face 0 has 2 corners".into()),
+            ("OFF\n1 1 0\n0 0 0\n3 0 0 -1\n".into(), "4: \"-1\" is not a corner".into()),
+            ("OFF\n1 1 0\n0 0 0\n3 0 0 4294967296\n".into(), "4: \"4294967296\" is not a corner".into()),
+            ("OFF\n1 1 0\n0 0 0\n3 0 0 0 0 0\n".into(), "4: face 0 has 2 numbers after its 3 corners".into()),
+            ("OFF\n1 1 0\n0 0 0\n3 0 0 0 red\n".into(), "4: \"red\" is not a number or the end of the line".into()),
             (
                 "COFF\n1 1 0\n0 0 0\n255 0 0\n3 0 0 0\n".into(),
                 "3: vertex 0 is followed by 0 numbers on its line".into(),
             ),
         ] {
             let found = refusal(&text);
-            assert!(
-                found.starts_with(&format!("a.off, line {message}")),
-                "{text}: {found}"
-            );
+            assert!(found.starts_with(&format!("a.off, line {message}")), "{text}: {found}");
         }
     }
 

@@ -164,10 +164,7 @@ impl Numbering {
     /// # Panics
     /// If `order` is not a permutation.
     pub fn new(order: Vec<u32>) -> Self {
-        Numbering {
-            place: inverse(&order),
-            order,
-        }
+        Numbering { place: inverse(&order), order }
     }
 
     /// The vertex at every place.
@@ -203,21 +200,14 @@ impl Numbering {
     pub fn back_into<T: Copy + Send + Sync>(&self, values: &[T], out: &mut [T]) {
         let n = self.place.len();
         assert!(values.len() == n && out.len() == n, "one value a vertex");
-        out.par_iter_mut()
-            .zip(&self.place)
-            .with_min_len(4096)
-            .for_each(|(out, &k)| *out = values[k as usize]);
+        out.par_iter_mut().zip(&self.place).with_min_len(4096).for_each(|(out, &k)| *out = values[k as usize]);
     }
 }
 
 /// The k-th is `values[order[k]]`.
 fn gather<T: Copy + Send + Sync>(values: &[T], order: &[u32]) -> Vec<T> {
     assert_eq!(values.len(), order.len(), "one value a vertex");
-    order
-        .par_iter()
-        .with_min_len(4096)
-        .map(|&v| values[v as usize])
-        .collect()
+    order.par_iter().with_min_len(4096).map(|&v| values[v as usize]).collect()
 }
 
 /// How far apart an order puts neighbours.
@@ -248,10 +238,7 @@ pub fn locality(faces: &Faces, order: &[u32]) -> Locality {
         }
         bandwidth = bandwidth.max(max.saturating_sub(min));
     }
-    Locality {
-        bandwidth,
-        mean_distance: total as f64 / faces.corners().len().max(1) as f64,
-    }
+    Locality { bandwidth, mean_distance: total as f64 / faces.corners().len().max(1) as f64 }
 }
 
 #[cfg(test)]
@@ -262,15 +249,8 @@ mod tests {
     use crate::mesh::builtin;
     use crate::mesh::generate::{permute_vertices, random_polygons, union};
 
-    const ALL: [Order; 7] = [
-        Order::File,
-        Order::Reverse,
-        Order::Bfs,
-        Order::Rcm,
-        Order::Morton,
-        Order::Valence,
-        Order::Random(8),
-    ];
+    const ALL: [Order; 7] =
+        [Order::File, Order::Reverse, Order::Bfs, Order::Rcm, Order::Morton, Order::Valence, Order::Random(8)];
 
     fn ordered(order: Order, mesh: &Mesh) -> Vec<u32> {
         order.order(mesh, &Incidence::new(&mesh.faces, mesh.len()))
@@ -350,10 +330,7 @@ mod tests {
                     let size = level.iter().flatten().count();
                     // The component comes in one piece, nearer vertices first.
                     let (component, others) = rest.split_at(size);
-                    let found: Vec<_> = component
-                        .iter()
-                        .map(|&v| level[v as usize].unwrap())
-                        .collect();
+                    let found: Vec<_> = component.iter().map(|&v| level[v as usize].unwrap()).collect();
                     assert!(found.is_sorted(), "{order}");
                     rest = others;
                 }
@@ -387,10 +364,7 @@ mod tests {
             (builtin::irregular_poly(2000, 1), "irregular polygons"),
             (builtin::irregular_quad(2000, 1), "irregular quads"),
             (builtin::quad_sphere(4), "quad sphere"),
-            (
-                union(&[builtin::icosphere(2), builtin::torus(12, 5)]),
-                "two components",
-            ),
+            (union(&[builtin::icosphere(2), builtin::torus(12, 5)]), "two components"),
         ] {
             let mesh = shuffled(&mesh);
             let mut pattern = sprs::TriMat::new((mesh.len(), mesh.len()));
@@ -407,10 +381,7 @@ mod tests {
             let theirs = locality(&mesh.faces, &theirs).bandwidth;
             let ours = locality(&mesh.faces, &ordered(Order::Rcm, &mesh)).bandwidth;
             let shuffled = locality(&mesh.faces, &ordered(Order::File, &mesh)).bandwidth;
-            assert!(
-                f64::from(ours) <= 1.1 * f64::from(theirs),
-                "{name}: {ours}, sprs {theirs}"
-            );
+            assert!(f64::from(ours) <= 1.1 * f64::from(theirs), "{name}: {ours}, sprs {theirs}");
             assert!(4 * ours < shuffled, "{name}: {ours}, shuffled {shuffled}");
         }
     }
@@ -428,14 +399,11 @@ mod tests {
     #[test]
     fn morton_follows_the_curve() {
         // The corners of a cube, by their signs as bits: z is the highest.
-        assert_eq!(
-            ordered(Order::Morton, &builtin::cube()),
-            [0, 1, 2, 3, 4, 5, 6, 7]
-        );
+        assert_eq!(ordered(Order::Morton, &builtin::cube()), [0, 1, 2, 3, 4, 5, 6, 7]);
         // Far better than chance, as it should be.
         let mesh = shuffled(&builtin::quad_sphere(5));
-        let [random, morton] = [Order::File, Order::Morton]
-            .map(|o| locality(&mesh.faces, &ordered(o, &mesh)).mean_distance);
+        let [random, morton] =
+            [Order::File, Order::Morton].map(|o| locality(&mesh.faces, &ordered(o, &mesh)).mean_distance);
         assert!(morton < random / 10.0);
         // All in one point, and one that is not finite.
         let flat = Mesh::new(vec![DVec3::ONE, DVec3::NAN, DVec3::ONE], Faces::default());

@@ -47,21 +47,11 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
         Format::BinaryLittleEndian => ByteOrder::Little,
         Format::BinaryBigEndian => ByteOrder::Big,
     };
-    let values = Binary {
-        path,
-        bytes,
-        at: bytes.len() - scanner.rest().len(),
-        order,
-    };
+    let values = Binary { path, bytes, at: bytes.len() - scanner.rest().len(), order };
     read_elements(&elements, values, None, path)
 }
 
-fn read_elements<V: Values>(
-    elements: &[Element],
-    mut values: V,
-    lines: Option<Lines>,
-    path: &Path,
-) -> Result<Loaded> {
+fn read_elements<V: Values>(elements: &[Element], mut values: V, lines: Option<Lines>, path: &Path) -> Result<Loaded> {
     let mut builder = Builder::new(lines);
     let mut normals = Vec::new();
     for element in elements {
@@ -75,10 +65,7 @@ fn read_elements<V: Values>(
         let what = "data after the last element: correct the counts in the header";
         return Err(values.error(place, what.into()));
     }
-    let has_normals = elements
-        .iter()
-        .flat_map(|e| &e.properties)
-        .any(|p| matches!(p.keep, Keep::Coordinate(3..)));
+    let has_normals = elements.iter().flat_map(|e| &e.properties).any(|p| matches!(p.keep, Keep::Coordinate(3..)));
     let remarks = Vec::from_iter(not_kept(elements));
     Ok(builder.finish(path, has_normals.then_some(normals), remarks))
 }
@@ -90,16 +77,9 @@ fn read_rows<V: Values>(
     normals: &mut Vec<DVec3>,
 ) -> Result<()> {
     let (name, count) = (&element.name, element.count);
-    let row_bytes: usize = element
-        .properties
-        .iter()
-        .map(|p| values.least_bytes(p.length.unwrap_or(p.scalar)))
-        .sum();
+    let row_bytes: usize = element.properties.iter().map(|p| values.least_bytes(p.length.unwrap_or(p.scalar))).sum();
     let rows_at_most = values.bytes_left() / row_bytes;
-    let has_normals = element
-        .properties
-        .iter()
-        .any(|p| matches!(p.keep, Keep::Coordinate(3..)));
+    let has_normals = element.properties.iter().any(|p| matches!(p.keep, Keep::Coordinate(3..)));
     match element.kind {
         Kind::Vertex => builder.reserve_vertices(count, rows_at_most),
         Kind::Face => builder.reserve_faces(count, rows_at_most),
@@ -110,19 +90,16 @@ fn read_rows<V: Values>(
         let mut coordinates = [0.0; 6];
         for property in &element.properties {
             let scalar = property.scalar;
-            let wanted =
-                |what: &str| format!("{what} {} of {name} {row} of {count}", property.name);
+            let wanted = |what: &str| format!("{what} {} of {name} {row} of {count}", property.name);
             let items = match property.length {
                 None => 1,
-                Some(length) => values
-                    .unsigned(length)
-                    .ok_or_else(|| values.unexpected(wanted("the length of the list")))?,
+                Some(length) => {
+                    values.unsigned(length).ok_or_else(|| values.unexpected(wanted("the length of the list")))?
+                }
             };
             match property.keep {
                 Keep::Coordinate(k) => {
-                    coordinates[k] = values
-                        .number(scalar)
-                        .ok_or_else(|| values.unexpected(wanted("the number")))?;
+                    coordinates[k] = values.number(scalar).ok_or_else(|| values.unexpected(wanted("the number")))?;
                 }
                 Keep::Corners => {
                     for _ in 0..items {
@@ -132,9 +109,7 @@ fn read_rows<V: Values>(
                         builder.corner(corner);
                     }
                 }
-                Keep::No => values
-                    .skip(scalar, items)
-                    .ok_or_else(|| values.unexpected(wanted("a value of")))?,
+                Keep::No => values.skip(scalar, items).ok_or_else(|| values.unexpected(wanted("a value of")))?,
             }
         }
         let [x, y, z, nx, ny, nz] = coordinates;
@@ -159,12 +134,8 @@ fn not_kept(elements: &[Element]) -> Option<String> {
             parts.push(format!("element {} ({})", element.name, element.count));
             continue;
         }
-        let dropped: Vec<&str> = element
-            .properties
-            .iter()
-            .filter(|p| p.keep == Keep::No)
-            .map(|p| p.name.as_str())
-            .collect();
+        let dropped: Vec<&str> =
+            element.properties.iter().filter(|p| p.keep == Keep::No).map(|p| p.name.as_str()).collect();
         if !dropped.is_empty() {
             parts.push(format!("{} properties {}", element.name, dropped.join(" ")));
         }
@@ -185,19 +156,11 @@ pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> 
     let fits_int = faces.corners().iter().all(|&v| i32::try_from(v).is_ok());
     let index = if fits_int { "int" } else { "uint" };
     let coordinates = if normals.is_some() { 6 } else { 3 };
-    write!(
-        out,
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n",
-        mesh.len()
-    )?;
+    write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", mesh.len())?;
     for name in &COORDINATES[..coordinates] {
         writeln!(out, "property double {name}")?;
     }
-    write!(
-        out,
-        "element face {}\nproperty list {length} {index} vertex_indices\nend_header\n",
-        faces.len()
-    )?;
+    write!(out, "element face {}\nproperty list {length} {index} vertex_indices\nend_header\n", faces.len())?;
 
     let mut row = Vec::new();
     let push_point = |row: &mut Vec<u8>, p: DVec3| {
@@ -241,10 +204,7 @@ mod tests {
 
     fn triangle() -> Mesh {
         let faces = crate::mesh::Faces::from_lists([[0, 1, 2]]);
-        Mesh::new(
-            vec![DVec3::ZERO, DVec3::X, DVec3::new(0.0, 2.5, 0.0)],
-            faces,
-        )
+        Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::new(0.0, 2.5, 0.0)], faces)
     }
 
     const XYZ: &str = "property float x\nproperty float y\nproperty float z\n";
@@ -305,9 +265,7 @@ mod tests {
         };
         let cases = [
             motley("ascii", |b, x, _, _| b.extend(format!("{x}\r\n").bytes())),
-            motley("binary_little_endian", |b, x, n, f| {
-                binary(b, x, n, f, false)
-            }),
+            motley("binary_little_endian", |b, x, n, f| binary(b, x, n, f, false)),
             motley("binary_big_endian", |b, x, n, f| binary(b, x, n, f, true)),
         ];
         for (bytes, is_text) in cases.iter().zip([true, false, false]) {
@@ -369,126 +327,48 @@ mod tests {
         for (text, message) in [
             (String::new(), "1: not a PLY file"),
             ("plywood\n".into(), "1: not a PLY file"),
-            (
-                "ply\nformat ascii 2.0\n".into(),
-                "2: \"2.0\" is not the only version",
-            ),
-            (
-                "ply\nformat text 1.0\n".into(),
-                "2: \"text\" is not a PLY format",
-            ),
-            (
-                "ply\nformat ascii 1.0 x\n".into(),
-                "2: \"x\" is not the end of the line",
-            ),
-            (
-                "ply\nelement vertex x\n".into(),
-                "2: \"x\" is not the number of elements vertex",
-            ),
-            (
-                "ply\nproperty float x\n".into(),
-                "2: a property before the first element",
-            ),
-            (
-                "ply\nend_header\n".into(),
-                "2: the header ends without a format",
-            ),
-            (
-                "ply\nblob\n".into(),
-                "2: \"blob\" is not a PLY header statement",
-            ),
-            (
-                "ply\nformat ascii 1.0\n".into(),
-                "2: the file ends where a PLY header statement",
-            ),
-            (
-                ascii("property long x\n", ""),
-                "4: \"long\" is not a PLY type",
-            ),
-            (
-                ascii("property int\n", ""),
-                "4: the line ends where the name of a property",
-            ),
-            (
-                ascii("property float x\nproperty int x\n", ""),
-                "5: a second property \"x\"",
-            ),
-            (
-                ascii("property list float int x\n", ""),
-                "4: the length of a list must be a whole number",
-            ),
+            ("ply\nformat ascii 2.0\n".into(), "2: \"2.0\" is not the only version"),
+            ("ply\nformat text 1.0\n".into(), "2: \"text\" is not a PLY format"),
+            ("ply\nformat ascii 1.0 x\n".into(), "2: \"x\" is not the end of the line"),
+            ("ply\nelement vertex x\n".into(), "2: \"x\" is not the number of elements vertex"),
+            ("ply\nproperty float x\n".into(), "2: a property before the first element"),
+            ("ply\nend_header\n".into(), "2: the header ends without a format"),
+            ("ply\nblob\n".into(), "2: \"blob\" is not a PLY header statement"),
+            ("ply\nformat ascii 1.0\n".into(), "2: the file ends where a PLY header statement"),
+            (ascii("property long x\n", ""), "4: \"long\" is not a PLY type"),
+            (ascii("property int\n", ""), "4: the line ends where the name of a property"),
+            (ascii("property float x\nproperty int x\n", ""), "5: a second property \"x\""),
+            (ascii("property list float int x\n", ""), "4: the length of a list must be a whole number"),
             (plain("element vertex 1\n"), "7: a second element vertex"),
-            (
-                plain("end_header\n"),
-                "7: the header announces no element face: a point cloud",
-            ),
-            (
-                plain("element tristrips 1\n"),
-                "7: faces as triangle strips are not read: convert",
-            ),
-            (
-                plain("element face 1\nend_header\n"),
-                "8: the element face has no property list",
-            ),
+            (plain("end_header\n"), "7: the header announces no element face: a point cloud"),
+            (plain("element tristrips 1\n"), "7: faces as triangle strips are not read: convert"),
+            (plain("element face 1\nend_header\n"), "8: the element face has no property list"),
             (
                 plain("element face 1\nproperty list int float vertex_index\n"),
                 "8: the vertices of a face must be whole numbers",
             ),
-            (
-                ascii("property float x\nproperty list int int y\n", FACE),
-                "8: the element vertex has no property y",
-            ),
-            (
-                "ply\nformat ascii 1.0\nelement face 0\nend_header\n".into(),
-                "4: the header announces no element vertex",
-            ),
+            (ascii("property float x\nproperty list int int y\n", FACE), "8: the element vertex has no property y"),
+            ("ply\nformat ascii 1.0\nelement face 0\nend_header\n".into(), "4: the header announces no element vertex"),
         ] {
             let found = refusal(text.as_bytes());
-            assert!(
-                found.starts_with(&format!("a.ply, line {message}")),
-                "{text}: {found}"
-            );
+            assert!(found.starts_with(&format!("a.ply, line {message}")), "{text}: {found}");
         }
     }
 
     #[test]
     fn errors_in_text_name_the_line() {
         for (body, message) in [
-            (
-                "0 0 0\n1 0 0\n0 one 0\n",
-                "12: \"one\" is not the number y of vertex 2 of 3",
-            ),
-            (
-                "0 0 0\n1 0 0\n",
-                "11: the file ends where the number x of vertex 2 of 3",
-            ),
-            (
-                "0 0 0 1 0 0 0 1 0\n3 0 1 -1\n",
-                "11: \"-1\" is not an index (0, 1, 2, …) in vertex_indices",
-            ),
-            (
-                "0 0 0 1 0 0 0 1 0\n3 0 1 4294967296\n",
-                "11: \"4294967296\" is not an index",
-            ),
+            ("0 0 0\n1 0 0\n0 one 0\n", "12: \"one\" is not the number y of vertex 2 of 3"),
+            ("0 0 0\n1 0 0\n", "11: the file ends where the number x of vertex 2 of 3"),
+            ("0 0 0 1 0 0 0 1 0\n3 0 1 -1\n", "11: \"-1\" is not an index (0, 1, 2, …) in vertex_indices"),
+            ("0 0 0 1 0 0 0 1 0\n3 0 1 4294967296\n", "11: \"4294967296\" is not an index"),
             ("0 0 0 1 0 0 0 1 0\n2 0 1\n", "11: face 0 has 2 corners"),
-            (
-                "0 0 0 1 0 0 0 1 0\n1.5 0 1\n",
-                "11: \"1.5\" is not the length of the list",
-            ),
-            (
-                "0 0 0 1 0 0 0 1 0\n3 0 1 2\n\n3 0 1 2\n",
-                "13: data after the last element",
-            ),
-            (
-                "0 0 0 1 0 0 0 1 0\n1000000000000 0 1 2\n",
-                "11: the file ends where an index",
-            ),
+            ("0 0 0 1 0 0 0 1 0\n1.5 0 1\n", "11: \"1.5\" is not the length of the list"),
+            ("0 0 0 1 0 0 0 1 0\n3 0 1 2\n\n3 0 1 2\n", "13: data after the last element"),
+            ("0 0 0 1 0 0 0 1 0\n1000000000000 0 1 2\n", "11: the file ends where an index"),
         ] {
             let found = refusal(ascii(XYZ, &format!("{FACE}{body}")).as_bytes());
-            assert!(
-                found.starts_with(&format!("a.ply, line {message}")),
-                "{found}"
-            );
+            assert!(found.starts_with(&format!("a.ply, line {message}")), "{found}");
         }
     }
 
@@ -504,29 +384,17 @@ mod tests {
         };
         let ends = |at: usize| refusal(&bytes[..at]);
         let what = "an index (0, 1, 2, …) in vertex_indices of face 0 of 1";
-        assert_eq!(
-            changed(face + 4, 0xFF),
-            format!("a.ply: byte {}: the value is not {what}", face + 1)
-        );
-        assert_eq!(
-            changed(face, 200),
-            format!("a.ply: the file ends where {what} should be: is it complete?")
-        );
+        assert_eq!(changed(face + 4, 0xFF), format!("a.ply: byte {}: the value is not {what}", face + 1));
+        assert_eq!(changed(face, 200), format!("a.ply: the file ends where {what} should be: is it complete?"));
         let text = changed(face, 2);
-        assert!(
-            text.starts_with(&format!("a.ply: byte {face}: face 0 has 2 corners")),
-            "{text}"
-        );
+        assert!(text.starts_with(&format!("a.ply: byte {face}: face 0 has 2 corners")), "{text}");
         assert_eq!(
             ends(face - 1),
             "a.ply: the file ends where the number z of vertex 2 of 3 should be: is it complete?"
         );
         assert_eq!(
             refusal(&[&bytes[..], b"\n x"].concat()),
-            format!(
-                "a.ply: byte {}: data after the last element: correct the counts in the header",
-                bytes.len()
-            )
+            format!("a.ply: byte {}: data after the last element: correct the counts in the header", bytes.len())
         );
         parse(&[&bytes[..], b"\n"].concat()).unwrap();
     }
@@ -534,18 +402,13 @@ mod tests {
     #[test]
     fn absurd_counts_are_refused_at_the_end_of_the_data() {
         for format in ["ascii", "binary_big_endian"] {
-            let header = |n: &str| {
-                format!("ply\nformat {format} 1.0\nelement vertex {n}\n{XYZ}{FACE}0 0 0\n")
-            };
+            let header = |n: &str| format!("ply\nformat {format} 1.0\nelement vertex {n}\n{XYZ}{FACE}0 0 0\n");
             for count in ["1000000000000", "18446744073709551615"] {
                 let found = refusal(header(count).as_bytes());
                 assert!(found.contains("the file ends where the number"), "{found}");
             }
             let found = refusal(header("18446744073709551616").as_bytes());
-            assert!(
-                found.contains("is not the number of elements vertex"),
-                "{found}"
-            );
+            assert!(found.contains("is not the number of elements vertex"), "{found}");
         }
     }
 }

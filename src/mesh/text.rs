@@ -21,12 +21,7 @@ pub(super) struct Scanner<'a> {
 
 impl<'a> Scanner<'a> {
     pub fn new(bytes: &'a [u8], path: &'a Path) -> Self {
-        Scanner {
-            path,
-            bytes: bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes),
-            at: 0,
-            line: 1,
-        }
+        Scanner { path, bytes: bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes), at: 0, line: 1 }
     }
 
     pub fn line(&self) -> usize {
@@ -139,11 +134,7 @@ impl<'a> Scanner<'a> {
     /// The whole number here, if it fits `T`. Otherwise `None`, and the place stays.
     pub fn unsigned<T: TryFrom<u64>>(&mut self) -> Option<T> {
         let (value, length) = leading_digits(self.rest())?;
-        if self
-            .bytes
-            .get(self.at + length)
-            .is_some_and(|&b| !is_separator(b))
-        {
+        if self.bytes.get(self.at + length).is_some_and(|&b| !is_separator(b)) {
             return None;
         }
         let value = T::try_from(value).ok()?;
@@ -177,18 +168,15 @@ impl<'a> Scanner<'a> {
 /// all else. Digits and power of ten are exact doubles, so that their quotient is correctly rounded (Clinger 1990).
 fn short_decimal(bytes: &[u8]) -> Option<(f64, usize)> {
     const MAX_DIGITS: usize = 15;
-    const POWERS: [f64; MAX_DIGITS + 1] = [
-        1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
-    ];
+    const POWERS: [f64; MAX_DIGITS + 1] =
+        [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
     let sign = usize::from(bytes.first() == Some(&b'-'));
     let mut digits = 0u64;
     let mut at = sign;
     let mut point = None;
     loop {
         match bytes.get(at) {
-            Some(b @ b'0'..=b'9') => {
-                digits = digits.wrapping_mul(10).wrapping_add(u64::from(b - b'0'))
-            }
+            Some(b @ b'0'..=b'9') => digits = digits.wrapping_mul(10).wrapping_add(u64::from(b - b'0')),
             Some(b'.') if point.is_none() => point = Some(at),
             Some(&b) if !is_separator(b) => return None,
             _ => break,
@@ -213,9 +201,7 @@ pub(super) fn leading_digits(bytes: &[u8]) -> Option<(u64, usize)> {
     let mut value = 0u64;
     let mut length = 0;
     while let Some(digit @ b'0'..=b'9') = bytes.get(length) {
-        value = value
-            .checked_mul(10)?
-            .checked_add(u64::from(digit - b'0'))?;
+        value = value.checked_mul(10)?.checked_add(u64::from(digit - b'0'))?;
         length += 1;
     }
     (length > 0).then_some((value, length))
@@ -307,14 +293,8 @@ mod tests {
         let ends = "the file ends where a number should be: is it complete?";
         assert_eq!(told("x\n", 0), format!("t, line 1: {ends}"));
         assert_eq!(told("x\ny", 1), format!("t, line 2: {ends}"));
-        assert_eq!(
-            told("x\n# y", 0),
-            "t, line 2: the line ends where a number should be"
-        );
-        assert_eq!(
-            told("x\ny\u{7}z 3", 0),
-            "t, line 2: \"y\\u{7}z\" is not a number"
-        );
+        assert_eq!(told("x\n# y", 0), "t, line 2: the line ends where a number should be");
+        assert_eq!(told("x\ny\u{7}z 3", 0), "t, line 2: \"y\\u{7}z\" is not a number");
         assert_eq!(told("x\n\\", 0), "t, line 2: \"\\\\\" is not a number");
         assert_eq!(quoted(&[0xFF; 40]).chars().count(), 32 + 3);
     }

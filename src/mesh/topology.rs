@@ -187,10 +187,7 @@ impl Topology {
         let mut step = [0; AT_ONCE];
         for (step, &c) in step.iter_mut().zip(at) {
             let turned = self.twin[self.incidence.prev(faces, c) as usize];
-            *step = (0..AT_ONCE as u32)
-                .zip(here)
-                .map(|(k, c)| if c == turned { k } else { 0 })
-                .sum::<u32>();
+            *step = (0..AT_ONCE as u32).zip(here).map(|(k, c)| if c == turned { k } else { 0 }).sum::<u32>();
         }
         let mut place = 0;
         for turns in 1..=n {
@@ -236,11 +233,7 @@ impl Topology {
     /// One half-edge of every edge, ascending: that of the smaller index. An
     /// [irregular](Self::irregular_edges) edge comes once a side.
     pub fn edge_sides(&self) -> impl Iterator<Item = u32> + '_ {
-        self.twin
-            .iter()
-            .enumerate()
-            .filter(|&(c, &t)| c as u32 <= t)
-            .map(|(c, _)| c as u32)
+        self.twin.iter().enumerate().filter(|&(c, &t)| c as u32 <= t).map(|(c, _)| c as u32)
     }
 
     /// The number of edges at vertex `v`. An [irregular](Self::irregular_edges) edge may count more than once.
@@ -378,14 +371,7 @@ impl Pairs {
     /// The usual case: each side that leaves `v` meets exactly one that enters it, and none is left over. Otherwise
     /// nothing is done.
     #[inline]
-    fn all_opposite(
-        &mut self,
-        v: u32,
-        at: &[u32],
-        faces: &Faces,
-        incidence: &Incidence,
-        twin: &Scatter,
-    ) -> bool {
+    fn all_opposite(&mut self, v: u32, at: &[u32], faces: &Faces, incidence: &Incidence, twin: &Scatter) -> bool {
         let corners = faces.corners();
         // One more place than can be taken: what does not count is written beyond the end.
         let mut leaving = [(0, 0); FEW + 1];
@@ -448,8 +434,7 @@ impl Pairs {
             match *edge {
                 [(w, c)] if w as usize != v => self.boundary.push(c),
                 [(w, a), (_, b)]
-                    if (corners[a as usize] as usize == v)
-                        != (corners[b as usize] as usize == v)
+                    if (corners[a as usize] as usize == v) != (corners[b as usize] as usize == v)
                         && w as usize != v =>
                 {
                     twin.set(a, b);
@@ -527,10 +512,7 @@ mod tests {
             assert_eq!(t.twin(d), Some(c));
             let ends = |c: u32| {
                 let range = faces.range(t.incidence.face_of(c));
-                (
-                    faces.corners()[c as usize],
-                    faces.corners()[next_in(&range, c) as usize],
-                )
+                (faces.corners()[c as usize], faces.corners()[next_in(&range, c) as usize])
             };
             let ((a, b), (e, f)) = (ends(c), ends(d));
             assert_eq!((a, b), (f, e));
@@ -550,10 +532,7 @@ mod tests {
         assert_eq!(valences, [4, 2, 3, 3, 2]);
         let loops = t.boundary_loops(&faces);
         assert_eq!(loops.len(), 1);
-        let walk: Vec<u32> = loops[0]
-            .iter()
-            .map(|&c| faces.corners()[c as usize])
-            .collect();
+        let walk: Vec<u32> = loops[0].iter().map(|&c| faces.corners()[c as usize]).collect();
         assert_eq!(walk, [2, 3, 4, 0, 1]);
     }
 
@@ -573,14 +552,7 @@ mod tests {
     fn irregular_edges_are_listed_with_their_sides() {
         // Three triangles on edge 0-1.
         let (_, t) = topology(5, &[&[0, 1, 2], &[1, 0, 3], &[0, 1, 4]]);
-        assert_eq!(
-            t.irregular_edges(),
-            [IrregularEdge {
-                vertices: [0, 1],
-                sides: 3,
-                half_edges: [0, 6]
-            }]
-        );
+        assert_eq!(t.irregular_edges(), [IrregularEdge { vertices: [0, 1], sides: 3, half_edges: [0, 6] }]);
         assert!(!t.irregular_edges()[0].is_misoriented());
         assert_eq!((t.edges(), t.boundary_edges()), (7, 6));
         // Two triangles that run along edge 0-1 in the same direction.
@@ -595,11 +567,7 @@ mod tests {
             let (_, t) = topology(2, &faces);
             let loops = t.irregular_edges().iter().filter(|e| e.is_loop()).count();
             assert_eq!(loops, 1);
-            assert!(
-                !t.irregular_edges()
-                    .iter()
-                    .any(|e| e.is_misoriented() && e.is_loop())
-            );
+            assert!(!t.irregular_edges().iter().any(|e| e.is_misoriented() && e.is_loop()));
             assert!(t.boundary_half_edges().is_empty());
         }
     }

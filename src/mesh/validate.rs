@@ -34,9 +34,7 @@ impl FromStr for Boundary {
         match text {
             "refuse" => Ok(Boundary::Refuse),
             "as-interior" => Ok(Boundary::AsInterior),
-            _ => Err(Error::Unknown(format!(
-                "unknown treatment of the boundary `{text}`: use refuse or as-interior"
-            ))),
+            _ => Err(Error::Unknown(format!("unknown treatment of the boundary `{text}`: use refuse or as-interior"))),
         }
     }
 }
@@ -150,39 +148,27 @@ impl Validation {
     fn advice(&self, kind: DefectKind) -> String {
         match kind {
             DefectKind::NoVertices => "give a mesh with vertices and faces".into(),
-            DefectKind::NoFaces => {
-                "give a mesh with faces: a point cloud has no limit surface".into()
-            }
+            DefectKind::NoFaces => "give a mesh with faces: a point cloud has no limit surface".into(),
             DefectKind::IndexOutOfRange => {
                 "correct the face or add the missing vertices (vertices are numbered from 0 here)".into()
             }
             DefectKind::TooFewCorners => "remove such faces".into(),
             DefectKind::RepeatedVertex => "remove the repetitions, or the faces".into(),
             DefectKind::NonFiniteCoordinate => "give finite coordinates".into(),
-            DefectKind::NonManifoldEdge => {
-                "delete the extra faces, or split the mesh along such edges".into()
-            }
+            DefectKind::NonManifoldEdge => "delete the extra faces, or split the mesh along such edges".into(),
             DefectKind::InconsistentOrientation => match &self.orientation {
                 Some(o) if o.unorientable_components > 0 => {
                     "the surface cannot be oriented (a Möbius band or Klein bottle): no turning of faces helps".into()
                 }
-                Some(Orientation {
-                    faces_to_flip,
-                    first: Some(first),
-                    ..
-                }) => format!(
+                Some(Orientation { faces_to_flip, first: Some(first), .. }) => format!(
                     "turn {} round (first: face {first}) to orient the mesh consistently",
                     counted(*faces_to_flip, "face")
                 ),
                 _ => "orient the faces consistently".into(),
             },
-            DefectKind::NonManifoldVertex => {
-                "split such a vertex into one for each umbrella of faces".into()
-            }
+            DefectKind::NonManifoldVertex => "split such a vertex into one for each umbrella of faces".into(),
             DefectKind::IsolatedVertex => "remove vertices that no face uses".into(),
-            DefectKind::LowValence => {
-                "give such vertices three edges or more, or remove them".into()
-            }
+            DefectKind::LowValence => "give such vertices three edges or more, or remove them".into(),
             DefectKind::BoundaryEdge if self.totals().contains_key(&DefectKind::LowValence) => {
                 "close the holes or stitch the faces".into()
             }
@@ -223,13 +209,8 @@ pub(super) fn counted(count: usize, one: &str) -> String {
 /// assert!(report.summary_line().contains("3 boundary edges (first: face 0, vertices 0 and 1)"));
 /// ```
 pub fn validate(mesh: &Mesh, lines: Option<(&[u32], &[u32])>, boundary: Boundary) -> Validation {
-    let mut report = Validation {
-        defects: Vec::new(),
-        remarks: Vec::new(),
-        counts: None,
-        orientation: None,
-        topology: None,
-    };
+    let mut report =
+        Validation { defects: Vec::new(), remarks: Vec::new(), counts: None, orientation: None, topology: None };
     if mesh.is_empty() {
         report.defects.push(Defect::new(DefectKind::NoVertices));
     }
@@ -277,10 +258,7 @@ fn examine_faces(mesh: &Mesh) -> (Vec<Defect>, usize) {
     let mut named_by = vec![NONE; n];
     for (f, face) in mesh.faces.iter().enumerate() {
         if face.len() < 3 {
-            defects.push(Defect {
-                count: Some(face.len() as u32),
-                ..Defect::at_face(DefectKind::TooFewCorners, f)
-            });
+            defects.push(Defect { count: Some(face.len() as u32), ..Defect::at_face(DefectKind::TooFewCorners, f) });
         }
         let mut repeated = None;
         for &v in face {
@@ -299,10 +277,7 @@ fn examine_faces(mesh: &Mesh) -> (Vec<Defect>, usize) {
             }
         }
         if repeated.is_some() {
-            defects.push(Defect {
-                vertex: repeated,
-                ..Defect::at_face(DefectKind::RepeatedVertex, f)
-            });
+            defects.push(Defect { vertex: repeated, ..Defect::at_face(DefectKind::RepeatedVertex, f) });
         }
     }
     let isolated = named_by.iter().filter(|&&f| f == NONE).count();
@@ -333,32 +308,20 @@ fn examine_topology(mesh: &Mesh, boundary: Boundary, report: &mut Validation) {
                 ..Defect::at_edge(DefectKind::InconsistentOrientation, first, edge.vertices)
             }
         } else {
-            Defect {
-                count: Some(edge.sides),
-                ..Defect::at_edge(DefectKind::NonManifoldEdge, first, edge.vertices)
-            }
+            Defect { count: Some(edge.sides), ..Defect::at_edge(DefectKind::NonManifoldEdge, first, edge.vertices) }
         });
     }
-    if topology
-        .irregular_edges()
-        .iter()
-        .any(|e| e.is_misoriented())
-    {
+    if topology.irregular_edges().iter().any(|e| e.is_misoriented()) {
         report.orientation = Some(examine_orientation(faces, &topology));
     }
     // Components are found one after the other, vertices in parallel.
-    let ((min_valence, max_valence), components) = rayon::join(
-        || examine_vertices(faces, &topology, &mut report.defects),
-        || topology.components(faces).1,
-    );
+    let ((min_valence, max_valence), components) =
+        rayon::join(|| examine_vertices(faces, &topology, &mut report.defects), || topology.components(faces).1);
     let boundary_edges = topology.boundary_edges();
-    let boundary_loops = topology.irregular_edges().is_empty().then(|| {
-        if boundary_edges == 0 {
-            0
-        } else {
-            topology.boundary_loops(faces).len()
-        }
-    });
+    let boundary_loops = topology
+        .irregular_edges()
+        .is_empty()
+        .then(|| if boundary_edges == 0 { 0 } else { topology.boundary_loops(faces).len() });
     match boundary {
         Boundary::Refuse => {
             for &c in topology.boundary_half_edges() {
@@ -372,10 +335,9 @@ fn examine_topology(mesh: &Mesh, boundary: Boundary, report: &mut Validation) {
         Boundary::AsInterior if boundary_edges > 0 => {
             let edges = counted(boundary_edges, "boundary edge");
             let loops = boundary_loops.map(|l| format!(" in {}", counted(l, "loop")));
-            report.remarks.push(format!(
-                "{edges}{}: boundary vertices are treated as interior",
-                loops.unwrap_or_default()
-            ));
+            report
+                .remarks
+                .push(format!("{edges}{}: boundary vertices are treated as interior", loops.unwrap_or_default()));
         }
         Boundary::AsInterior => {}
     }
@@ -394,11 +356,7 @@ fn examine_topology(mesh: &Mesh, boundary: Boundary, report: &mut Validation) {
 }
 
 /// Umbrellas and valences of all vertices, in parallel. Returns the least and the greatest valence.
-fn examine_vertices(
-    faces: &Faces,
-    topology: &Topology,
-    defects: &mut Vec<Defect>,
-) -> (usize, usize) {
+fn examine_vertices(faces: &Faces, topology: &Topology, defects: &mut Vec<Defect>) -> (usize, usize) {
     let incidence = &topology.incidence;
     let n = incidence.vertices();
     let is_closed = topology.is_closed();
@@ -423,10 +381,7 @@ fn examine_vertices(
                 min = min.min(valence);
                 max = max.max(valence);
                 let mut report = |kind, count: usize| {
-                    found.push(Defect {
-                        count: Some(count as u32),
-                        ..Defect::at_vertex(kind, v as u32)
-                    });
+                    found.push(Defect { count: Some(count as u32), ..Defect::at_vertex(kind, v as u32) });
                 };
                 if umbrellas > 1 {
                     report(DefectKind::NonManifoldVertex, umbrellas);
@@ -499,21 +454,13 @@ impl Link {
 fn examine_orientation(faces: &Faces, topology: &Topology) -> Orientation {
     let incidence = &topology.incidence;
     let mut same_direction = vec![NONE; faces.corners().len()];
-    for edge in topology
-        .irregular_edges()
-        .iter()
-        .filter(|e| e.is_misoriented())
-    {
+    for edge in topology.irregular_edges().iter().filter(|e| e.is_misoriented()) {
         let [a, b] = edge.half_edges;
         same_direction[a as usize] = b;
         same_direction[b as usize] = a;
     }
     let mut turned: Vec<Option<bool>> = vec![None; faces.len()];
-    let mut verdict = Orientation {
-        faces_to_flip: 0,
-        first: None,
-        unorientable_components: 0,
-    };
+    let mut verdict = Orientation { faces_to_flip: 0, first: None, unorientable_components: 0 };
     let mut component = Vec::new();
     for seed in 0..faces.len() {
         if turned[seed].is_some() {
@@ -547,17 +494,10 @@ fn examine_orientation(faces: &Faces, topology: &Topology) -> Orientation {
             verdict.unorientable_components += 1;
             continue;
         }
-        let ones = component
-            .iter()
-            .filter(|&&f| turned[f] == Some(true))
-            .count();
+        let ones = component.iter().filter(|&&f| turned[f] == Some(true)).count();
         let fewer = 2 * ones <= component.len();
         verdict.faces_to_flip += ones.min(component.len() - ones);
-        let first = component
-            .iter()
-            .filter(|&&f| turned[f] == Some(fewer))
-            .min()
-            .map(|&f| f as u32);
+        let first = component.iter().filter(|&&f| turned[f] == Some(fewer)).min().map(|&f| f as u32);
         verdict.first = match (verdict.first, first) {
             (Some(a), Some(b)) => Some(a.min(b)),
             (a, b) => a.or(b),

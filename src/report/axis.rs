@@ -53,49 +53,28 @@ impl Axis {
     /// # Panics
     /// If the range is empty, not finite, or not positive on a logarithmic axis.
     pub fn over(scale: Scale, (lo, hi): (f64, f64)) -> Self {
-        assert!(
-            lo.is_finite() && hi.is_finite() && lo < hi,
-            "an axis needs lo < hi, not {lo} and {hi}"
-        );
-        assert!(
-            scale == Scale::Linear || lo > 0.0,
-            "a logarithmic axis begins above 0, not at {lo}"
-        );
+        assert!(lo.is_finite() && hi.is_finite() && lo < hi, "an axis needs lo < hi, not {lo} and {hi}");
+        assert!(scale == Scale::Linear || lo > 0.0, "a logarithmic axis begins above 0, not at {lo}");
         Axis { scale, lo, hi }
     }
 
     /// The axis that shows all `values` that have a place on it.
     pub fn around(scale: Scale, values: impl Iterator<Item = f64>) -> Self {
         let has_place = |v: &f64| v.abs() < BEYOND && (scale == Scale::Linear || *v > 0.0);
-        let (lo, hi) = values
-            .filter(has_place)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| {
-                (lo.min(v), hi.max(v))
-            });
+        let (lo, hi) =
+            values.filter(has_place).fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)));
         if lo > hi {
             // nothing to show
-            return Axis {
-                scale,
-                lo: 0.1,
-                hi: 1.0,
-            };
+            return Axis { scale, lo: 0.1, hi: 1.0 };
         }
         match scale {
             Scale::Linear => {
                 let size = lo.abs().max(hi.abs());
-                let spread = if hi - lo > FLAT * size {
-                    hi - lo
-                } else {
-                    size.max(1.0)
-                };
+                let spread = if hi - lo > FLAT * size { hi - lo } else { size.max(1.0) };
                 let from_zero = lo >= 0.0 && lo <= STARTS_AT_ZERO * hi;
                 Axis {
                     scale,
-                    lo: if from_zero {
-                        0.0
-                    } else {
-                        lo - LINEAR_MARGIN * spread
-                    },
+                    lo: if from_zero { 0.0 } else { lo - LINEAR_MARGIN * spread },
                     hi: hi + LINEAR_MARGIN * spread,
                 }
             }
@@ -108,22 +87,14 @@ impl Axis {
                     (a - margin, b + margin)
                 };
                 // The smallest doubles have no power of ten below them.
-                Axis {
-                    scale,
-                    lo: 10_f64.powf(a).max(f64::MIN_POSITIVE),
-                    hi: 10_f64.powf(b).min(f64::MAX),
-                }
+                Axis { scale, lo: 10_f64.powf(a).max(f64::MIN_POSITIVE), hi: 10_f64.powf(b).min(f64::MAX) }
             }
         }
     }
 
     /// The shortest axis of this scale that covers both.
     pub fn union(self, other: Axis) -> Axis {
-        Axis {
-            lo: self.lo.min(other.lo),
-            hi: self.hi.max(other.hi),
-            ..self
-        }
+        Axis { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi), ..self }
     }
 
     /// Where `value` lies: 0 at `lo`, 1 at `hi`, outside beyond; `None` if it has no place on the axis.
@@ -148,9 +119,7 @@ impl Axis {
 
     fn tick(&self, value: f64, label: Option<String>) -> Option<Tick> {
         let at = self.position(value)?;
-        (-1e-9..=1.0 + 1e-9)
-            .contains(&at)
-            .then_some(Tick { at, label })
+        (-1e-9..=1.0 + 1e-9).contains(&at).then_some(Tick { at, label })
     }
 
     fn linear_ticks(&self, most: usize) -> Vec<Tick> {
@@ -166,14 +135,9 @@ impl Axis {
     /// The multiples of a step within the range.
     fn multiples(&self, step: Step) -> Vec<Tick> {
         let size = step.value();
-        let (first, last) = (
-            (self.lo / size - 1e-9).ceil() as i64,
-            (self.hi / size + 1e-9).floor() as i64,
-        );
+        let (first, last) = ((self.lo / size - 1e-9).ceil() as i64, (self.hi / size + 1e-9).floor() as i64);
         let largest = self.lo.abs().max(self.hi.abs());
-        (first..=last)
-            .filter_map(|i| self.tick(step.multiple(i), Some(step.label(i, largest))))
-            .collect()
+        (first..=last).filter_map(|i| self.tick(step.multiple(i), Some(step.label(i, largest)))).collect()
     }
 
     fn log_ticks(&self, most: usize) -> Vec<Tick> {
@@ -283,9 +247,7 @@ pub(super) fn power_of_ten(exponent: i32) -> String {
         _ => char::from_u32('⁴' as u32 + (c as u32 - '4' as u32)).unwrap_or(c),
     };
     let exponent = exponent.to_string();
-    "10".chars()
-        .chain(exponent.chars().map(superscript))
-        .collect()
+    "10".chars().chain(exponent.chars().map(superscript)).collect()
 }
 
 #[cfg(test)]
@@ -307,75 +269,35 @@ mod tests {
 
     #[test]
     fn linear_labels_are_plain_decimals() {
-        assert_eq!(
-            labels(Scale::Linear, (0.0, 1.2), 8),
-            ["0", "0.2", "0.4", "0.6", "0.8", "1.0", "1.2"]
-        );
-        assert_eq!(
-            labels(Scale::Linear, (-1.0, 1.0), 5),
-            ["−1.0", "−0.5", "0", "0.5", "1.0"]
-        );
-        assert_eq!(
-            labels(Scale::Linear, (3.0, 203.0), 5),
-            ["50", "100", "150", "200"]
-        );
-        assert_eq!(
-            labels(Scale::Linear, (0.98, 1.02), 5),
-            ["0.98", "0.99", "1.00", "1.01", "1.02"]
-        );
+        assert_eq!(labels(Scale::Linear, (0.0, 1.2), 8), ["0", "0.2", "0.4", "0.6", "0.8", "1.0", "1.2"]);
+        assert_eq!(labels(Scale::Linear, (-1.0, 1.0), 5), ["−1.0", "−0.5", "0", "0.5", "1.0"]);
+        assert_eq!(labels(Scale::Linear, (3.0, 203.0), 5), ["50", "100", "150", "200"]);
+        assert_eq!(labels(Scale::Linear, (0.98, 1.02), 5), ["0.98", "0.99", "1.00", "1.01", "1.02"]);
     }
 
     #[test]
     fn large_and_fine_linear_labels_share_a_power() {
-        assert_eq!(
-            labels(Scale::Linear, (0.0, 1_048_576.0), 4),
-            ["0", "0.5×10⁶", "1.0×10⁶"]
-        );
-        assert_eq!(
-            labels(Scale::Linear, (0.0, 4e-5), 5),
-            ["0", "1×10⁻⁵", "2×10⁻⁵", "3×10⁻⁵", "4×10⁻⁵"]
-        );
+        assert_eq!(labels(Scale::Linear, (0.0, 1_048_576.0), 4), ["0", "0.5×10⁶", "1.0×10⁶"]);
+        assert_eq!(labels(Scale::Linear, (0.0, 4e-5), 5), ["0", "1×10⁻⁵", "2×10⁻⁵", "3×10⁻⁵", "4×10⁻⁵"]);
     }
 
     #[test]
     fn log_labels_are_powers_of_ten() {
         assert_eq!(
             labels(Scale::Log, (1e-8, 1.0), 9),
-            [
-                "10⁻⁸", "10⁻⁷", "10⁻⁶", "10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²", "10⁻¹", "10⁰"
-            ]
+            ["10⁻⁸", "10⁻⁷", "10⁻⁶", "10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²", "10⁻¹", "10⁰"]
         );
         assert_eq!(
             labels(Scale::Log, (1e-12, 1e6), 10),
-            [
-                "10⁻¹²",
-                "10⁻¹⁰",
-                "10⁻⁸",
-                "10⁻⁶",
-                "10⁻⁴",
-                "10⁻²",
-                "10⁰",
-                "10²",
-                "10⁴",
-                "10⁶"
-            ]
+            ["10⁻¹²", "10⁻¹⁰", "10⁻⁸", "10⁻⁶", "10⁻⁴", "10⁻²", "10⁰", "10²", "10⁴", "10⁶"]
         );
     }
 
     #[test]
     fn short_log_ranges_label_multiples() {
-        assert_eq!(
-            labels(Scale::Log, (8.0, 300.0), 8),
-            ["10", "20", "50", "100", "200"]
-        );
-        assert_eq!(
-            labels(Scale::Log, (1.5e-6, 2.5e-5), 8),
-            ["2×10⁻⁶", "5×10⁻⁶", "10⁻⁵", "2×10⁻⁵"]
-        );
-        assert_eq!(
-            labels(Scale::Log, (0.32, 0.38), 4),
-            ["0.32", "0.34", "0.36", "0.38"]
-        );
+        assert_eq!(labels(Scale::Log, (8.0, 300.0), 8), ["10", "20", "50", "100", "200"]);
+        assert_eq!(labels(Scale::Log, (1.5e-6, 2.5e-5), 8), ["2×10⁻⁶", "5×10⁻⁶", "10⁻⁵", "2×10⁻⁵"]);
+        assert_eq!(labels(Scale::Log, (0.32, 0.38), 4), ["0.32", "0.34", "0.36", "0.38"]);
     }
 
     #[test]
@@ -386,10 +308,7 @@ mod tests {
         };
         assert_eq!(axis(Scale::Linear, &[0.0, 100.0]), (0.0, 103.0));
         assert_eq!(axis(Scale::Linear, &[-100.0, 100.0]), (-106.0, 106.0));
-        let (lo, hi) = axis(
-            Scale::Log,
-            &[3e-12, 0.0, -1.0, f64::NAN, 2e5, f64::INFINITY],
-        );
+        let (lo, hi) = axis(Scale::Log, &[3e-12, 0.0, -1.0, f64::NAN, 2e5, f64::INFINITY]);
         assert!((lo / 1e-12 - 1.0).abs() < 1e-12 && (hi / 1e6 - 1.0).abs() < 1e-12);
         // A power of ten is an end of its own.
         let (lo, hi) = axis(Scale::Log, &[1e-10, 1.0]);

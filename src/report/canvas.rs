@@ -10,9 +10,7 @@ use plotters::coord::Shift;
 use plotters::drawing::{DrawingArea, IntoDrawingArea};
 use plotters::element::{BitMapElement, Circle, Polygon, Rectangle};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{
-    Color, FontDesc, FontFamily, FontStyle, FontTransform, IntoFont, WHITE, register_font,
-};
+use plotters::style::{Color, FontDesc, FontFamily, FontStyle, FontTransform, IntoFont, WHITE, register_font};
 use std::fmt::Display;
 use std::sync::Once;
 
@@ -64,10 +62,7 @@ impl Rect {
     }
 
     pub fn centre(&self) -> Point {
-        (
-            (self.left + self.right) / 2.0,
-            (self.top + self.bottom) / 2.0,
-        )
+        ((self.left + self.right) / 2.0, (self.top + self.bottom) / 2.0)
     }
 
     pub fn contains(&self, (x, y): Point) -> bool {
@@ -78,12 +73,9 @@ impl Rect {
     fn clip(&self, a: Point, b: Point) -> Option<(Point, Point)> {
         let (dx, dy) = (b.0 - a.0, b.1 - a.1);
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
-        for (speed, room) in [
-            (-dx, a.0 - self.left),
-            (dx, self.right - a.0),
-            (-dy, a.1 - self.top),
-            (dy, self.bottom - a.1),
-        ] {
+        for (speed, room) in
+            [(-dx, a.0 - self.left), (dx, self.right - a.0), (-dy, a.1 - self.top), (dy, self.bottom - a.1)]
+        {
             if speed == 0.0 {
                 if room < 0.0 {
                     return None;
@@ -152,11 +144,7 @@ pub(super) struct Canvas<'a> {
 }
 
 /// Draws an image of `width`×`height` points.
-pub(super) fn paint(
-    width: u32,
-    height: u32,
-    draw: impl FnOnce(&Canvas<'_>) -> Result<()>,
-) -> Result<Image> {
+pub(super) fn paint(width: u32, height: u32, draw: impl FnOnce(&Canvas<'_>) -> Result<()>) -> Result<Image> {
     let scale = PIXELS_PER_POINT * SUPERSAMPLING;
     let (width, height) = (width * scale, height * scale);
     let mut rgb = vec![u8::MAX; 3 * width as usize * height as usize];
@@ -192,18 +180,11 @@ struct Run<'t> {
 
 /// Splits `ω_{opt}` and `x^{2}` into runs; an underscore or caret without brace is itself.
 fn runs(text: &str) -> Vec<Run<'_>> {
-    let plain = |text| Run {
-        text,
-        size: 1.0,
-        rise: 0.0,
-    };
+    let plain = |text| Run { text, size: 1.0, rise: 0.0 };
     let mut found = Vec::new();
     let mut rest = text;
     loop {
-        let start = [rest.find("_{"), rest.find("^{")]
-            .into_iter()
-            .flatten()
-            .min();
+        let start = [rest.find("_{"), rest.find("^{")].into_iter().flatten().min();
         let end = start.and_then(|s| rest[s..].find('}').map(|e| s + e));
         let (Some(start), Some(end)) = (start, end) else {
             if !rest.is_empty() {
@@ -217,11 +198,7 @@ fn runs(text: &str) -> Vec<Run<'_>> {
         found.push(Run {
             text: &rest[start + 2..end],
             size: SCRIPT_SIZE,
-            rise: if rest[start..].starts_with('_') {
-                -SUBSCRIPT_DROP
-            } else {
-                SUPERSCRIPT_RISE
-            },
+            rise: if rest[start..].starts_with('_') { -SUBSCRIPT_DROP } else { SUPERSCRIPT_RISE },
         });
         rest = &rest[end + 1..];
     }
@@ -243,15 +220,7 @@ fn pixel((x, y): Point) -> (i32, i32) {
 
 impl Canvas<'_> {
     /// Writes `text` with its baseline through `at`, to the right, or upward if `upright`.
-    pub fn text(
-        &self,
-        text: &str,
-        at: Point,
-        size: f64,
-        anchor: Anchor,
-        upright: bool,
-        colour: Colour,
-    ) -> Result<()> {
+    pub fn text(&self, text: &str, at: Point, size: f64, anchor: Anchor, upright: bool, colour: Colour) -> Result<()> {
         let width = text_width(text, size)?;
         let mut along = match anchor {
             Anchor::Start => 0.0,
@@ -267,10 +236,7 @@ impl Canvas<'_> {
             } else {
                 ((at.0 + along, at.1 - above), FontTransform::None)
             };
-            let style = font(em)
-                .transform(turn)
-                .color(&colour)
-                .pos(Pos::new(HPos::Left, VPos::Top));
+            let style = font(em).transform(turn).color(&colour).pos(Pos::new(HPos::Left, VPos::Top));
             drawn(self.area.draw_text(run.text, &style, pixel(place)))?;
             along += text_width(run.text, em)?;
         }
@@ -287,39 +253,19 @@ impl Canvas<'_> {
     }
 
     /// A straight upright line, its middle at `x`, that ends square at `from` and `to`.
-    pub fn upright(
-        &self,
-        x: f64,
-        (from, to): (f64, f64),
-        width: f64,
-        colour: Colour,
-    ) -> Result<()> {
-        let line = Rect {
-            left: x - width / 2.0,
-            right: x + width / 2.0,
-            top: from,
-            bottom: to,
-        };
+    pub fn upright(&self, x: f64, (from, to): (f64, f64), width: f64, colour: Colour) -> Result<()> {
+        let line = Rect { left: x - width / 2.0, right: x + width / 2.0, top: from, bottom: to };
         self.fill(line, colour)
     }
 
     /// A straight level line, its middle at `y`, that ends square at `from` and `to`.
     pub fn level(&self, y: f64, (from, to): (f64, f64), width: f64, colour: Colour) -> Result<()> {
-        let line = Rect {
-            left: from,
-            right: to,
-            top: y - width / 2.0,
-            bottom: y + width / 2.0,
-        };
+        let line = Rect { left: from, right: to, top: y - width / 2.0, bottom: y + width / 2.0 };
         self.fill(line, colour)
     }
 
     /// Fills a rectangle with an image, made for its width and height in drawn pixels and the drawn pixels a point.
-    pub fn image(
-        &self,
-        rect: Rect,
-        make: impl FnOnce(u32, u32, f64) -> Result<Image>,
-    ) -> Result<()> {
+    pub fn image(&self, rect: Rect, make: impl FnOnce(u32, u32, f64) -> Result<Image>) -> Result<()> {
         let (x0, y0) = pixel((rect.left, rect.top));
         let (x1, y1) = pixel((rect.right, rect.bottom));
         let size = ((x1 - x0).max(1) as u32, (y1 - y0).max(1) as u32);
@@ -344,14 +290,7 @@ impl Canvas<'_> {
 
     /// Draws the polyline through `path` as far as it lies in `window`. Dashes have their lengths along the line
     /// on paper, whatever the spacing of its points.
-    pub fn stroke(
-        &self,
-        path: &[Point],
-        window: Rect,
-        width: f64,
-        dash: Dash,
-        colour: Colour,
-    ) -> Result<()> {
+    pub fn stroke(&self, path: &[Point], window: Rect, width: f64, dash: Dash, colour: Colour) -> Result<()> {
         for piece in clipped(path, window) {
             for piece in dashed(&piece, dash.pattern(), width) {
                 self.solid(&piece, width, colour)?;
@@ -373,12 +312,7 @@ impl Canvas<'_> {
                 continue;
             }
             let (nx, ny) = (-dy / length * half, dx / length * half);
-            let corners = [
-                (ax + nx, ay + ny),
-                (bx + nx, by + ny),
-                (bx - nx, by - ny),
-                (ax - nx, ay - ny),
-            ];
+            let corners = [(ax + nx, ay + ny), (bx + nx, by + ny), (bx - nx, by - ny), (ax - nx, ay - ny)];
             self.polygon(&corners, colour)?;
         }
         for &centre in px.iter().skip(1).take(px.len().saturating_sub(2)) {
@@ -407,11 +341,7 @@ impl Canvas<'_> {
         match marker {
             Marker::Cross | Marker::Plus => {
                 let r = radius * if marker == Marker::Cross { 1.0 } else { 1.35 };
-                let arms = if marker == Marker::Cross {
-                    [(r, r), (r, -r)]
-                } else {
-                    [(r, 0.0), (0.0, r)]
-                };
+                let arms = if marker == Marker::Cross { [(r, r), (r, -r)] } else { [(r, 0.0), (0.0, r)] };
                 for (dx, dy) in arms {
                     let arm = [(at.0 - dx, at.1 - dy), (at.0 + dx, at.1 + dy)];
                     self.solid(&arm, 0.5 * radius, colour)?;
@@ -497,52 +427,27 @@ fn dashed(path: &[Point], pattern: &[f64], width: f64) -> Vec<Vec<Point>> {
 mod tests {
     use super::*;
 
-    const WINDOW: Rect = Rect {
-        left: 0.0,
-        top: 0.0,
-        right: 10.0,
-        bottom: 10.0,
-    };
+    const WINDOW: Rect = Rect { left: 0.0, top: 0.0, right: 10.0, bottom: 10.0 };
 
     fn length(path: &[Point]) -> f64 {
         let segments = path.windows(2);
-        segments
-            .map(|s| (s[1].0 - s[0].0).hypot(s[1].1 - s[0].1))
-            .sum()
+        segments.map(|s| (s[1].0 - s[0].0).hypot(s[1].1 - s[0].1)).sum()
     }
 
     #[test]
     fn clipping_keeps_what_is_inside() {
         // In, out through the right side, back in through it, and a segment that never enters.
-        let path = [
-            (5.0, 5.0),
-            (15.0, 5.0),
-            (15.0, 7.0),
-            (5.0, 7.0),
-            (5.0, 20.0),
-            (9.0, 20.0),
-        ];
-        assert_eq!(
-            clipped(&path, WINDOW),
-            [
-                vec![(5.0, 5.0), (10.0, 5.0)],
-                vec![(10.0, 7.0), (5.0, 7.0), (5.0, 10.0)]
-            ]
-        );
+        let path = [(5.0, 5.0), (15.0, 5.0), (15.0, 7.0), (5.0, 7.0), (5.0, 20.0), (9.0, 20.0)];
+        assert_eq!(clipped(&path, WINDOW), [vec![(5.0, 5.0), (10.0, 5.0)], vec![(10.0, 7.0), (5.0, 7.0), (5.0, 10.0)]]);
         // Across the corner.
-        assert_eq!(
-            clipped(&[(-1.0, 3.0), (3.0, -1.0)], WINDOW),
-            [[(0.0, 2.0), (2.0, 0.0)]]
-        );
+        assert_eq!(clipped(&[(-1.0, 3.0), (3.0, -1.0)], WINDOW), [[(0.0, 2.0), (2.0, 0.0)]]);
     }
 
     #[test]
     fn dashes_do_not_depend_on_the_spacing_of_points() {
         // The same line of length 10 with 2 and with 1001 points; pattern 2 on, 1 off at width 1.
         let coarse = [(0.0, 0.0), (6.0, 8.0)];
-        let fine: Vec<Point> = (0..=1000)
-            .map(|i| (0.006 * f64::from(i), 0.008 * f64::from(i)))
-            .collect();
+        let fine: Vec<Point> = (0..=1000).map(|i| (0.006 * f64::from(i), 0.008 * f64::from(i))).collect();
         for path in [&coarse[..], &fine] {
             let lines = dashed(path, &[2.0, 1.0], 1.0);
             let lengths: Vec<f64> = lines.iter().map(|l| length(l)).collect();
@@ -557,40 +462,23 @@ mod tests {
     fn scripts_are_split_off() {
         let parts = |text| -> Vec<(String, bool)> {
             let runs = runs(text);
-            runs.iter()
-                .map(|r| (r.text.to_owned(), r.rise == 0.0))
-                .collect()
+            runs.iter().map(|r| (r.text.to_owned(), r.rise == 0.0)).collect()
         };
         let own = |s: &str, plain| (s.to_owned(), plain);
-        assert_eq!(
-            parts("ω_{opt} = x^{2}"),
-            [
-                own("ω", true),
-                own("opt", false),
-                own(" = x", true),
-                own("2", false)
-            ]
-        );
+        assert_eq!(parts("ω_{opt} = x^{2}"), [own("ω", true), own("opt", false), own(" = x", true), own("2", false)]);
         assert_eq!(parts("pcg_jacobi _{"), [own("pcg_jacobi _{", true)]);
         assert_eq!(parts(""), []);
     }
 
     #[test]
     fn a_line_is_as_wide_as_asked() {
-        let window = Rect {
-            left: 0.0,
-            top: 0.0,
-            right: 40.0,
-            bottom: 20.0,
-        };
+        let window = Rect { left: 0.0, top: 0.0, right: 40.0, bottom: 20.0 };
         let line = [(5.0, 10.0), (35.0, 10.0)];
         let black = Colour(0, 0, 0);
         let draw = |canvas: &Canvas<'_>| canvas.stroke(&line, window, 1.5, Dash::Solid, black);
         let image = paint(40, 20, draw).unwrap();
         let final_px = |points: u32| points * PIXELS_PER_POINT;
-        let ink: f64 = (0..image.height)
-            .map(|y| 1.0 - f64::from(image.pixel(final_px(20), y)[0]) / 255.0)
-            .sum();
+        let ink: f64 = (0..image.height).map(|y| 1.0 - f64::from(image.pixel(final_px(20), y)[0]) / 255.0).sum();
         let expected = 1.5 * f64::from(PIXELS_PER_POINT);
         assert!((ink - expected).abs() < 0.4, "{ink}");
         assert_eq!(image.pixel(final_px(5) - 2, final_px(10)), [255; 3]);

@@ -56,22 +56,11 @@ pub fn compare(fresh: &Table, committed_csv: &Path) -> Result<Vec<Difference>> {
     };
 
     // Where each column of `fresh` stands in the file.
-    let place: Vec<Option<usize>> = fresh
-        .columns
-        .iter()
-        .map(|column| {
-            committed
-                .header
-                .iter()
-                .position(|name| *name == column.name)
-        })
-        .collect();
+    let place: Vec<Option<usize>> =
+        fresh.columns.iter().map(|column| committed.header.iter().position(|name| *name == column.name)).collect();
     for (column, place) in fresh.columns.iter().zip(&place) {
         if place.is_none() {
-            report(format!(
-                "column {} is not in the committed file",
-                column.name
-            ));
+            report(format!("column {} is not in the committed file", column.name));
         }
     }
     for name in &committed.header {
@@ -80,15 +69,12 @@ pub fn compare(fresh: &Table, committed_csv: &Path) -> Result<Vec<Difference>> {
         }
     }
 
-    let keys: Vec<usize> = (0..fresh.columns.len())
-        .filter(|&c| fresh.columns[c].kind == Kind::Key)
-        .collect();
+    let keys: Vec<usize> = (0..fresh.columns.len()).filter(|&c| fresh.columns[c].kind == Kind::Key).collect();
     let Some(committed_keys) = keys.iter().map(|&c| place[c]).collect::<Option<Vec<_>>>() else {
         return Ok(differences); // rows cannot be looked up; the missing key column is reported above
     };
-    let key_of = |row: &[String], columns: &[usize]| -> Vec<String> {
-        columns.iter().map(|&c| row[c].clone()).collect()
-    };
+    let key_of =
+        |row: &[String], columns: &[usize]| -> Vec<String> { columns.iter().map(|&c| row[c].clone()).collect() };
 
     let mut rows: HashMap<Vec<String>, &[String]> = HashMap::new();
     for row in &committed.rows {
@@ -104,19 +90,14 @@ pub fn compare(fresh: &Table, committed_csv: &Path) -> Result<Vec<Difference>> {
         let name = key.join(", ");
         // Taken out, so that a second fresh row with the same key is not found.
         let Some(old) = rows.remove(&key) else {
-            report(format!(
-                "row [{name}] is not in the committed file, or fresh twice"
-            ));
+            report(format!("row [{name}] is not in the committed file, or fresh twice"));
             continue;
         };
         for (c, column) in fresh.columns.iter().enumerate() {
             let Some(place) = place[c] else { continue };
             let (new, old) = (&row[c], &old[place]);
             if let Some(reason) = disagreement(column.kind, new, old) {
-                report(format!(
-                    "row [{name}], {}: fresh {new:?}, committed {old:?}{reason}",
-                    column.name
-                ));
+                report(format!("row [{name}], {}: fresh {new:?}, committed {old:?}{reason}", column.name));
             }
         }
     }
@@ -136,9 +117,7 @@ fn disagreement(kind: Kind, a: &str, b: &str) -> Option<String> {
             (Ok(_), Ok(_)) => Some(" (may differ by 1)".to_owned()),
             _ => Some(String::new()),
         },
-        Kind::Number {
-            tolerance, floor, ..
-        } => match (a.parse::<f64>(), b.parse::<f64>()) {
+        Kind::Number { tolerance, floor, .. } => match (a.parse::<f64>(), b.parse::<f64>()) {
             // An infinity would be within any tolerance of itself only: |a − b| is NaN or infinite.
             (Ok(a), Ok(b)) if a.is_finite() && b.is_finite() => {
                 let (distance, size) = ((a - b).abs(), a.abs().max(b.abs()));
@@ -175,22 +154,9 @@ mod tests {
         ]
     }
 
-    fn row(
-        mesh: &str,
-        omega: f64,
-        verdict: &str,
-        iterations: Option<i64>,
-        max_error: f64,
-    ) -> Vec<Cell> {
+    fn row(mesh: &str, omega: f64, verdict: &str, iterations: Option<i64>, max_error: f64) -> Vec<Cell> {
         let seconds = 77.0; // never agrees
-        vec![
-            mesh.into(),
-            omega.into(),
-            verdict.into(),
-            iterations.into(),
-            max_error.into(),
-            seconds.into(),
-        ]
+        vec![mesh.into(), omega.into(), verdict.into(), iterations.into(), max_error.into(), seconds.into()]
     }
 
     fn differences(columns: Vec<Column>, rows: Vec<Vec<Cell>>) -> Vec<String> {
@@ -209,13 +175,7 @@ mod tests {
             // Another order; ω with the last bits of a sum; counts off by 1 to either side; the number at 0.99
             // of its tolerance.
             row("torus", 1.0, "diverged", None, f64::INFINITY),
-            row(
-                "cube",
-                0.1 + 0.7,
-                "agrees",
-                Some(13),
-                0.001 * (1.0 - 0.99e-3),
-            ),
+            row("cube", 0.1 + 0.7, "agrees", Some(13), 0.001 * (1.0 - 0.99e-3)),
             row("torus", 0.8, "agrees", Some(39), 9e-13), // below the floor
         ];
         assert_eq!(differences(columns(), rows), [""; 0]);
@@ -246,10 +206,7 @@ mod tests {
                 row("cube", 0.8, "agrees", Some(14), 1e-3),
                 r#"sweep: row [cube, 0.8], iterations: fresh "14", committed "12" (may differ by 1)"#,
             ),
-            (
-                row("cube", 0.8, "agrees", None, 1e-3),
-                r#"sweep: row [cube, 0.8], iterations: fresh "", committed "12""#,
-            ),
+            (row("cube", 0.8, "agrees", None, 1e-3), r#"sweep: row [cube, 0.8], iterations: fresh "", committed "12""#),
             (
                 row("cube", 0.8, "agrees", Some(12), 1.0011e-3),
                 r#"sweep: row [cube, 0.8], max_error: fresh "0.0010011", committed "0.001" (relative difference 1.1e-3, allowed 1.0e-3)"#,
@@ -310,10 +267,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let columns = vec![Column::key("k"), Column::number("x", 0.0, 3).floor(0.0)];
         let mut table = Table::new("own", "Own", columns);
-        for (i, x) in [1.0 / 3.0, f64::NAN, -1e-300, 0.1 + 0.2]
-            .into_iter()
-            .enumerate()
-        {
+        for (i, x) in [1.0 / 3.0, f64::NAN, -1e-300, 0.1 + 0.2].into_iter().enumerate() {
             table.push(vec![i.into(), x.into()]);
         }
         table.write(dir.path()).unwrap();

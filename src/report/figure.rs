@@ -148,14 +148,7 @@ pub struct Figure {
 impl Figure {
     /// A single panel, 600×380 points.
     pub fn new(panel: impl Into<Panel>) -> Self {
-        Figure {
-            title: String::new(),
-            width: 600,
-            height: 380,
-            columns: 1,
-            share_x: false,
-            panels: vec![panel.into()],
-        }
+        Figure { title: String::new(), width: 600, height: 380, columns: 1, share_x: false, panels: vec![panel.into()] }
     }
 
     /// Panels one above the other that share their x axis, 600 points wide and 220 high each.
@@ -235,11 +228,7 @@ impl Figure {
                 .filter(|(axis, _)| axis.scale == own.scale)
         };
         let chosen = column().any(|(_, chosen)| chosen);
-        column()
-            .filter(|&(_, c)| c == chosen)
-            .map(|(axis, _)| axis)
-            .reduce(Axis::union)
-            .unwrap_or(own)
+        column().filter(|&(_, c)| c == chosen).map(|(axis, _)| axis).reduce(Axis::union).unwrap_or(own)
     }
 
     /// Lays the panels out: all frames of one size, between the widest texts of each row and column.
@@ -252,11 +241,7 @@ impl Figure {
             above[row] = above[row].max(panel.top());
             below[row] = below[row].max(panel.bottom(self.is_labelled(index)));
         }
-        let title = if self.title.is_empty() {
-            0.0
-        } else {
-            FIGURE_TITLE_ROOM
-        };
+        let title = if self.title.is_empty() { 0.0 } else { FIGURE_TITLE_ROOM };
         let used = title + 2.0 * MARGIN + above.iter().chain(&below).sum::<f64>();
         let height = (f64::from(self.height) - used) / rows as f64;
 
@@ -279,23 +264,10 @@ impl Figure {
 
         let slot = |index: usize| {
             let (row, column) = (index / columns, index % columns);
-            let left = MARGIN
-                + before[..=column]
-                    .iter()
-                    .chain(&after[..column])
-                    .sum::<f64>()
-                + column as f64 * width;
-            let top = MARGIN
-                + title
-                + above[..=row].iter().chain(&below[..row]).sum::<f64>()
-                + row as f64 * height;
+            let left = MARGIN + before[..=column].iter().chain(&after[..column]).sum::<f64>() + column as f64 * width;
+            let top = MARGIN + title + above[..=row].iter().chain(&below[..row]).sum::<f64>() + row as f64 * height;
             Slot {
-                frame: Rect {
-                    left,
-                    top,
-                    right: left + width,
-                    bottom: top + height,
-                },
+                frame: Rect { left, top, right: left + width, bottom: top + height },
                 left: before[column],
                 x_axis: self.x_axis(index),
                 labelled: self.is_labelled(index),
@@ -321,21 +293,14 @@ pub(super) fn x_axis_room(label: &str, labelled: bool) -> f64 {
 
 /// Room for tick labels and label of a y axis.
 pub(super) fn y_axis_room(label: &str, ticks: &[Tick]) -> Result<f64> {
-    let room = if label.is_empty() {
-        0.0
-    } else {
-        LABEL_SIZE + 7.0
-    };
+    let room = if label.is_empty() { 0.0 } else { LABEL_SIZE + 7.0 };
     Ok(room + widest_label(ticks)? + TICK_GAP + TICK_LENGTH)
 }
 
 fn widest_label(ticks: &[Tick]) -> Result<f64> {
     let labels = ticks.iter().filter_map(|t| t.label.as_deref());
     let widths = labels.map(|label| text_width(label, TICK_SIZE));
-    Ok(widths
-        .collect::<Result<Vec<_>>>()?
-        .into_iter()
-        .fold(0.0, f64::max))
+    Ok(widths.collect::<Result<Vec<_>>>()?.into_iter().fold(0.0, f64::max))
 }
 
 /// Ticks of an x axis of this length.
@@ -349,13 +314,7 @@ pub(super) fn y_ticks(axis: Axis, length: f64) -> Vec<Tick> {
 }
 
 /// Ticks below the frame, and their labels and the axis's if `labelled`.
-pub(super) fn draw_x_axis(
-    canvas: &Canvas<'_>,
-    frame: Rect,
-    ticks: &[Tick],
-    label: &str,
-    labelled: bool,
-) -> Result<()> {
+pub(super) fn draw_x_axis(canvas: &Canvas<'_>, frame: Rect, ticks: &[Tick], label: &str, labelled: bool) -> Result<()> {
     let baseline = frame.bottom + TICK_LENGTH + TICK_GAP + CAP_HEIGHT * TICK_SIZE;
     for tick in ticks {
         let at = frame.left + tick.at * frame.width();
@@ -375,13 +334,7 @@ pub(super) fn draw_x_axis(
 
 /// Ticks to the left of the frame, their labels, and at the outer edge of the `room` there the axis's label, made
 /// smaller if it is longer than the axis.
-pub(super) fn draw_y_axis(
-    canvas: &Canvas<'_>,
-    frame: Rect,
-    room: f64,
-    ticks: &[Tick],
-    label: &str,
-) -> Result<()> {
+pub(super) fn draw_y_axis(canvas: &Canvas<'_>, frame: Rect, room: f64, ticks: &[Tick], label: &str) -> Result<()> {
     for tick in ticks {
         let at = frame.bottom - tick.at * frame.height();
         let reach = (frame.left - tick_length(tick), frame.left);
@@ -399,11 +352,7 @@ pub(super) fn draw_y_axis(
 }
 
 fn tick_length(tick: &Tick) -> f64 {
-    if tick.label.is_some() {
-        TICK_LENGTH
-    } else {
-        MINOR_TICK_LENGTH
-    }
+    if tick.label.is_some() { TICK_LENGTH } else { MINOR_TICK_LENGTH }
 }
 
 /// The title at the top of the `room` above the frame.

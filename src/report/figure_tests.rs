@@ -19,19 +19,13 @@ fn histories() -> Figure {
         "pcg-ssor",
         "pcg-ic0",
     ];
-    let factors = [
-        1.09, 0.93, 0.87, 0.80, 0.83, 0.96, 0.9, 0.72, 0.66, 0.6, 0.5, 1.03,
-    ];
-    let series = names
-        .iter()
-        .zip(factors)
-        .enumerate()
-        .map(|(i, (name, factor))| {
-            let wiggle = move |k: i32| 1.0 + 0.3 * (f64::from(k) * 0.7 + i as f64).sin();
-            let values = (0..=200).map(move |k| f64::powi(factor, k) * wiggle(k));
-            let values = values.take_while(|v| (1e-12..1e6).contains(v));
-            Series::history(*name, values).marker(marker(i))
-        });
+    let factors = [1.09, 0.93, 0.87, 0.80, 0.83, 0.96, 0.9, 0.72, 0.66, 0.6, 0.5, 1.03];
+    let series = names.iter().zip(factors).enumerate().map(|(i, (name, factor))| {
+        let wiggle = move |k: i32| 1.0 + 0.3 * (f64::from(k) * 0.7 + i as f64).sin();
+        let values = (0..=200).map(move |k| f64::powi(factor, k) * wiggle(k));
+        let values = values.take_while(|v| (1e-12..1e6).contains(v));
+        Series::history(*name, values).marker(marker(i))
+    });
     Figure::new(LinePlot {
         title: "Catmull-Clark, torus:64x64, noise 0.1".into(),
         x_label: "iteration".into(),
@@ -53,16 +47,9 @@ fn sweep() -> Figure {
     };
     let marks = |labelled: bool| -> Vec<Rule> {
         let name = |text: &str| {
-            if labelled {
-                text.to_owned()
-            } else {
-                String::new()
-            }
+            if labelled { text.to_owned() } else { String::new() }
         };
-        vec![
-            Rule::new(0.8, name("ω_{opt} = 0.8")),
-            Rule::new(8.0 / 9.0, name("ω_{crit} = 0.889")),
-        ]
+        vec![Rule::new(0.8, name("ω_{opt} = 0.8")), Rule::new(8.0 / 9.0, name("ω_{crit} = 0.889"))]
     };
     let upper = LinePlot {
         y_label: "iterations".into(),
@@ -80,22 +67,12 @@ fn sweep() -> Figure {
         x_range: Some((0.0, 1.2)),
         y_range: Some((0.7, 1.4)),
         series: vec![
-            Series::line(
-                "predicted ρ(ω)",
-                (0..=240).map(|i| 0.005 * f64::from(i)).map(|w| (w, rho(w))),
-            ),
+            Series::line("predicted ρ(ω)", (0..=240).map(|i| 0.005 * f64::from(i)).map(|w| (w, rho(w)))),
             Series::scatter("measured", omegas().map(|w| (w, rho(w)))).colour(palette(0)),
         ],
         vertical_lines: marks(false),
-        bands: vec![Band {
-            from: 0.0,
-            to: 8.0 / 9.0,
-            label: "converges".into(),
-        }],
-        horizontal_lines: vec![Rule {
-            dash: Dash::Dotted,
-            ..Rule::new(1.0, "ρ = 1")
-        }],
+        bands: vec![Band { from: 0.0, to: 8.0 / 9.0, label: "converges".into() }],
+        horizontal_lines: vec![Rule { dash: Dash::Dotted, ..Rule::new(1.0, "ρ = 1") }],
         ..LinePlot::default()
     };
     Figure::stack([upper, lower]).title("Catmull-Clark, torus:16x16, noise 0.1")
@@ -116,24 +93,14 @@ fn patterns(side: u32) -> Figure {
     // A permutation, since 7919 is a prime that does not divide n.
     let shuffled = move |v: u32| (u64::from(v) * 7919 % u64::from(n)) as u32;
     Figure::row([
-        SparsityPlot::new(
-            format!("file order, bandwidth {}", n - 1),
-            n as usize,
-            torus(),
-        ),
-        SparsityPlot::new(
-            "shuffled",
-            n as usize,
-            torus().map(move |(r, c)| (shuffled(r), shuffled(c))),
-        ),
+        SparsityPlot::new(format!("file order, bandwidth {}", n - 1), n as usize, torus()),
+        SparsityPlot::new("shuffled", n as usize, torus().map(move |(r, c)| (shuffled(r), shuffled(c)))),
     ])
 }
 
 fn spectrum() -> Figure {
     let symbol = |k: u32| (2.0 + (f64::from(k) * std::f64::consts::TAU / 64.0).cos()) / 3.0;
-    let values: Vec<f64> = (0..64 * 64)
-        .map(|k| symbol(k / 64) * symbol(k % 64))
-        .collect();
+    let values: Vec<f64> = (0..64 * 64).map(|k| symbol(k / 64) * symbol(k % 64)).collect();
     Figure::new(LinePlot {
         x_label: "eigenvalue".into(),
         y_label: "count".into(),
@@ -163,12 +130,9 @@ fn ink(image: &Image, area: Rect) -> f64 {
 
 #[test]
 fn figures_have_their_size_are_drawn_and_come_out_the_same() {
-    for (figure, width, height) in [
-        (histories(), 600, 380),
-        (sweep(), 600, 440),
-        (patterns(64), 600, 320),
-        (spectrum(), 600, 380),
-    ] {
+    for (figure, width, height) in
+        [(histories(), 600, 380), (sweep(), 600, 440), (patterns(64), 600, 320), (spectrum(), 600, 380)]
+    {
         let image = figure.render().unwrap();
         assert_eq!((image.width, image.height), (width * 3, height * 3));
         for frame in frames(&figure) {
@@ -187,12 +151,7 @@ fn nothing_reaches_the_border_of_the_picture() {
     for figure in [histories(), sweep(), patterns(64), spectrum()] {
         let image = figure.render().unwrap();
         let (width, height) = (f64::from(figure.width), f64::from(figure.height));
-        let strip = |left, top, right, bottom| Rect {
-            left,
-            top,
-            right,
-            bottom,
-        };
+        let strip = |left, top, right, bottom| Rect { left, top, right, bottom };
         for side in [
             strip(0.0, 0.0, width, 1.0),
             strip(0.0, height - 1.0, width, height),
@@ -211,42 +170,26 @@ fn the_legend_stands_beside_the_data() {
     let bare = {
         let mut figure = figure.clone();
         for panel in &mut figure.panels {
-            let Panel::Lines(plot) = panel else {
-                unreachable!()
-            };
+            let Panel::Lines(plot) = panel else { unreachable!() };
             plot.series.iter_mut().for_each(|s| s.name.clear());
             plot.horizontal_lines[0].label.clear();
         }
         figure
     };
     let wide = frames(&bare)[0];
-    assert!(
-        wide.right > frame.right + 50.0,
-        "the legend takes room from the frame"
-    );
+    assert!(wide.right > frame.right + 50.0, "the legend takes room from the frame");
     let image = figure.render().unwrap();
     // Between frame and legend there is nothing, in the legend there is something.
-    let gap = Rect {
-        left: frame.right + 1.0,
-        right: frame.right + 8.0,
-        ..frame
-    };
+    let gap = Rect { left: frame.right + 1.0, right: frame.right + 8.0, ..frame };
     assert_eq!(ink(&image, gap), 0.0);
-    let legend = Rect {
-        left: frame.right + 8.0,
-        right: f64::from(figure.width),
-        ..frame
-    };
+    let legend = Rect { left: frame.right + 8.0, right: f64::from(figure.width), ..frame };
     assert!(ink(&image, legend) > 0.01);
 }
 
 #[test]
 fn stacked_panels_are_in_line() {
     let frames = frames(&sweep());
-    assert_eq!(
-        (frames[0].left, frames[0].right),
-        (frames[1].left, frames[1].right)
-    );
+    assert_eq!((frames[0].left, frames[0].right), (frames[1].left, frames[1].right));
     assert!((frames[0].height() - frames[1].height()).abs() < 1e-9);
     assert!(frames[0].bottom < frames[1].top);
     let figure = sweep();
@@ -256,14 +199,7 @@ fn stacked_panels_are_in_line() {
 #[test]
 fn curves_stay_in_the_frame_and_break_where_there_is_no_value() {
     let red = Colour(255, 0, 0);
-    let points = [
-        (0.0, 1e-3),
-        (1.0, 1e3),
-        (2.0, 1e-3),
-        (3.0, 0.0),
-        (4.0, 1e-1),
-        (5.0, 1e-1),
-    ];
+    let points = [(0.0, 1e-3), (1.0, 1e3), (2.0, 1e-3), (3.0, 0.0), (4.0, 1e-1), (5.0, 1e-1)];
     let figure = Figure::new(LinePlot {
         y_scale: Scale::Log,
         x_range: Some((0.0, 5.0)),
@@ -278,26 +214,13 @@ fn curves_stay_in_the_frame_and_break_where_there_is_no_value() {
         r > 200 && g < 60 && b < 60
     };
     let columns = |from: f64, to: f64| {
-        let px =
-            |v: f64| ((frame.left + v / 5.0 * frame.width()) * f64::from(PIXELS_PER_POINT)) as u32;
+        let px = |v: f64| ((frame.left + v / 5.0 * frame.width()) * f64::from(PIXELS_PER_POINT)) as u32;
         (px(from)..px(to)).map(|x| (0..image.height).filter(|&y| is_red(x, y)).count())
     };
-    assert!(
-        columns(0.2, 0.3).all(|n| n > 0),
-        "the rising branch crosses the frame"
-    );
-    assert!(
-        columns(0.7, 1.3).all(|n| n == 0),
-        "nothing is drawn along the upper edge"
-    );
-    assert!(
-        columns(2.1, 3.9).all(|n| n == 0),
-        "the point at 0 has no line to it"
-    );
-    assert!(
-        columns(4.1, 4.9).all(|n| n > 0),
-        "the line goes on after the gap"
-    );
+    assert!(columns(0.2, 0.3).all(|n| n > 0), "the rising branch crosses the frame");
+    assert!(columns(0.7, 1.3).all(|n| n == 0), "nothing is drawn along the upper edge");
+    assert!(columns(2.1, 3.9).all(|n| n == 0), "the point at 0 has no line to it");
+    assert!(columns(4.1, 4.9).all(|n| n > 0), "the line goes on after the gap");
     let outside = (0..image.height)
         .flat_map(|y| (0..image.width).map(move |x| (x, y)))
         .filter(|&(x, y)| is_red(x, y))
@@ -321,10 +244,7 @@ fn no_room_is_an_error_of_one_line() {
     let mut figure = histories();
     figure.width = 120;
     let message = figure.render().unwrap_err().to_string();
-    assert!(
-        message.contains("120×380") && !message.contains('\n'),
-        "{message}"
-    );
+    assert!(message.contains("120×380") && !message.contains('\n'), "{message}");
 }
 
 #[test]
@@ -332,10 +252,7 @@ fn empty_plots_are_drawn() {
     assert!(Figure::new(LinePlot::default()).render().is_ok());
     assert!(Figure::row([SparsityPlot::new("", 0, [])]).render().is_ok());
     let none: [LinePlot; 0] = [];
-    let figure = Figure {
-        height: 100,
-        ..Figure::stack(none)
-    };
+    let figure = Figure { height: 100, ..Figure::stack(none) };
     assert!(figure.render().is_ok());
 }
 

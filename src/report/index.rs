@@ -32,19 +32,8 @@ pub fn write_index(dir: &Path, title: &str, introduction: &str, entries: &[Entry
 fn index(title: &str, introduction: &str, entries: &[Entry]) -> String {
     let mut page = format!("# {title}\n\n{introduction}\n\n");
     for entry in entries {
-        let links: Vec<String> = entry
-            .files
-            .iter()
-            .map(|file| format!("[{file}]({})", address(file)))
-            .collect();
-        let _ = writeln!(
-            page,
-            "- **{}** (`{}`), {}: {}",
-            entry.title,
-            entry.id,
-            entry.meshes,
-            links.join(", ")
-        );
+        let links: Vec<String> = entry.files.iter().map(|file| format!("[{file}]({})", address(file))).collect();
+        let _ = writeln!(page, "- **{}** (`{}`), {}: {}", entry.title, entry.id, entry.meshes, links.join(", "));
         for picture in entry.files.iter().filter(|file| file.ends_with(".png")) {
             let source = address(picture);
             let _ = writeln!(

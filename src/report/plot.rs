@@ -143,11 +143,7 @@ impl LinePlot {
 
     /// The room above the frame, in points.
     pub(super) fn top(&self) -> f64 {
-        let labels = if self.has_rule_labels() {
-            RULE_LABEL_ROOM
-        } else {
-            0.0
-        };
+        let labels = if self.has_rule_labels() { RULE_LABEL_ROOM } else { 0.0 };
         figure::title_room(&self.title) + labels
     }
 
@@ -167,18 +163,12 @@ impl LinePlot {
         let widths = legend.iter().map(|(name, _)| text_width(name, LEGEND_SIZE));
         let widest = widths.collect::<Result<Vec<_>>>()?;
         let widest = widest.into_iter().reduce(f64::max);
-        Ok(widest.map_or(figure::BARE_RIGHT, |w| {
-            LEGEND_GAP + LEGEND_KEY + 6.0 + w + 4.0
-        }))
+        Ok(widest.map_or(figure::BARE_RIGHT, |w| LEGEND_GAP + LEGEND_KEY + 6.0 + w + 4.0))
     }
 
     pub(super) fn draw(&self, canvas: &Canvas<'_>, slot: &Slot) -> Result<()> {
         let (x, y) = (slot.x_axis, self.y_axis());
-        let frame = if self.equal_units {
-            with_aspect(slot.frame, (x.hi - x.lo) / (y.hi - y.lo))
-        } else {
-            slot.frame
-        };
+        let frame = if self.equal_units { with_aspect(slot.frame, (x.hi - x.lo) / (y.hi - y.lo)) } else { slot.frame };
         let x_ticks = figure::x_ticks(x, frame.width());
         let y_ticks = figure::y_ticks(y, frame.height());
         self.draw_bands(canvas, frame, x)?;
@@ -200,11 +190,8 @@ impl LinePlot {
                 continue;
             };
             let (left, right) = (a.min(b).clamp(0.0, 1.0), a.max(b).clamp(0.0, 1.0));
-            let area = Rect {
-                left: frame.left + left * frame.width(),
-                right: frame.left + right * frame.width(),
-                ..frame
-            };
+            let area =
+                Rect { left: frame.left + left * frame.width(), right: frame.left + right * frame.width(), ..frame };
             if left < right {
                 canvas.fill(area, BAND_COLOUR)?;
             }
@@ -215,18 +202,10 @@ impl LinePlot {
     fn draw_bars(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis, y: Axis) -> Result<()> {
         const PARTING: f64 = 0.3;
         for (index, bars) in self.bars.iter().enumerate() {
-            assert_eq!(
-                bars.edges.len(),
-                bars.heights.len() + 1,
-                "edges around bars"
-            );
+            assert_eq!(bars.edges.len(), bars.heights.len() + 1, "edges around bars");
             let foot = y.position(0.0).unwrap_or(0.0).clamp(0.0, 1.0);
             for (edges, &height) in bars.edges.windows(2).zip(&bars.heights) {
-                let places = (
-                    x.position(edges[0]),
-                    x.position(edges[1]),
-                    y.position(height),
-                );
+                let places = (x.position(edges[0]), x.position(edges[1]), y.position(height));
                 let (Some(a), Some(b), Some(h)) = places else {
                     continue; // nothing to see on a logarithmic axis
                 };
@@ -266,10 +245,7 @@ impl LinePlot {
     fn draw_series(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis, y: Axis) -> Result<()> {
         let place = |&(px, py): &(f64, f64)| -> Option<Point> {
             let (px, py) = (x.position(px)?, y.position(py)?);
-            Some((
-                frame.left + px * frame.width(),
-                frame.bottom - py * frame.height(),
-            ))
+            Some((frame.left + px * frame.width(), frame.bottom - py * frame.height()))
         };
         for (index, series) in self.series.iter().enumerate() {
             let look = self.look(index);
@@ -310,22 +286,11 @@ impl LinePlot {
         let centres = moved_apart(&wanted, frame.left, frame.right);
         for (&(at, _, rule), centre) in labels.iter().zip(centres) {
             let leader = [(at, frame.top), (centre, frame.top - RULE_LEADER)];
-            let above = Rect {
-                top: frame.top - RULE_LEADER,
-                bottom: frame.top,
-                ..frame
-            };
+            let above = Rect { top: frame.top - RULE_LEADER, bottom: frame.top, ..frame };
             canvas.stroke(&leader, above, RULE_WIDTH * 0.7, Dash::Solid, rule.colour)?;
             let place = (centre, frame.top - RULE_LEADER - 3.5);
             let text = &rule.label;
-            canvas.text(
-                text,
-                place,
-                RULE_LABEL_SIZE,
-                Anchor::Middle,
-                false,
-                rule.colour,
-            )?;
+            canvas.text(text, place, RULE_LABEL_SIZE, Anchor::Middle, false, rule.colour)?;
         }
         Ok(())
     }
@@ -338,12 +303,8 @@ impl LinePlot {
         for (row, (name, key)) in legend.into_iter().enumerate() {
             let middle = frame.top + (row as f64 + 0.5) * pitch;
             let line = [(left, middle), (left + LEGEND_KEY, middle)];
-            let area = Rect {
-                left,
-                right: left + LEGEND_KEY,
-                top: middle - 0.32 * pitch,
-                bottom: middle + 0.32 * pitch,
-            };
+            let area =
+                Rect { left, right: left + LEGEND_KEY, top: middle - 0.32 * pitch, bottom: middle + 0.32 * pitch };
             match key {
                 Key::Line(look) => {
                     if let Some(dash) = look.dash {
@@ -367,11 +328,7 @@ impl LinePlot {
 /// and the neighbouring frames are.
 fn with_aspect(frame: Rect, aspect: f64) -> Rect {
     let width = frame.width().min(aspect * frame.height());
-    Rect {
-        right: frame.left + width,
-        bottom: frame.top + width / aspect,
-        ..frame
-    }
+    Rect { right: frame.left + width, bottom: frame.top + width / aspect, ..frame }
 }
 
 fn draw_grid(canvas: &Canvas<'_>, frame: Rect, x: &[Tick], y: &[Tick]) -> Result<()> {
@@ -439,13 +396,9 @@ fn moved_apart(labels: &[(f64, f64)], lo: f64, hi: f64) -> Vec<f64> {
     };
     let least = lo + first.1 / 2.0;
     let most = (hi - last.1 / 2.0 - offset).max(least);
-    let means = pools
-        .into_iter()
-        .flat_map(|(mean, n)| std::iter::repeat_n(mean, n));
+    let means = pools.into_iter().flat_map(|(mean, n)| std::iter::repeat_n(mean, n));
     let free = means.map(|mean| mean.clamp(least, most));
-    free.zip(offsets)
-        .map(|(mean, offset)| mean + offset)
-        .collect()
+    free.zip(offsets).map(|(mean, offset)| mean + offset).collect()
 }
 
 #[cfg(test)]
@@ -478,15 +431,10 @@ mod tests {
     #[test]
     fn sixteen_series_look_different() {
         let plot = LinePlot {
-            series: (0..16)
-                .map(|i| Series::history(format!("{i}"), [1.0]))
-                .collect(),
+            series: (0..16).map(|i| Series::history(format!("{i}"), [1.0])).collect(),
             ..LinePlot::default()
         };
-        let looks: Vec<_> = (0..16)
-            .map(|i| plot.look(i))
-            .map(|l| (l.colour.0, l.colour.1, l.dash))
-            .collect();
+        let looks: Vec<_> = (0..16).map(|i| plot.look(i)).map(|l| (l.colour.0, l.colour.1, l.dash)).collect();
         for (i, look) in looks.iter().enumerate() {
             assert!(!looks[..i].contains(look), "series {i} looks like another");
         }

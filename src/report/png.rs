@@ -96,8 +96,7 @@ impl Animation {
     /// Those of `out`; no image at all, or images of different sizes.
     pub fn write_png(&self, out: &mut dyn Write) -> io::Result<()> {
         let refuse = |what| io::Error::new(io::ErrorKind::InvalidInput, what);
-        let (Some(first), Ok(count)) = (self.frames.first(), u32::try_from(self.frames.len()))
-        else {
+        let (Some(first), Ok(count)) = (self.frames.first(), u32::try_from(self.frames.len())) else {
             return Err(refuse("an animation needs an image"));
         };
         let size = |image: &Image| (image.width, image.height);
@@ -132,11 +131,7 @@ mod tests {
     fn reduction_averages_blocks() {
         // 5×4 pixels, red = 10·row + column; the fifth column fills no 2×2 block.
         let rgb = (0..20).flat_map(|i| [10 * (i / 5) + i % 5, 7, 255]);
-        let image = Image {
-            width: 5,
-            height: 4,
-            rgb: rgb.collect(),
-        };
+        let image = Image { width: 5, height: 4, rgb: rgb.collect() };
         let half = image.reduced(2);
         assert_eq!((half.width, half.height), (2, 2));
         // Mean of {0, 1, 10, 11} is 5.5, rounded up.
@@ -149,16 +144,10 @@ mod tests {
     #[test]
     fn a_png_decodes_to_its_image() {
         let rgb: Vec<u8> = (0..3 * 7 * 5).map(|i| (i * 37 % 256) as u8).collect();
-        let image = Image {
-            width: 7,
-            height: 5,
-            rgb,
-        };
+        let image = Image { width: 7, height: 5, rgb };
         let mut bytes = Vec::new();
         image.write_png(&mut bytes).unwrap();
-        let mut reader = png::Decoder::new(io::Cursor::new(&bytes))
-            .read_info()
-            .unwrap();
+        let mut reader = png::Decoder::new(io::Cursor::new(&bytes)).read_info().unwrap();
         let mut decoded = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut decoded).unwrap();
         assert_eq!((info.width, info.height), (7, 5));
@@ -167,20 +156,11 @@ mod tests {
 
     #[test]
     fn an_animation_decodes_to_its_images() {
-        let frame = |shade: u8| Image {
-            width: 4,
-            height: 3,
-            rgb: (0..36).map(|i| shade.wrapping_add(i)).collect(),
-        };
-        let animation = Animation {
-            frames: [7, 90, 200].map(frame).to_vec(),
-            milliseconds: 400,
-        };
+        let frame = |shade: u8| Image { width: 4, height: 3, rgb: (0..36).map(|i| shade.wrapping_add(i)).collect() };
+        let animation = Animation { frames: [7, 90, 200].map(frame).to_vec(), milliseconds: 400 };
         let mut bytes = Vec::new();
         animation.write_png(&mut bytes).unwrap();
-        let mut reader = png::Decoder::new(io::Cursor::new(&bytes))
-            .read_info()
-            .unwrap();
+        let mut reader = png::Decoder::new(io::Cursor::new(&bytes)).read_info().unwrap();
         let control = *reader.info().animation_control().unwrap();
         assert_eq!((control.num_frames, control.num_plays), (3, 0));
         for (i, image) in animation.frames.iter().enumerate() {
@@ -200,11 +180,7 @@ mod tests {
 
     #[test]
     fn an_image_without_pixels_is_an_error() {
-        let image = Image {
-            width: 0,
-            height: 0,
-            rgb: vec![],
-        };
+        let image = Image { width: 0, height: 0, rgb: vec![] };
         assert!(image.write_png(&mut Vec::new()).is_err());
     }
 }

@@ -53,11 +53,7 @@ pub struct Series {
 impl Series {
     /// Points joined by a line.
     pub fn line(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        Series {
-            name: name.into(),
-            points: points.into_iter().collect(),
-            ..Series::default()
-        }
+        Series { name: name.into(), points: points.into_iter().collect(), ..Series::default() }
     }
 
     /// A history over its index: (0, h₀), (1, h₁), …
@@ -68,11 +64,7 @@ impl Series {
 
     /// Circles that are not joined.
     pub fn scatter(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        Series {
-            line: Line::None,
-            marker: Some(Marker::Circle),
-            ..Series::line(name, points)
-        }
+        Series { line: Line::None, marker: Some(Marker::Circle), ..Series::line(name, points) }
     }
 
     /// The same series with this marker.
@@ -118,12 +110,7 @@ pub struct Rule {
 impl Rule {
     /// A dashed grey line.
     pub fn new(at: f64, label: impl Into<String>) -> Self {
-        Rule {
-            at,
-            label: label.into(),
-            dash: Dash::Dashed,
-            colour: RULE_COLOUR,
-        }
+        Rule { at, label: label.into(), dash: Dash::Dashed, colour: RULE_COLOUR }
     }
 }
 
@@ -176,9 +163,7 @@ impl Bars {
         }
         Bars {
             name: name.into(),
-            edges: (0..=bins)
-                .map(|i| lo + (hi - lo) * i as f64 / bins as f64)
-                .collect(),
+            edges: (0..=bins).map(|i| lo + (hi - lo) * i as f64 / bins as f64).collect(),
             heights,
             colour: None,
         }

@@ -44,30 +44,17 @@ impl SparsityPlot {
     ///
     /// # Panics
     /// If an entry is outside the matrix.
-    pub fn new(
-        caption: impl Into<String>,
-        dimension: usize,
-        entries: impl IntoIterator<Item = (u32, u32)>,
-    ) -> Self {
+    pub fn new(caption: impl Into<String>, dimension: usize, entries: impl IntoIterator<Item = (u32, u32)>) -> Self {
         let block = dimension.div_ceil(MOST_BLOCKS).max(1);
         let blocks = dimension.div_ceil(block);
         let mut counts = vec![0_u32; blocks * blocks];
         for (row, column) in entries {
             let (row, column) = (row as usize, column as usize);
-            assert!(
-                row < dimension && column < dimension,
-                "entry ({row}, {column}) is inside the matrix"
-            );
+            assert!(row < dimension && column < dimension, "entry ({row}, {column}) is inside the matrix");
             let count = &mut counts[row / block * blocks + column / block];
             *count = count.saturating_add(1);
         }
-        SparsityPlot {
-            caption: caption.into(),
-            dimension,
-            block,
-            blocks,
-            counts,
-        }
+        SparsityPlot { caption: caption.into(), dimension, block, blocks, counts }
     }
 
     /// Columns from the left, or rows from the top.
@@ -87,12 +74,7 @@ impl SparsityPlot {
         // The largest square at the top of the room, in its middle.
         let side = room.width().min(room.height());
         let left = room.centre().0 - side / 2.0;
-        let frame = Rect {
-            left,
-            top: room.top,
-            right: left + side,
-            bottom: room.top + side,
-        };
+        let frame = Rect { left, top: room.top, right: left + side, bottom: room.top + side };
         let fullest = f64::from(self.counts.iter().copied().max().unwrap_or(0));
         // The last block may be cut short; the frame ends where the matrix does.
         let size = side * self.block as f64 / self.dimension.max(1) as f64;
@@ -120,12 +102,7 @@ impl SparsityPlot {
             tick.at = 1.0 - tick.at; // rows count downward
         }
         figure::draw_y_axis(canvas, frame, figure::y_axis_room("row", &y)?, &y, "row")?;
-        figure::draw_title(
-            canvas,
-            frame,
-            &self.caption,
-            figure::title_room(&self.caption),
-        )
+        figure::draw_title(canvas, frame, &self.caption, figure::title_room(&self.caption))
     }
 }
 

@@ -47,10 +47,7 @@ pub struct Column {
 
 impl Column {
     fn new(name: impl Into<String>, kind: Kind) -> Self {
-        Column {
-            name: name.into(),
-            kind,
-        }
+        Column { name: name.into(), kind }
     }
 
     /// A column of [`Kind::Key`].
@@ -71,14 +68,7 @@ impl Column {
     /// A column of [`Kind::Number`] with the relative `tolerance` of comparisons, the floor
     /// [`ROUNDING_FLOOR`], and `digits` significant digits in Markdown.
     pub fn number(name: impl Into<String>, tolerance: f64, digits: usize) -> Self {
-        Column::new(
-            name,
-            Kind::Number {
-                tolerance,
-                floor: ROUNDING_FLOOR,
-                digits,
-            },
-        )
+        Column::new(name, Kind::Number { tolerance, floor: ROUNDING_FLOOR, digits })
     }
 
     /// A column of [`Kind::Time`].
@@ -213,13 +203,7 @@ pub struct Table {
 impl Table {
     /// A table without notes or rows.
     pub fn new(id: impl Into<String>, title: impl Into<String>, columns: Vec<Column>) -> Self {
-        Table {
-            id: id.into(),
-            title: title.into(),
-            notes: Vec::new(),
-            columns,
-            rows: Vec::new(),
-        }
+        Table { id: id.into(), title: title.into(), notes: Vec::new(), columns, rows: Vec::new() }
     }
 
     /// Adds a paragraph under the title.
@@ -238,9 +222,7 @@ impl Table {
 
     /// The cells of each row as CSV holds them.
     pub(super) fn csv_rows(&self) -> impl Iterator<Item = Vec<String>> + '_ {
-        self.rows
-            .iter()
-            .map(|row| row.iter().map(Cell::csv).collect())
+        self.rows.iter().map(|row| row.iter().map(Cell::csv).collect())
     }
 
     /// Writes a header line of column names, then the rows, quoted where RFC 4180 asks for it. A float has 10
@@ -263,8 +245,7 @@ impl Table {
     /// If a row does not have one cell a column.
     pub fn to_csv(&self) -> String {
         let mut bytes = Vec::new();
-        self.write_csv(&mut bytes)
-            .expect("rows have one cell a column");
+        self.write_csv(&mut bytes).expect("rows have one cell a column");
         String::from_utf8(bytes).expect("all cells are UTF-8")
     }
 
@@ -294,11 +275,7 @@ impl Table {
         }
         let line = |text: &mut String, cells: &[String]| {
             for ((cell, &width), &right) in cells.iter().zip(&widths).zip(&right) {
-                let _ = if right {
-                    write!(text, "| {cell:>width$} ")
-                } else {
-                    write!(text, "| {cell:<width$} ")
-                };
+                let _ = if right { write!(text, "| {cell:>width$} ") } else { write!(text, "| {cell:<width$} ") };
             }
             text.push_str("|\n");
         };
@@ -320,8 +297,7 @@ impl Table {
             Kind::Count | Kind::Number { .. } | Kind::Time => true,
             Kind::Key | Kind::Text | Kind::Remark => {
                 let mut cells = self.rows.iter().map(|row| &row[column]);
-                !self.rows.is_empty()
-                    && cells.all(|c| matches!(c, Cell::Integer(_) | Cell::Float(_)))
+                !self.rows.is_empty() && cells.all(|c| matches!(c, Cell::Integer(_) | Cell::Float(_)))
             }
         }
     }
@@ -344,9 +320,7 @@ impl Table {
     pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>> {
         let (csv, markdown) = (format!("{}.csv", self.id), format!("{}.md", self.id));
         write_file(&dir.join(&csv), |out| self.write_csv(out))?;
-        write_file(&dir.join(&markdown), |out| {
-            out.write_all(self.to_markdown().as_bytes())
-        })?;
+        write_file(&dir.join(&markdown), |out| out.write_all(self.to_markdown().as_bytes()))?;
         Ok(vec![csv.into(), markdown.into()])
     }
 }
@@ -385,16 +359,12 @@ fn csv_error(path: &Path, error: csv::Error) -> Error {
     let line = error.position().map(|p| p.line() as usize);
     match error.into_kind() {
         csv::ErrorKind::Io(source) => Error::io(path, "read", source),
-        csv::ErrorKind::UnequalLengths {
-            expected_len, len, ..
-        } => Error::parse(
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => Error::parse(
             path,
             line,
             format!("the row has {len} fields, the header {expected_len}; write the file anew"),
         ),
-        csv::ErrorKind::Utf8 { .. } => {
-            Error::parse(path, line, "the row is not UTF-8; write the file anew")
-        }
+        csv::ErrorKind::Utf8 { .. } => Error::parse(path, line, "the row is not UTF-8; write the file anew"),
         kind => Error::parse(path, line, format!("{kind:?}; write the file anew")),
     }
 }
@@ -429,20 +399,8 @@ mod tests {
             ],
         );
         table.note("On built-in meshes.");
-        table.push(vec![
-            "a,b \"c\"".into(),
-            "two\nlines".into(),
-            12_usize.into(),
-            8.13812e-4.into(),
-            0.123456.into(),
-        ]);
-        table.push(vec![
-            "x|y\\z".into(),
-            "".into(),
-            Cell::Empty,
-            f64::NAN.into(),
-            Cell::Empty,
-        ]);
+        table.push(vec!["a,b \"c\"".into(), "two\nlines".into(), 12_usize.into(), 8.13812e-4.into(), 0.123456.into()]);
+        table.push(vec!["x|y\\z".into(), "".into(), Cell::Empty, f64::NAN.into(), Cell::Empty]);
         table
     }
 
@@ -451,20 +409,11 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let table = awkward();
         let files = table.write(dir.path()).unwrap();
-        assert_eq!(
-            files,
-            [PathBuf::from("awkward.csv"), PathBuf::from("awkward.md")]
-        );
+        assert_eq!(files, [PathBuf::from("awkward.csv"), PathBuf::from("awkward.md")]);
         let read = CsvFile::read(&dir.path().join("awkward.csv")).unwrap();
-        assert_eq!(
-            read.header,
-            ["mesh", "verdict", "iterations", "max_error", "seconds"]
-        );
+        assert_eq!(read.header, ["mesh", "verdict", "iterations", "max_error", "seconds"]);
         assert_eq!(read.rows, table.csv_rows().collect::<Vec<_>>());
-        assert_eq!(
-            read.rows[0],
-            ["a,b \"c\"", "two\nlines", "12", "0.000813812", "0.123456"]
-        );
+        assert_eq!(read.rows[0], ["a,b \"c\"", "two\nlines", "12", "0.000813812", "0.123456"]);
         assert_eq!(read.rows[1], ["x|y\\z", "", "", "NaN", ""]);
     }
 
@@ -485,10 +434,7 @@ mod tests {
         let path = dir.path().join("short.csv");
         std::fs::write(&path, "a,b\n1,2\n3\n").unwrap();
         let message = CsvFile::read(&path).unwrap_err().to_string();
-        assert!(
-            message.contains("short.csv, line 3: the row has 1 fields, the header 2"),
-            "{message}"
-        );
+        assert!(message.contains("short.csv, line 3: the row has 1 fields, the header 2"), "{message}");
         assert!(!message.contains('\n'));
     }
 
@@ -509,17 +455,9 @@ On built-in meshes.
 
     #[test]
     fn integers_in_a_text_column_go_to_the_right() {
-        let mut table = Table::new(
-            "t",
-            "T",
-            vec![Column::text("vertices"), Column::text("remark")],
-        );
+        let mut table = Table::new("t", "T", vec![Column::text("vertices"), Column::text("remark")]);
         table.push(vec![8_usize.into(), "x".into()]);
-        assert!(
-            table.to_markdown().contains("|        8 | x      |\n"),
-            "{}",
-            table.to_markdown()
-        );
+        assert!(table.to_markdown().contains("|        8 | x      |\n"), "{}", table.to_markdown());
     }
 
     #[test]

@@ -43,16 +43,10 @@ impl<S: System> Iterate for Chebyshev<'_, S> {
         let (gamma, tau) = self.recurrence.coefficients();
         let current = &self.current;
         self.rows
-            .residual(
-                self.system,
-                self.points,
-                current,
-                &mut self.other,
-                |i, e, other, _| {
-                    let v = current[i];
-                    *other = v + gamma * (v - *other) + tau * e;
-                },
-            )
+            .residual(self.system, self.points, current, &mut self.other, |i, e, other, _| {
+                let v = current[i];
+                *other = v + gamma * (v - *other) + tau * e;
+            })
             .errors
     }
 
@@ -83,18 +77,10 @@ impl Recurrence {
     /// # Panics
     /// Unless 0 < λ_min ≤ λ_max.
     pub fn new((lambda_min, lambda_max): (f64, f64)) -> Self {
-        assert!(
-            0.0 < lambda_min && lambda_min <= lambda_max,
-            "a positive interval, not [{lambda_min}, {lambda_max}]"
-        );
+        assert!(0.0 < lambda_min && lambda_min <= lambda_max, "a positive interval, not [{lambda_min}, {lambda_max}]");
         let delta = 0.5 * (lambda_max - lambda_min);
         let midpoint = 0.5 * (lambda_max + lambda_min);
-        Recurrence {
-            delta,
-            sigma: midpoint / delta,
-            midpoint,
-            ratio: 0.0,
-        }
+        Recurrence { delta, sigma: midpoint / delta, midpoint, ratio: 0.0 }
     }
 
     /// γ_k and τ_k of the coming step.
@@ -110,11 +96,7 @@ impl Recurrence {
     pub fn step(&mut self) {
         // An interval of one point needs the first step only, again and again.
         if self.sigma.is_finite() {
-            self.ratio = if self.ratio == 0.0 {
-                1.0 / self.sigma
-            } else {
-                1.0 / (2.0 * self.sigma - self.ratio)
-            };
+            self.ratio = if self.ratio == 0.0 { 1.0 / self.sigma } else { 1.0 / (2.0 * self.sigma - self.ratio) };
         }
     }
 }

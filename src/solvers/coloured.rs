@@ -87,14 +87,7 @@ impl<'a> Coloured<'a> {
     }
 
     /// The new values of rows that do not couple go to `fresh` first, since all threads read `x`.
-    fn block(
-        &self,
-        omega: f64,
-        rows: Range<usize>,
-        p: &[DVec3],
-        x: &mut [DVec3],
-        fresh: &mut [DVec3],
-    ) {
+    fn block(&self, omega: f64, rows: Range<usize>, p: &[DVec3], x: &mut [DVec3], fresh: &mut [DVec3]) {
         let fresh = &mut fresh[..rows.len()];
         if rows.len() <= PIECE {
             self.piece(omega, rows.start, p, x, fresh);
@@ -106,10 +99,7 @@ impl<'a> Coloured<'a> {
             .par_chunks_mut(PIECE)
             .enumerate()
             .for_each(|(k, fresh)| self.piece(omega, rows.start + k * PIECE, p, old, fresh));
-        x[rows]
-            .par_chunks_mut(PIECE)
-            .zip(fresh.par_chunks(PIECE))
-            .for_each(|(x, fresh)| x.copy_from_slice(fresh));
+        x[rows].par_chunks_mut(PIECE).zip(fresh.par_chunks(PIECE)).for_each(|(x, fresh)| x.copy_from_slice(fresh));
     }
 
     fn piece(&self, omega: f64, first: usize, p: &[DVec3], x: &[DVec3], fresh: &mut [DVec3]) {

@@ -89,13 +89,8 @@ impl<'a, S: System> ConjugateGradient<'a, S> {
     fn evaluate(&mut self) -> Errors {
         self.drift = 0.0;
         self.next_rho = None;
-        let totals = self.rows.residual(
-            self.system,
-            self.points,
-            &self.current,
-            &mut self.residual,
-            |_, e, out, _| *out = e,
-        );
+        let totals =
+            self.rows.residual(self.system, self.points, &self.current, &mut self.residual, |_, e, out, _| *out = e);
         totals.errors
     }
 }
@@ -176,16 +171,10 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
         let mut nothing = vec![(); direction.len()];
         let curvature = self
             .rows
-            .product(
-                system,
-                direction,
-                &mut self.work,
-                &mut nothing,
-                |i, ap, q, (), tally| {
-                    *q = ap;
-                    tally.dot(direction[i].dot(ap) / h[i]);
-                },
-            )
+            .product(system, direction, &mut self.work, &mut nothing, |i, ap, q, (), tally| {
+                *q = ap;
+                tally.dot(direction[i].dot(ap) / h[i]);
+            })
             .dot;
         if !(curvature > 0.0 && curvature.is_finite()) {
             return Err(breakdown(format!(
@@ -224,8 +213,5 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
 }
 
 fn breakdown(detail: String) -> Failure {
-    Failure {
-        outcome: Outcome::Breakdown,
-        detail,
-    }
+    Failure { outcome: Outcome::Breakdown, detail }
 }

@@ -28,14 +28,7 @@ impl<'a, S: System> Sor<'a, S> {
     /// # Panics
     /// If the order names a vertex that the system lacks.
     pub fn new(system: &'a S, points: &'a [DVec3], omega: f64, order: Option<&'a [u32]>) -> Self {
-        Sor {
-            system,
-            points,
-            omega,
-            order,
-            current: points.to_vec(),
-            rows: Rows::new(points.len()),
-        }
+        Sor { system, points, omega, order, current: points.to_vec(), rows: Rows::new(points.len()) }
     }
 }
 
@@ -47,20 +40,10 @@ impl<S: System> Iterate for Sor<'_, S> {
     fn advance(&mut self) -> Result<(), Failure> {
         let n = self.points.len();
         match self.order {
-            Some(order) => sweep(
-                self.system,
-                self.points,
-                self.omega,
-                order.iter().map(|&i| i as usize),
-                &mut self.current,
-            ),
-            None => sweep(
-                self.system,
-                self.points,
-                self.omega,
-                0..n,
-                &mut self.current,
-            ),
+            Some(order) => {
+                sweep(self.system, self.points, self.omega, order.iter().map(|&i| i as usize), &mut self.current)
+            }
+            None => sweep(self.system, self.points, self.omega, 0..n, &mut self.current),
         }
         Ok(())
     }
@@ -71,13 +54,7 @@ impl<S: System> Iterate for Sor<'_, S> {
 }
 
 /// One in-place sweep over the vertices in the order given.
-pub fn sweep<S: System>(
-    system: &S,
-    points: &[DVec3],
-    omega: f64,
-    order: impl Iterator<Item = usize>,
-    x: &mut [DVec3],
-) {
+pub fn sweep<S: System>(system: &S, points: &[DVec3], omega: f64, order: impl Iterator<Item = usize>, x: &mut [DVec3]) {
     let diagonal = system.diagonal();
     for i in order {
         let e = points[i] - system.row(i, x);
@@ -94,12 +71,7 @@ const LOOK: usize = 8;
 ///
 /// # Panics
 /// If there is not one point a vertex.
-pub fn in_waves(
-    operator: &Operator,
-    points: &[DVec3],
-    omega: f64,
-    stop: &Stop,
-) -> (Vec<DVec3>, Report) {
+pub fn in_waves(operator: &Operator, points: &[DVec3], omega: f64, stop: &Stop) -> (Vec<DVec3>, Report) {
     let wavefront = Wavefront::new(operator);
     in_looks(operator, points, stop, |count, x| {
         wavefront.relax(omega, count, points, x);
@@ -112,12 +84,7 @@ pub fn in_waves(
 ///
 /// # Panics
 /// If there is not one point a vertex.
-pub fn by_colours(
-    operator: &Operator,
-    points: &[DVec3],
-    omega: f64,
-    stop: &Stop,
-) -> (Vec<DVec3>, Report) {
+pub fn by_colours(operator: &Operator, points: &[DVec3], omega: f64, stop: &Stop) -> (Vec<DVec3>, Report) {
     let coloured = Coloured::new(operator);
     in_looks(operator, points, stop, |count, x| {
         coloured.relax(omega, count, points, x);
@@ -154,21 +121,12 @@ fn in_looks(
             let rate = (errors.max / before).ln() / count as f64;
             let needed = ((stop.tolerance / errors.max).ln() / rate).ceil();
             // Without progress there is no such number.
-            count = if needed >= 1.0 && needed < LOOK as f64 {
-                needed as usize
-            } else {
-                LOOK
-            };
+            count = if needed >= 1.0 && needed < LOOK as f64 { needed as usize } else { LOOK };
         }
         count = count.min(stop.max_iterations - iterations);
         relax(count, &mut x);
         iterations += count;
     };
-    let report = Report {
-        outcome,
-        iterations,
-        history,
-        detail: None,
-    };
+    let report = Report { outcome, iterations, history, detail: None };
     (x, report)
 }

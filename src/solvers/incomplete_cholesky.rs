@@ -27,11 +27,7 @@ impl IncompleteCholesky {
             let start = columns.len();
             for (j, a) in m.row(i).take_while(|&(j, _)| j <= i) {
                 // l_ij = (m_ij − Σ_{k<j} l_ik l_jk) / l_jj over the common columns k of rows i and j.
-                let other = if j < i {
-                    offsets[j] as usize..offsets[j + 1] as usize
-                } else {
-                    start..columns.len()
-                };
+                let other = if j < i { offsets[j] as usize..offsets[j + 1] as usize } else { start..columns.len() };
                 let dot = common_dot(
                     (&columns[start..], &values[start..]),
                     (&columns[other.clone()], &values[other.clone()]),
@@ -45,20 +41,14 @@ impl IncompleteCholesky {
                 } else {
                     return Err(Failure {
                         outcome: Outcome::Breakdown,
-                        detail: format!(
-                            "incomplete Cholesky: pivot {rest:e} of vertex {i} is not positive"
-                        ),
+                        detail: format!("incomplete Cholesky: pivot {rest:e} of vertex {i} is not positive"),
                     });
                 }
                 columns.push(j as u32);
             }
             offsets.push(columns.len() as u32);
         }
-        Ok(IncompleteCholesky {
-            offsets,
-            columns,
-            values,
-        })
+        Ok(IncompleteCholesky { offsets, columns, values })
     }
 
     /// `x ← (L Lᵀ)⁻¹ x`.

@@ -91,10 +91,7 @@ pub struct Report {
 impl Report {
     /// The errors of the last iterate.
     pub fn last(&self) -> Errors {
-        self.history.last().copied().unwrap_or(Errors {
-            max: f64::NAN,
-            mean: f64::NAN,
-        })
+        self.history.last().copied().unwrap_or(Errors { max: f64::NAN, mean: f64::NAN })
     }
 }
 
@@ -152,11 +149,7 @@ pub const PROGRESS: f64 = 1e-8;
 
 /// Runs `method` until a stopping rule applies. The start is the method's current iterate. The watch sees every
 /// iterate and may stop the run.
-pub fn solve(
-    method: &mut dyn Iterate,
-    stop: &Stop,
-    watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
-) -> Report {
+pub fn solve(method: &mut dyn Iterate, stop: &Stop, watch: &mut dyn FnMut(&Step) -> ControlFlow<()>) -> Report {
     let mut history: Vec<Errors> = Vec::new();
     let mut rules = Rules::default();
     loop {
@@ -166,11 +159,7 @@ pub fn solve(
             errors = method.confirm(errors);
         }
         history.push(errors);
-        let step = Step {
-            iteration,
-            errors,
-            points: method.points(),
-        };
+        let step = Step { iteration, errors, points: method.points() };
         let told = watch(&step);
         let ended = if errors.max <= stop.tolerance {
             Some(Outcome::Converged)
@@ -190,12 +179,7 @@ pub fn solve(
                 Err(failure) => (failure.outcome, Some(failure.detail)),
             },
         };
-        return Report {
-            outcome,
-            iterations: iteration,
-            history,
-            detail,
-        };
+        return Report { outcome, iterations: iteration, history, detail };
     }
 }
 
@@ -215,19 +199,10 @@ impl Rules {
             return Some(Outcome::Diverged);
         }
         let Some(start) = self.start else {
-            *self = Rules {
-                start: Some(error),
-                previous: error,
-                smallest: error,
-                ..Rules::default()
-            };
+            *self = Rules { start: Some(error), previous: error, smallest: error, ..Rules::default() };
             return None;
         };
-        self.rises = if error > self.previous {
-            self.rises + 1
-        } else {
-            0
-        };
+        self.rises = if error > self.previous { self.rises + 1 } else { 0 };
         self.previous = error;
         if error < self.smallest * (1.0 - PROGRESS) {
             self.since_progress = 0;
@@ -259,10 +234,7 @@ mod tests {
     impl Iterate for Script<'_> {
         fn errors(&mut self) -> Errors {
             let max = (self.errors)(self.k);
-            Errors {
-                max,
-                mean: 0.5 * max,
-            }
+            Errors { max, mean: 0.5 * max }
         }
         fn advance(&mut self) -> Result<(), Failure> {
             self.k += 1;
@@ -274,13 +246,8 @@ mod tests {
     }
 
     fn run(errors: &dyn Fn(usize) -> f64, tolerance: f64) -> Report {
-        let stop = Stop {
-            tolerance,
-            max_iterations: 5000,
-        };
-        solve(&mut Script { errors, k: 0 }, &stop, &mut |_| {
-            ControlFlow::Continue(())
-        })
+        let stop = Stop { tolerance, max_iterations: 5000 };
+        solve(&mut Script { errors, k: 0 }, &stop, &mut |_| ControlFlow::Continue(()))
     }
 
     #[test]
@@ -307,10 +274,7 @@ mod tests {
 
     #[test]
     fn decay_that_turns_into_growth_is_divergence() {
-        let report = run(
-            &|k| 0.7f64.powi(k as i32) + 1e-4 * 1.01f64.powi(k as i32),
-            1e-9,
-        );
+        let report = run(&|k| 0.7f64.powi(k as i32) + 1e-4 * 1.01f64.powi(k as i32), 1e-9);
         assert_eq!(report.outcome, Outcome::Diverged);
     }
 
@@ -338,11 +302,7 @@ mod tests {
     fn not_a_number_is_divergence() {
         let report = run(
             &|k| {
-                if k == 3 {
-                    f64::NAN
-                } else {
-                    1.0 / (k + 1) as f64
-                }
+                if k == 3 { f64::NAN } else { 1.0 / (k + 1) as f64 }
             },
             1e-9,
         );
@@ -352,26 +312,12 @@ mod tests {
     #[test]
     fn the_watch_sees_every_iterate_and_may_stop() {
         let mut seen = Vec::new();
-        let stop = Stop {
-            tolerance: 0.0,
-            max_iterations: 50,
-        };
+        let stop = Stop { tolerance: 0.0, max_iterations: 50 };
         let errors = |k: usize| 1.0 / (k + 1) as f64;
-        let report = solve(
-            &mut Script {
-                errors: &errors,
-                k: 0,
-            },
-            &stop,
-            &mut |step| {
-                seen.push(step.iteration);
-                if step.iteration == 4 {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
-                }
-            },
-        );
+        let report = solve(&mut Script { errors: &errors, k: 0 }, &stop, &mut |step| {
+            seen.push(step.iteration);
+            if step.iteration == 4 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
         assert_eq!(seen, [0, 1, 2, 3, 4]);
         assert_eq!((report.outcome, report.iterations), (Outcome::Stopped, 4));
     }

@@ -66,10 +66,7 @@ impl<'a> Editor<'a> {
     /// If there is not one point a vertex in both.
     pub fn new(operator: &'a Operator, points: Vec<DVec3>, control: Vec<DVec3>) -> Self {
         let n = operator.len();
-        assert!(
-            points.len() == n && control.len() == n,
-            "one point a vertex"
-        );
+        assert!(points.len() == n && control.len() == n, "one point a vertex");
         let mut editor = Editor {
             operator,
             points,
@@ -148,8 +145,7 @@ impl<'a> Editor<'a> {
             while let Some(v) = self.queue.pop_front() {
                 let i = v as usize;
                 self.marks[i] &= !QUEUED;
-                if self.residual[i].length_squared() > threshold * threshold && relaxations < limit
-                {
+                if self.residual[i].length_squared() > threshold * threshold && relaxations < limit {
                     relaxations += 1;
                     self.relax(i, threshold);
                 }
@@ -161,28 +157,17 @@ impl<'a> Editor<'a> {
                 threshold = self.max_error();
             }
         }
-        Edit {
-            relaxations,
-            touched: self.touched.len(),
-            max_error: self.max_error(),
-            anew,
-        }
+        Edit { relaxations, touched: self.touched.len(), max_error: self.max_error(), anew }
     }
 
     /// The largest residual among the vertices touched.
     fn max_error(&self) -> f64 {
-        let squares = self
-            .touched
-            .iter()
-            .map(|&v| self.residual[v as usize].length_squared());
+        let squares = self.touched.iter().map(|&v| self.residual[v as usize].length_squared());
         squares.fold(0.0, f64::max).sqrt()
     }
 
     fn solve_all(&mut self, tolerance: f64) {
-        let stop = Stop {
-            tolerance,
-            max_iterations: MOST,
-        };
+        let stop = Stop { tolerance, max_iterations: MOST };
         self.control = mixed::solve(self.operator, &self.points, &stop).0;
         self.evaluate();
         (0..self.points.len()).for_each(|i| self.touch(i));
@@ -196,8 +181,7 @@ impl<'a> Editor<'a> {
     }
 
     fn enqueue(&mut self, i: usize, threshold: f64) {
-        if self.residual[i].length_squared() > threshold * threshold && self.marks[i] & QUEUED == 0
-        {
+        if self.residual[i].length_squared() > threshold * threshold && self.marks[i] & QUEUED == 0 {
             self.marks[i] |= QUEUED;
             self.queue.push_back(i as u32);
         }
@@ -236,10 +220,7 @@ pub fn decay(operator: &Operator, vertex: usize, tolerance: f64) -> Vec<f64> {
     seen[vertex] = true;
     let mut ring = vec![vertex];
     while !ring.is_empty() {
-        let largest = ring
-            .iter()
-            .map(|&v| editor.control[v].x.abs())
-            .fold(0.0, f64::max);
+        let largest = ring.iter().map(|&v| editor.control[v].x.abs()).fold(0.0, f64::max);
         if largest <= tolerance {
             break;
         }

@@ -101,10 +101,7 @@ impl Method {
 
     /// Whether the method depends on the vertex order.
     pub fn is_ordered(self) -> bool {
-        matches!(
-            self,
-            Method::GaussSeidel | Method::Sor | Method::Ssor | Method::PcgSsor
-        )
+        matches!(self, Method::GaussSeidel | Method::Sor | Method::Ssor | Method::PcgSsor)
     }
 }
 
@@ -118,13 +115,10 @@ impl FromStr for Method {
     type Err = Error;
 
     fn from_str(s: &str) -> Result<Self, Error> {
-        Method::ALL
-            .into_iter()
-            .find(|m| m.name() == s)
-            .ok_or_else(|| {
-                let names = Method::ALL.map(Method::name).join(", ");
-                Error::Unknown(format!("unknown method \"{s}\"; the methods are {names}"))
-            })
+        Method::ALL.into_iter().find(|m| m.name() == s).ok_or_else(|| {
+            let names = Method::ALL.map(Method::name).join(", ");
+            Error::Unknown(format!("unknown method \"{s}\"; the methods are {names}"))
+        })
     }
 }
 
@@ -208,9 +202,7 @@ pub struct Solution {
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn run(system: &LimitSystem, points: &[DVec3], setup: Setup, stop: &Stop) -> Solution {
-    run_watched(system, points, setup, stop, &mut |_| {
-        ControlFlow::Continue(())
-    })
+    run_watched(system, points, setup, stop, &mut |_| ControlFlow::Continue(()))
 }
 
 /// As [`run`], with a watch that sees every iterate.
@@ -245,11 +237,7 @@ pub fn run_watched(
 
 type Prepared<'a> = (Box<dyn Iterate + 'a>, Option<usize>);
 
-fn prepare<'a>(
-    system: &'a LimitSystem,
-    points: &'a [DVec3],
-    setup: Setup<'a>,
-) -> Result<Prepared<'a>, Failure> {
+fn prepare<'a>(system: &'a LimitSystem, points: &'a [DVec3], setup: Setup<'a>) -> Result<Prepared<'a>, Failure> {
     let method: Box<dyn Iterate + 'a> = match setup {
         Setup::Lu => return direct(system, points, SparseLu::new(system)?),
         Setup::Cholesky => return direct(system, points, Cholesky::new(&system.m, Kind::Llt)?),
@@ -272,11 +260,7 @@ fn prepare<'a>(
     Ok((method, None))
 }
 
-fn cg<'a>(
-    system: &'a LimitSystem,
-    points: &'a [DVec3],
-    preconditioner: Preconditioner,
-) -> Box<dyn Iterate + 'a> {
+fn cg<'a>(system: &'a LimitSystem, points: &'a [DVec3], preconditioner: Preconditioner) -> Box<dyn Iterate + 'a> {
     Box::new(ConjugateGradient::new(system, points, preconditioner))
 }
 
@@ -290,21 +274,11 @@ fn direct<'a, F: Factorization + 'a>(
     Ok((Box::new(method), fill))
 }
 
-fn not_set_up(
-    system: &LimitSystem,
-    points: &[DVec3],
-    failure: Failure,
-    setup_seconds: f64,
-) -> Solution {
+fn not_set_up(system: &LimitSystem, points: &[DVec3], failure: Failure, setup_seconds: f64) -> Solution {
     let errors: Errors = Rows::new(points.len()).errors(system, points, points);
     Solution {
         points: points.to_vec(),
-        report: Report {
-            outcome: failure.outcome,
-            iterations: 0,
-            history: vec![errors],
-            detail: Some(failure.detail),
-        },
+        report: Report { outcome: failure.outcome, iterations: 0, history: vec![errors], detail: Some(failure.detail) },
         setup_seconds,
         solve_seconds: 0.0,
         fill: None,

@@ -59,17 +59,10 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
     let mut correction = filled(n, Vec3A::ZERO);
     let mut scratch = wavefront.scratch();
     // Residuals in units of the tolerance are far from the ends of single precision's range.
-    let unit = if stop.tolerance > 0.0 {
-        stop.tolerance
-    } else {
-        1.0
-    };
+    let unit = if stop.tolerance > 0.0 { stop.tolerance } else { 1.0 };
     let least = operator.bounds().lambda_min.clamp(LOWEST, 1.0);
     let mut interval = (operator.usual_lambda_min().max(least), 1.0);
-    let largest = points
-        .iter()
-        .map(|p| p.length_squared())
-        .fold(0.0, f64::max);
+    let largest = points.iter().map(|p| p.length_squared()).fold(0.0, f64::max);
     let floor = FLOOR * f64::EPSILON * largest.sqrt();
     let mut history: Vec<Errors> = Vec::new();
     let mut iterations = 0;
@@ -80,21 +73,15 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
         let first = recurrence.coefficients().1 as f32;
         let current = if control.is_empty() { points } else { &control };
         let errors = rows
-            .product(
-                operator,
-                current,
-                &mut residual,
-                &mut correction,
-                |i, ax, r, d, tally| {
-                    prefetch(points, i + POINTS_AHEAD);
-                    prefetch(std::slice::from_ref(r), POINTS_AHEAD);
-                    prefetch(std::slice::from_ref(d), POINTS_AHEAD);
-                    let e = points[i] - ax;
-                    tally.error(e);
-                    *r = (e / unit).as_vec3a();
-                    *d = first * *r;
-                },
-            )
+            .product(operator, current, &mut residual, &mut correction, |i, ax, r, d, tally| {
+                prefetch(points, i + POINTS_AHEAD);
+                prefetch(std::slice::from_ref(r), POINTS_AHEAD);
+                prefetch(std::slice::from_ref(d), POINTS_AHEAD);
+                let e = points[i] - ax;
+                tally.error(e);
+                *r = (e / unit).as_vec3a();
+                *d = first * *r;
+            })
             .errors;
         let before = history.last().map(|e| e.max);
         history.push(errors);
@@ -103,60 +90,33 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
         }
         if let Some(before) = before {
             let gain = errors.max / before;
-            let doubtful = interval.0 > least
-                && gain > DOUBT * reduction(interval, count)
-                && errors.max > floor;
+            let doubtful = interval.0 > least && gain > DOUBT * reduction(interval, count) && errors.max > floor;
             if doubtful {
-                let a = (STRETCH * lowest_mode(interval, count, gain))
-                    .max(STEP * interval.0)
-                    .max(least);
+                let a = (STRETCH * lowest_mode(interval, count, gain)).max(STEP * interval.0).max(least);
                 // The correction prepared above begins with the old interval's step.
                 let rescale = {
                     interval = (a.min(interval.0), 1.0);
                     Recurrence::new(interval).coefficients().1 as f32 / first
                 };
-                correction
-                    .par_iter_mut()
-                    .with_min_len(4096)
-                    .for_each(|d| *d *= rescale);
+                correction.par_iter_mut().with_min_len(4096).for_each(|d| *d *= rescale);
             } else if gain > PROGRESS {
                 break Outcome::Stagnated;
             }
         }
-        count = iterations_for(interval, stop.tolerance / errors.max)
-            .min(stop.max_iterations - iterations);
-        wavefront.iterate(
-            Recurrence::new(interval),
-            count,
-            &residual,
-            &mut correction,
-            &mut scratch,
-        );
+        count = iterations_for(interval, stop.tolerance / errors.max).min(stop.max_iterations - iterations);
+        wavefront.iterate(Recurrence::new(interval), count, &residual, &mut correction, &mut scratch);
         iterations += count;
         if control.is_empty() {
-            control = points
-                .par_iter()
-                .zip(&correction)
-                .with_min_len(4096)
-                .map(|(p, d)| *p + unit * d.as_dvec3())
-                .collect();
+            control =
+                points.par_iter().zip(&correction).with_min_len(4096).map(|(p, d)| *p + unit * d.as_dvec3()).collect();
         } else {
-            control
-                .par_iter_mut()
-                .zip(&correction)
-                .with_min_len(4096)
-                .for_each(|(v, d)| *v += unit * d.as_dvec3());
+            control.par_iter_mut().zip(&correction).with_min_len(4096).for_each(|(v, d)| *v += unit * d.as_dvec3());
         }
     };
     if control.is_empty() {
         control = points.to_vec();
     }
-    let report = Report {
-        outcome,
-        iterations,
-        history,
-        detail: None,
-    };
+    let report = Report { outcome, iterations, history, detail: None };
     (control, report)
 }
 

@@ -18,10 +18,7 @@ pub struct Pia<'a, S> {
 impl<'a, S: System> Pia<'a, S> {
     /// Starts from V = P.
     pub fn new(system: &'a S, points: &'a [DVec3], omega: f64) -> Self {
-        Pia {
-            relaxation: Relaxation::new(system, points),
-            omega,
-        }
+        Pia { relaxation: Relaxation::new(system, points), omega }
     }
 }
 
@@ -65,13 +62,9 @@ impl<'a, S: System> Relaxation<'a, S> {
     pub(super) fn prepare(&mut self, scale: impl Fn(usize) -> f64 + Sync) -> Errors {
         let current = &self.current;
         self.rows
-            .residual(
-                self.system,
-                self.points,
-                current,
-                &mut self.next,
-                |i, e, next, _| *next = current[i] + scale(i) * e,
-            )
+            .residual(self.system, self.points, current, &mut self.next, |i, e, next, _| {
+                *next = current[i] + scale(i) * e
+            })
             .errors
     }
 

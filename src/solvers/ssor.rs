@@ -25,14 +25,7 @@ impl<'a, S: System> Ssor<'a, S> {
     /// # Panics
     /// If the order names a vertex that the system lacks.
     pub fn new(system: &'a S, points: &'a [DVec3], omega: f64, order: Option<&'a [u32]>) -> Self {
-        Ssor {
-            system,
-            points,
-            omega,
-            order,
-            current: points.to_vec(),
-            rows: Rows::new(points.len()),
-        }
+        Ssor { system, points, omega, order, current: points.to_vec(), rows: Rows::new(points.len()) }
     }
 }
 
@@ -42,13 +35,7 @@ impl<S: System> Iterate for Ssor<'_, S> {
     }
 
     fn advance(&mut self) -> Result<(), Failure> {
-        symmetric_sweep(
-            self.system,
-            self.points,
-            self.omega,
-            self.order,
-            &mut self.current,
-        );
+        symmetric_sweep(self.system, self.points, self.omega, self.order, &mut self.current);
         Ok(())
     }
 
@@ -58,13 +45,7 @@ impl<S: System> Iterate for Ssor<'_, S> {
 }
 
 /// A forward and a backward sweep.
-pub fn symmetric_sweep<S: System>(
-    system: &S,
-    points: &[DVec3],
-    omega: f64,
-    order: Option<&[u32]>,
-    x: &mut [DVec3],
-) {
+pub fn symmetric_sweep<S: System>(system: &S, points: &[DVec3], omega: f64, order: Option<&[u32]>, x: &mut [DVec3]) {
     match order {
         Some(order) => {
             let vertices = order.iter().map(|&i| i as usize);

@@ -161,11 +161,7 @@ pub struct Rows {
 
 impl Rows {
     pub fn new(n: usize) -> Self {
-        Rows {
-            tallies: vec![Tally::default(); n.div_ceil(CHUNK)],
-            n,
-            shared: Vec::new(),
-        }
+        Rows { tallies: vec![Tally::default(); n.div_ceil(CHUNK)], n, shared: Vec::new() }
     }
 
     /// Calls `visit(i, &mut a[i], &mut b[i], tally)` for every row.
@@ -233,20 +229,10 @@ impl Rows {
         } else if let Some(tally) = tallies.first_mut() {
             run(0, a, b, tally);
         }
-        let total = self
-            .tallies
-            .iter()
-            .fold(Tally::default(), |sum, &t| sum.merge(t));
+        let total = self.tallies.iter().fold(Tally::default(), |sum, &t| sum.merge(t));
         let mean = total.sum / self.n.max(1) as f64;
-        let max = if mean.is_nan() {
-            f64::NAN
-        } else {
-            total.max_squared.sqrt()
-        };
-        Totals {
-            errors: Errors { max, mean },
-            dot: total.dot,
-        }
+        let max = if mean.is_nan() { f64::NAN } else { total.max_squared.sqrt() };
+        Totals { errors: Errors { max, mean }, dot: total.dot }
     }
 
     /// The differences e_i = p_i − (A x)_i are handed to `visit(i, e_i, &mut out[i], tally)` after they were
@@ -269,11 +255,7 @@ impl Rows {
     }
 
     /// As [`pass`](Self::pass), over one array.
-    pub fn pass_one<A: Send>(
-        &mut self,
-        a: &mut [A],
-        visit: impl Fn(usize, &mut A, &mut Tally) + Sync,
-    ) -> Totals {
+    pub fn pass_one<A: Send>(&mut self, a: &mut [A], visit: impl Fn(usize, &mut A, &mut Tally) + Sync) -> Totals {
         let mut nothing = vec![(); a.len()];
         self.pass(a, &mut nothing, |i, a, (), tally| visit(i, a, tally))
     }
@@ -281,7 +263,6 @@ impl Rows {
     /// The error norms of `x` alone.
     pub fn errors<S: System>(&mut self, system: &S, points: &[DVec3], x: &[DVec3]) -> Errors {
         let mut nothing = vec![(); self.n];
-        self.residual(system, points, x, &mut nothing, |_, _, (), _| {})
-            .errors
+        self.residual(system, points, x, &mut nothing, |_, _, (), _| {}).errors
     }
 }

@@ -87,29 +87,17 @@ impl<'a> Wavefront<'a> {
     /// # Panics
     /// If rows reach further than a band.
     pub fn in_bands(operator: &'a Operator, band: Option<usize>) -> Self {
-        assert!(
-            band.is_none_or(|band| operator.reach() <= band),
-            "rows reach no further than a band"
-        );
+        assert!(band.is_none_or(|band| operator.reach() <= band), "rows reach no further than a band");
         // Sums are ordered by blocks of rows.
         let sums = !operator.sums_of(0..operator.len()).is_empty();
-        let band = band.map(|band| {
-            if sums {
-                band.next_multiple_of(BLOCK)
-            } else {
-                band
-            }
-        });
+        let band = band.map(|band| if sums { band.next_multiple_of(BLOCK) } else { band });
         Wavefront { operator, band }
     }
 
     /// Arrays for [`iterate`](Self::iterate), to be used again and again.
     pub fn scratch<P: Point>(&self) -> Scratch<P> {
         let n = self.operator.len();
-        Scratch {
-            other: filled(n, P::ZERO),
-            sums: filled(self.operator.sums_of(0..n).len(), P::ZERO),
-        }
+        Scratch { other: filled(n, P::ZERO), sums: filled(self.operator.sums_of(0..n).len(), P::ZERO) }
     }
 
     /// `count` ≥ 1 iterations for eigenvalues within the interval of `recurrence`, from x = 0. The first of them is
@@ -130,10 +118,7 @@ impl<'a> Wavefront<'a> {
     ) {
         let n = self.operator.len();
         let Scratch { other, sums } = scratch;
-        assert!(
-            r.len() == n && x.len() == n && other.len() == n,
-            "one point a vertex"
-        );
+        assert!(r.len() == n && x.len() == n && other.len() == n, "one point a vertex");
         other.par_chunks_mut(CHUNK).for_each(|c| c.fill(P::ZERO));
         let coefficients: Vec<(f64, f64)> = (1..count)
             .map(|_| {
@@ -142,9 +127,7 @@ impl<'a> Wavefront<'a> {
             })
             .collect();
         let lag = if sums.is_empty() { 2 } else { 3 };
-        let length = self
-            .band
-            .map_or(1, |band| self.group_length::<P>(lag * band));
+        let length = self.band.map_or(1, |band| self.group_length::<P>(lag * band));
         for group in coefficients.chunks(length) {
             match self.band {
                 Some(band) => self.group(band, group, r, (x, other), sums),
@@ -190,15 +173,12 @@ impl<'a> Wavefront<'a> {
                         (at(j)..at(j + 1), cut(&mut rest, seen), start)
                     })
                     .collect();
-                tasks
-                    .into_par_iter()
-                    .with_max_len(1)
-                    .for_each(|(rows, window, start)| {
-                        for i in rows {
-                            let e = p[i] - self.operator.row_within(i, (window, start));
-                            window[i - start] += (omega / diagonal[i]) * e;
-                        }
-                    });
+                tasks.into_par_iter().with_max_len(1).for_each(|(rows, window, start)| {
+                    for i in rows {
+                        let e = p[i] - self.operator.row_within(i, (window, start));
+                        window[i - start] += (omega / diagonal[i]) * e;
+                    }
+                });
             }
         }
     }
@@ -211,27 +191,13 @@ impl<'a> Wavefront<'a> {
     }
 
     /// One iteration: `other` becomes the next one after `x`.
-    fn plain<P: Point>(
-        &self,
-        coefficients: (f64, f64),
-        r: &[P],
-        (x, other): (&[P], &mut [P]),
-        sums: &mut Vec<P>,
-    ) {
+    fn plain<P: Point>(&self, coefficients: (f64, f64), r: &[P], (x, other): (&[P], &mut [P]), sums: &mut Vec<P>) {
         self.operator.all_sums(x, sums);
-        other
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .for_each(|(k, out)| {
-                let update = Update {
-                    rows: k * CHUNK..k * CHUNK + out.len(),
-                    window: (x, 0),
-                    sums: (sums, 0),
-                    out,
-                    coefficients,
-                };
-                self.update(update, r);
-            });
+        other.par_chunks_mut(CHUNK).enumerate().for_each(|(k, out)| {
+            let update =
+                Update { rows: k * CHUNK..k * CHUNK + out.len(), window: (x, 0), sums: (sums, 0), out, coefficients };
+            self.update(update, r);
+        });
     }
 
     /// A group of iterations, band by band. After an odd number of them the last is in `other`, else in `x`.
@@ -286,21 +252,13 @@ impl<'a> Wavefront<'a> {
                     // Whole faces: sums come in ones or in threes.
                     let piece = 3 * PIECE;
                     for (k, sums) in sums.chunks_mut(piece).enumerate() {
-                        tasks.push(Task::Faces {
-                            window,
-                            first: first + k * piece,
-                            sums,
-                        });
+                        tasks.push(Task::Faces { window, first: first + k * piece, sums });
                     }
                 }
             }
             tasks.into_par_iter().for_each(|task| match task {
                 Task::Rows(update) => self.update(update, r),
-                Task::Faces {
-                    window,
-                    first,
-                    sums,
-                } => self.operator.sums(first, window, sums),
+                Task::Faces { window, first, sums } => self.operator.sums(first, window, sums),
             });
         }
     }

@@ -10,9 +10,7 @@ use rayon::prelude::*;
 use super::interpolatory::{RegularMask, SQRT_3, tangents};
 use super::loop_scheme::{refined_topology, split_in_four};
 use super::ring::{Place, Rings, Rule};
-use super::star::{
-    Tangents, next_in_triangle, prev_in_triangle, require_room, require_triangles, twin,
-};
+use super::star::{Tangents, next_in_triangle, prev_in_triangle, require_room, require_triangles, twin};
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
 use crate::pages::large;
@@ -76,12 +74,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     const NAME: &str = "butterfly";
     require_triangles(mesh, topology, NAME)?;
     require_room(mesh, 4)?;
-    let rule = Rule {
-        name: NAME,
-        place: Place::Edge,
-        mask: |n| (CENTER, extraordinary_mask(n)),
-        amplitudes,
-    };
+    let rule = Rule { name: NAME, place: Place::Edge, mask: |n| (CENTER, extraordinary_mask(n)), amplitudes };
     let rings = Rings::new(mesh, topology, rule)?;
     let edges = topology.edge_numbers();
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));

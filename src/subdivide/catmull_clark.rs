@@ -8,9 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::refined::{self, rows};
-use super::star::{
-    Circle, Tangents, centroid, for_each_star, numbers, require_closed, require_room, sides, twin,
-};
+use super::star::{Circle, Tangents, centroid, for_each_star, numbers, require_closed, require_room, sides, twin};
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
 use crate::mesh::incidence::{next_in, prev_in};
@@ -38,9 +36,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     let center = |f| centroid(old, mesh.faces.face(f));
     let mut centers = large(Vec::with_capacity(mesh.faces.len()));
     centers.par_extend(numbers(mesh.faces.len()).map(center));
-    let mut positions = large(Vec::with_capacity(
-        mesh.len() + topology.edges() + centers.len(),
-    ));
+    let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges() + centers.len()));
     positions.par_extend(numbers(mesh.len()).map(|v| {
         let star = incidence.corners_at(v);
         let mut sum = DVec3::ZERO;
@@ -52,8 +48,8 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
         (n - 2.0) / n * old[v] + sum / (n * n)
     }));
     positions.par_extend(edges.firsts().map(|c| {
-        let [one, other] = [c, twin(topology, c)]
-            .map(|c| old[corners[c as usize] as usize] + centers[incidence.face_of(c)]);
+        let [one, other] =
+            [c, twin(topology, c)].map(|c| old[corners[c as usize] as usize] + centers[incidence.face_of(c)]);
         0.25 * one + 0.25 * other
     }));
     positions.par_extend(centers);
@@ -99,10 +95,8 @@ pub fn refine_in_place(mut mesh: Mesh, topology: &Topology) -> Result<Mesh> {
     for v in 0..vertices {
         let star = topology.incidence.corners_at(v);
         let n = star.len() as f64;
-        let neighbors: DVec3 = star
-            .iter()
-            .map(|&c| 4.0 * points[vertices + numbers.of(c) as usize] - points[face_point(c)])
-            .sum();
+        let neighbors: DVec3 =
+            star.iter().map(|&c| 4.0 * points[vertices + numbers.of(c) as usize] - points[face_point(c)]).sum();
         points[v] = ((n * n - 3.0 * n) * points[v] + neighbors) / (n * n);
     }
     let faces = split(&mesh, topology, &numbers);
@@ -174,9 +168,7 @@ pub fn tangent_mask(n: usize) -> Vec<[f64; 2]> {
     let constant = tangent_constant(n);
     let mut circle = Circle::default();
     let circle = circle.of(n);
-    (0..n)
-        .map(|j| [constant * circle[j].x, circle[j].x + circle[(j + 1) % n].x])
-        .collect()
+    (0..n).map(|j| [constant * circle[j].x, circle[j].x + circle[(j + 1) % n].x]).collect()
 }
 
 /// The tangents of the limit surface at all vertices.
@@ -191,11 +183,7 @@ pub fn limit_tangents(mesh: &Mesh, topology: &Topology) -> Result<Vec<Tangents>>
     let corners = mesh.faces.corners();
     let mut tangents = Vec::with_capacity(mesh.len());
     let mut circle = Circle::default();
-    let centers: Vec<DVec3> = mesh
-        .faces
-        .iter()
-        .map(|face| centroid(&mesh.positions, face))
-        .collect();
+    let centers: Vec<DVec3> = mesh.faces.iter().map(|face| centroid(&mesh.positions, face)).collect();
     for_each_star(mesh, topology, |v, star| {
         let n = star.len();
         let constant = tangent_constant(n);

@@ -8,9 +8,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::refined::{self, ends, rows, set_by_edge};
-use super::star::{
-    CHUNK, Circle, Tangents, centroid, for_each_star, require_closed, require_room, twin,
-};
+use super::star::{CHUNK, Circle, Tangents, centroid, for_each_star, require_closed, require_room, twin};
 use crate::Result;
 use crate::mesh::incidence::{split_by_face, split_rows};
 use crate::mesh::{Faces, Mesh, Topology};
@@ -47,26 +45,18 @@ pub fn corner_points(mesh: &Mesh, rule: Rule) -> Vec<DVec3> {
     let mut points = large(Vec::with_capacity(corners.len()));
     points.par_extend(corners.par_iter().map(|_| DVec3::ZERO));
     let parts = split_by_face(&mesh.faces, CHUNK, &mut points);
-    parts
-        .into_par_iter()
-        .for_each_init(Circle::default, |circle, (range, mut part)| {
-            for f in range {
-                let face = mesh.faces.face(f);
-                let (points, rest) = part.split_at_mut(face.len());
-                face_points(&mesh.positions, face, circle.of(face.len()), rule, points);
-                part = rest;
-            }
-        });
+    parts.into_par_iter().for_each_init(Circle::default, |circle, (range, mut part)| {
+        for f in range {
+            let face = mesh.faces.face(f);
+            let (points, rest) = part.split_at_mut(face.len());
+            face_points(&mesh.positions, face, circle.of(face.len()), rule, points);
+            part = rest;
+        }
+    });
     points
 }
 
-fn face_points(
-    positions: &[DVec3],
-    face: &[u32],
-    circle: &[DVec2],
-    rule: Rule,
-    points: &mut [DVec3],
-) {
+fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: Rule, points: &mut [DVec3]) {
     let size = face.len() as f64;
     let (mut sum, mut cosine, mut sine) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
     for (&v, unit) in face.iter().zip(circle) {
@@ -78,9 +68,7 @@ fn face_points(
     for ((&v, unit), new) in face.iter().zip(circle).zip(points) {
         let point = positions[v as usize];
         *new = match rule {
-            Rule::DooSabin => {
-                0.25 * point + (0.75 * sum + 0.5 * (unit.x * cosine + unit.y * sine)) / size
-            }
+            Rule::DooSabin => 0.25 * point + (0.75 * sum + 0.5 * (unit.x * cosine + unit.y * sine)) / size,
             Rule::ZhengCai => 0.5 * (point + sum / size),
         };
     }
@@ -124,30 +112,23 @@ pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
         [next(c), c, next(t), t]
     });
     let parts = split_rows(incidence.offsets(), CHUNK, of_vertices);
-    parts
-        .into_par_iter()
-        .for_each_init(Vec::new, |star, (range, mut part)| {
-            for v in range {
-                topology.star(&mesh.faces, v, star);
-                let (face, rest) = part.split_at_mut(star.len());
-                face.copy_from_slice(star);
-                part = rest;
-            }
-        });
+    parts.into_par_iter().for_each_init(Vec::new, |star, (range, mut part)| {
+        for v in range {
+            topology.star(&mesh.faces, v, star);
+            let (face, rest) = part.split_at_mut(star.len());
+            face.copy_from_slice(star);
+            part = rest;
+        }
+    });
 
-    let mut offsets = large(Vec::with_capacity(
-        mesh.faces.len() + count / 2 + mesh.len() + 1,
-    ));
+    let mut offsets = large(Vec::with_capacity(mesh.faces.len() + count / 2 + mesh.len() + 1));
     offsets.push(0);
     let of_faces = (0..mesh.faces.len()).into_par_iter();
     offsets.par_extend(of_faces.map(|f| mesh.faces.range(f).end as u32));
     offsets.par_extend(ends(count, 4, count / 2));
     let first = 3 * count as u32;
     offsets.par_extend(incidence.offsets()[1..].par_iter().map(|&end| first + end));
-    Ok(Mesh::new(
-        corner_points(mesh, rule),
-        Faces::from_parts(offsets, corners),
-    ))
+    Ok(Mesh::new(corner_points(mesh, rule), Faces::from_parts(offsets, corners)))
 }
 
 /// The topology of `refined`, which is what [`refine_by`] made of `mesh`: that of [`Topology::new`], by index

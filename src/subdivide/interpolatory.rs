@@ -22,12 +22,7 @@ pub(super) struct RegularMask {
 ///
 /// At an extraordinary vertex the rule of both schemes maps the ring to the ring by a circulant, so the first harmonic
 /// of the ring is the mask.
-pub(super) fn tangents(
-    mesh: &Mesh,
-    topology: &Topology,
-    originals: usize,
-    mask: &RegularMask,
-) -> Vec<Tangents> {
+pub(super) fn tangents(mesh: &Mesh, topology: &Topology, originals: usize, mask: &RegularMask) -> Vec<Tangents> {
     let corners = mesh.faces.corners();
     let end = |c: u32| mesh.positions[corners[next_in_triangle(c)] as usize];
     let turned = |c: u32, times: usize| {

@@ -91,12 +91,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     const NAME: &str = "labsik-greiner";
     require_triangles(mesh, topology, NAME)?;
     require_room(mesh, 3)?;
-    let rule = Rule {
-        name: NAME,
-        place: Place::Triangle,
-        mask: extraordinary_mask,
-        amplitudes,
-    };
+    let rule = Rule { name: NAME, place: Place::Triangle, mask: extraordinary_mask, amplitudes };
     let rings = Rings::new(mesh, topology, rule)?;
     let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
     positions.par_extend(&mesh.positions);

@@ -7,8 +7,7 @@ use rayon::prelude::*;
 
 use super::refined::{self, rows};
 use super::star::{
-    Tangents, blend_with_neighbors, blends, prev_in_triangle, require_room, require_triangles,
-    ring_tangents, twin,
+    Tangents, blend_with_neighbors, blends, prev_in_triangle, require_room, require_triangles, ring_tangents, twin,
 };
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;

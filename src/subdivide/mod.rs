@@ -121,13 +121,9 @@ impl Refinement {
     pub fn refined_topology(self, mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
         match self {
             Refinement::CatmullClark => catmull_clark::refined_topology(mesh, topology, refined),
-            Refinement::Loop | Refinement::Butterfly => {
-                loop_scheme::refined_topology(topology, refined)
-            }
+            Refinement::Loop | Refinement::Butterfly => loop_scheme::refined_topology(topology, refined),
             Refinement::DooSabin => doo_sabin::refined_topology(mesh, topology, refined),
-            Refinement::Sqrt3 | Refinement::LabsikGreiner => {
-                sqrt3::refined_topology(mesh, topology, refined)
-            }
+            Refinement::Sqrt3 | Refinement::LabsikGreiner => sqrt3::refined_topology(mesh, topology, refined),
         }
     }
 
@@ -164,9 +160,7 @@ impl Refinement {
         match self {
             Refinement::CatmullClark => catmull_clark::limit_positions(mesh, topology),
             Refinement::Loop => loop_scheme::limit_positions(mesh, topology),
-            Refinement::DooSabin => {
-                doo_sabin::limit_positions(doo_sabin::Rule::DooSabin, mesh, topology)
-            }
+            Refinement::DooSabin => doo_sabin::limit_positions(doo_sabin::Rule::DooSabin, mesh, topology),
             Refinement::Sqrt3 => sqrt3::limit_positions(mesh, topology),
             Refinement::Butterfly | Refinement::LabsikGreiner => {
                 star::require_triangles(mesh, topology, self.name())?;
@@ -187,9 +181,7 @@ impl Refinement {
         match self {
             Refinement::CatmullClark => catmull_clark::limit_normals(mesh, topology),
             Refinement::Loop => loop_scheme::limit_normals(mesh, topology),
-            Refinement::DooSabin => {
-                doo_sabin::limit_normals(doo_sabin::Rule::DooSabin, mesh, topology)
-            }
+            Refinement::DooSabin => doo_sabin::limit_normals(doo_sabin::Rule::DooSabin, mesh, topology),
             Refinement::Sqrt3 => sqrt3::limit_normals(mesh, topology),
             Refinement::Butterfly => butterfly::limit_normals(mesh, topology),
             Refinement::LabsikGreiner => labsik_greiner::limit_normals(mesh, topology),
@@ -210,9 +202,7 @@ impl FromStr for Refinement {
         let found = Refinement::ALL.into_iter().find(|r| r.name() == name);
         found.ok_or_else(|| {
             let known = Refinement::ALL.map(Refinement::name).join(", ");
-            Error::Unknown(format!(
-                "unknown refinement {name:?}: choose one of {known}"
-            ))
+            Error::Unknown(format!("unknown refinement {name:?}: choose one of {known}"))
         })
     }
 }

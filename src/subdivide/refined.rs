@@ -20,9 +20,8 @@ const CHUNK: usize = 4096;
 pub(super) fn of_quads(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
     let (faces, incidence, twin) = (&mesh.faces, &topology.incidence, topology.twins());
     let count = twin.len();
-    let one_face_on_both_sides = (0..count as u32)
-        .into_par_iter()
-        .any(|c| incidence.face_of(c) == incidence.face_of(twin[c as usize]));
+    let one_face_on_both_sides =
+        (0..count as u32).into_par_iter().any(|c| incidence.face_of(c) == incidence.face_of(twin[c as usize]));
     if one_face_on_both_sides {
         return Topology::new(&refined.faces, refined.len());
     }
@@ -30,12 +29,7 @@ pub(super) fn of_quads(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
     let mut twins = large(vec![0; 4 * count]);
     rows(&mut twins).for_each(|(c, quad): (u32, &mut [u32; 4])| {
         let before = prev(c);
-        *quad = [
-            4 * next(twin[c as usize]) + 3,
-            4 * next(c) + 2,
-            4 * before + 1,
-            4 * twin[before as usize],
-        ];
+        *quad = [4 * next(twin[c as usize]) + 3, 4 * next(c) + 2, 4 * before + 1, 4 * twin[before as usize]];
     });
 
     let mut corners = large(vec![0; 4 * count]);
@@ -113,11 +107,7 @@ pub(super) fn of_flips(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
     let mut twins = large(vec![0; 3 * count]);
     rows(&mut twins).for_each(|(c, twins): (u32, &mut [u32; 3])| {
         let t = twin[c as usize];
-        *twins = [
-            3 * next_in_triangle(t) as u32 + 2,
-            3 * t + 1,
-            3 * twin[prev_in_triangle(c)],
-        ];
+        *twins = [3 * next_in_triangle(t) as u32 + 2, 3 * t + 1, 3 * twin[prev_in_triangle(c)]];
     });
 
     let mut corners = large(vec![0; 3 * count]);
@@ -160,11 +150,7 @@ pub(super) fn of_corners(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> To
     let stars = &refined.faces.corners()[3 * count..];
     // Where each corner stands in the face of its vertex.
     let place = Scatter::new(count);
-    stars
-        .par_iter()
-        .enumerate()
-        .with_min_len(CHUNK)
-        .for_each(|(p, &c)| place.set(c, first_star + p as u32));
+    stars.par_iter().enumerate().with_min_len(CHUNK).for_each(|(p, &c)| place.set(c, first_star + p as u32));
     let place = place.into_vec();
     // Of the quad of the edge of c, the corner that is c, and the corner that is next c.
     let in_edge = |c: u32| {
@@ -189,17 +175,9 @@ pub(super) fn of_corners(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> To
     let mut corners = large(vec![0; 4 * count]);
     rows(&mut corners).for_each(|(c, corners): (u32, &mut [u32; 4])| {
         let (leaving, entering) = (in_edge(c) + 1, in_edge(prev(c)));
-        *corners = [
-            c,
-            leaving.min(entering),
-            leaving.max(entering),
-            place[c as usize],
-        ];
+        *corners = [c, leaving.min(entering), leaving.max(entering), place[c as usize]];
     });
-    let offsets = (0..count as u32 + 1)
-        .into_par_iter()
-        .map(|c| 4 * c)
-        .collect();
+    let offsets = (0..count as u32 + 1).into_par_iter().map(|c| 4 * c).collect();
     closed(refined, offsets, corners, twins)
 }
 
@@ -227,31 +205,17 @@ pub(super) fn set_by_edge<const N: usize>(
 }
 
 /// Rows of N entries in parallel, with their numbers.
-pub(super) fn rows<const N: usize>(
-    values: &mut [u32],
-) -> impl IndexedParallelIterator<Item = (u32, &mut [u32; N])> {
+pub(super) fn rows<const N: usize>(values: &mut [u32]) -> impl IndexedParallelIterator<Item = (u32, &mut [u32; N])> {
     let (rows, _) = values.as_chunks_mut();
-    rows.par_iter_mut()
-        .with_min_len(CHUNK)
-        .enumerate()
-        .map(|(k, row)| (k as u32, row))
+    rows.par_iter_mut().with_min_len(CHUNK).enumerate().map(|(k, row)| (k as u32, row))
 }
 
 fn scale(to: &mut [u32], from: &[u32], map: impl Fn(u32) -> u32 + Sync) {
-    to.par_iter_mut()
-        .zip(from)
-        .with_min_len(CHUNK)
-        .for_each(|(to, &c)| *to = map(c));
+    to.par_iter_mut().zip(from).with_min_len(CHUNK).for_each(|(to, &c)| *to = map(c));
 }
 
 /// The ends of `count` rows of `size` entries that begin at `start`.
-pub(super) fn ends(
-    start: usize,
-    size: u32,
-    count: usize,
-) -> impl IndexedParallelIterator<Item = u32> {
+pub(super) fn ends(start: usize, size: u32, count: usize) -> impl IndexedParallelIterator<Item = u32> {
     let start = start as u32;
-    (1..count as u32 + 1)
-        .into_par_iter()
-        .map(move |k| start + size * k)
+    (1..count as u32 + 1).into_par_iter().map(move |k| start + size * k)
 }

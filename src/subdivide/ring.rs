@@ -4,9 +4,7 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::star::{
-    CHUNK, Circle, Harmonics, find_first, next_in_triangle, prev_in_triangle, refuse, twin,
-};
+use super::star::{CHUNK, Circle, Harmonics, find_first, next_in_triangle, prev_in_triangle, refuse, twin};
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
 
@@ -90,14 +88,9 @@ impl<'a> Rings<'a> {
         Ok(Rings {
             mesh,
             topology,
-            valences: vertices()
-                .map(|v| valence(v).min(u8::MAX.into()) as u8)
-                .collect(),
+            valences: vertices().map(|v| valence(v).min(u8::MAX.into()) as u8).collect(),
             masks: (0..=WALKED).map(half).collect(),
-            wide: vertices()
-                .filter(|&v| valence(v) > WALKED)
-                .map(|v| Wide::new(mesh, topology, v, &rule))
-                .collect(),
+            wide: vertices().filter(|&v| valence(v) > WALKED).map(|v| Wide::new(mesh, topology, v, &rule)).collect(),
             rule,
         })
     }

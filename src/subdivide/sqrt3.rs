@@ -8,8 +8,7 @@ use rayon::prelude::*;
 
 use super::refined::{self, rows};
 use super::star::{
-    Tangents, blend_with_neighbors, blends, centroid, numbers, require_room, require_triangles,
-    ring_tangents, twin,
+    Tangents, blend_with_neighbors, blends, centroid, numbers, require_room, require_triangles, ring_tangents, twin,
 };
 use crate::Result;
 use crate::mesh::{Faces, Mesh, Topology};

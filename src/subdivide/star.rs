@@ -19,20 +19,13 @@ const DEGENERATE: f64 = 1e-14;
 /// # Panics
 /// If `topology` is not that of `mesh`.
 pub(crate) fn require_closed(mesh: &Mesh, topology: &Topology) -> Result<()> {
-    assert!(
-        topology.incidence.vertices() == mesh.len(),
-        "the topology is that of the mesh"
-    );
+    assert!(topology.incidence.vertices() == mesh.len(), "the topology is that of the mesh");
     if let Some(edge) = topology.irregular_edges().first() {
         let [v, w] = edge.vertices;
         return refuse(format!(
             "the edge of vertices {v} and {w} has {} face sides{}; subdivision needs a closed, oriented manifold",
             edge.sides,
-            if edge.is_misoriented() {
-                " in the same direction"
-            } else {
-                ""
-            },
+            if edge.is_misoriented() { " in the same direction" } else { "" },
         ));
     }
     if topology.boundary_edges() > 0 {
@@ -60,10 +53,7 @@ pub(crate) fn require_closed(mesh: &Mesh, topology: &Topology) -> Result<()> {
         });
     }
     match first_face(mesh, |size| size < 3) {
-        Some(f) => refuse(format!(
-            "face {f} has {} corners, fewer than three: remove it",
-            mesh.faces.face(f).len()
-        )),
+        Some(f) => refuse(format!("face {f} has {} corners, fewer than three: remove it", mesh.faces.face(f).len())),
         None => Ok(()),
     }
 }
@@ -116,9 +106,7 @@ pub(crate) fn twin(topology: &Topology, c: u32) -> u32 {
 /// The sides (v, next v) of a face.
 pub(crate) fn sides(face: &[u32]) -> impl Iterator<Item = (usize, usize)> + '_ {
     let next = face.iter().cycle().skip(1);
-    face.iter()
-        .zip(next)
-        .map(|(&v, &w)| (v as usize, w as usize))
+    face.iter().zip(next).map(|(&v, &w)| (v as usize, w as usize))
 }
 
 /// The mean of the corners of a face.
@@ -136,11 +124,7 @@ pub(crate) fn by_valence<T>(incidence: &Incidence, mask: impl Fn(usize) -> T) ->
 
 /// `mask(n) = [a, b]` at every vertex of a closed mesh: a times the vertex plus b times the sum of its n
 /// neighbours.
-pub(crate) fn blend_with_neighbors(
-    mesh: &Mesh,
-    topology: &Topology,
-    mask: impl Fn(usize) -> [f64; 2],
-) -> Vec<DVec3> {
+pub(crate) fn blend_with_neighbors(mesh: &Mesh, topology: &Topology, mask: impl Fn(usize) -> [f64; 2]) -> Vec<DVec3> {
     blends(mesh, topology, mask).collect()
 }
 
@@ -176,11 +160,7 @@ pub(crate) fn neighbor_sum(mesh: &Mesh, topology: &Topology, v: usize) -> (usize
 }
 
 /// Calls `visit(v, corners)` for every vertex with its corners in counter-clockwise order.
-pub(crate) fn for_each_star(
-    mesh: &Mesh,
-    topology: &Topology,
-    mut visit: impl FnMut(usize, &[u32]),
-) {
+pub(crate) fn for_each_star(mesh: &Mesh, topology: &Topology, mut visit: impl FnMut(usize, &[u32])) {
     let mut star = Vec::new();
     for v in 0..mesh.len() {
         topology.star(&mesh.faces, v, &mut star);
@@ -224,17 +204,9 @@ pub(crate) struct Harmonics {
 
 impl Harmonics {
     /// Of points at every `stride`-th place of `circle`.
-    pub(crate) fn of(
-        ring: impl ExactSizeIterator<Item = DVec3>,
-        circle: &[DVec2],
-        stride: usize,
-    ) -> Self {
+    pub(crate) fn of(ring: impl ExactSizeIterator<Item = DVec3>, circle: &[DVec2], stride: usize) -> Self {
         let share = 1.0 / ring.len() as f64;
-        let mut found = Harmonics {
-            mean: DVec3::ZERO,
-            once: [DVec3::ZERO; 2],
-            twice: [DVec3::ZERO; 2],
-        };
+        let mut found = Harmonics { mean: DVec3::ZERO, once: [DVec3::ZERO; 2], twice: [DVec3::ZERO; 2] };
         for (j, point) in ring.enumerate() {
             let point = share * point;
             let [once, twice] = places(circle, stride * j);
@@ -296,11 +268,7 @@ impl Tangents {
     pub fn normal(&self) -> DVec3 {
         let cross = self.cosine.cross(self.sine);
         let length = cross.length();
-        if length > DEGENERATE * self.reach * self.reach {
-            cross / length
-        } else {
-            DVec3::ZERO
-        }
+        if length > DEGENERATE * self.reach * self.reach { cross / length } else { DVec3::ZERO }
     }
 }
 

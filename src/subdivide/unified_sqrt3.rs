@@ -4,10 +4,7 @@
 use rayon::prelude::*;
 
 use super::sqrt3::{flip, relaxation};
-use super::star::{
-    by_valence, centroid, find_first, neighbor_sum, numbers, refuse, require_room,
-    require_triangles,
-};
+use super::star::{by_valence, centroid, find_first, neighbor_sum, numbers, refuse, require_room, require_triangles};
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
 use crate::pages::large;

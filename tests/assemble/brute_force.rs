@@ -37,19 +37,10 @@ fn hold_against_masks(system: &LimitSystem, scheme: Scheme, mesh: &Mesh, what: &
 fn rows_are_the_limit_masks_on_random_meshes() {
     for scheme in Scheme::ALL {
         (0..150u64).into_par_iter().for_each(|seed| {
-            let large = if scheme.needs_triangles() {
-                random_triangulation(seed)
-            } else {
-                random_polygons(seed)
-            };
+            let large = if scheme.needs_triangles() { random_triangulation(seed) } else { random_polygons(seed) };
             for mesh in [small_mesh(scheme, seed), large] {
                 let mesh = scattered(&mesh, seed);
-                hold_against_masks(
-                    &system(&mesh, scheme),
-                    scheme,
-                    &mesh,
-                    &format!("seed {seed}"),
-                );
+                hold_against_masks(&system(&mesh, scheme), scheme, &mesh, &format!("seed {seed}"));
             }
         });
     }
@@ -107,9 +98,7 @@ fn extrapolate(scheme: Scheme, valence: usize, x: &[DVec3]) -> DVec3 {
     let determinant = a * c - b * b;
     let s = (f * c - b * g) / determinant;
     let p = (a * g - b * f) / determinant;
-    let [.., before, last, next] = x else {
-        unreachable!("at least three levels")
-    };
+    let [.., before, last, next] = x else { unreachable!("at least three levels") };
     (*next - s * *last + p * *before) / (1.0 - s + p)
 }
 
@@ -139,10 +128,7 @@ fn plain_refinement_ends_where_the_rows_say() {
                 let limit = extrapolate(scheme, incidence.face_count(v), &path);
                 let row = system.a.row_times(v, &mesh.positions);
                 let error = (row - limit).length();
-                assert!(
-                    error < EXTRAPOLATION,
-                    "{scheme} {seed}, vertex {v}: {error:e}"
-                );
+                assert!(error < EXTRAPOLATION, "{scheme} {seed}, vertex {v}: {error:e}");
                 assert!((path[4] - row).length() < (path[0] - row).length() || error == 0.0);
             }
         }
@@ -152,10 +138,7 @@ fn plain_refinement_ends_where_the_rows_say() {
 /// Under Doo-Sabin the face of a vertex shrinks to the limit point, and its centroid stays where the first step put it.
 #[test]
 fn the_faces_of_vertices_shrink_to_where_the_rows_say() {
-    for (scheme, rule) in [
-        (Scheme::Nasri, Rule::DooSabin),
-        (Scheme::ZhengCai, Rule::ZhengCai),
-    ] {
+    for (scheme, rule) in [(Scheme::Nasri, Rule::DooSabin), (Scheme::ZhengCai, Rule::ZhengCai)] {
         for seed in 0..8 {
             let mesh = scattered(&small_polygons(seed), seed);
             let (system, topology) = (system(&mesh, scheme), topology(&mesh));
@@ -164,26 +147,14 @@ fn the_faces_of_vertices_shrink_to_where_the_rows_say() {
             for v in 0..mesh.len() {
                 let row = system.a.row_times(v, &mesh.positions);
                 let face = mesh.faces.len() + topology.edges() + v;
-                let corners = |m: &Mesh| -> Vec<DVec3> {
-                    m.faces
-                        .face(face)
-                        .iter()
-                        .map(|&c| m.positions[c as usize])
-                        .collect()
-                };
+                let corners =
+                    |m: &Mesh| -> Vec<DVec3> { m.faces.face(face).iter().map(|&c| m.positions[c as usize]).collect() };
                 let (before, after) = (corners(&once), corners(&fine));
                 let mean = after.iter().sum::<DVec3>() / after.len() as f64;
-                assert!(
-                    (mean - row).length() <= tol::rounding(64),
-                    "{scheme} {seed}, vertex {v}"
-                );
+                assert!((mean - row).length() <= tol::rounding(64), "{scheme} {seed}, vertex {v}");
                 // Three halvings, in the norm in which the circulant is normal.
                 let radius = |points: &[DVec3]| -> f64 {
-                    points
-                        .iter()
-                        .map(|p| (*p - row).length_squared())
-                        .sum::<f64>()
-                        .sqrt()
+                    points.iter().map(|p| (*p - row).length_squared()).sum::<f64>().sqrt()
                 };
                 assert!(radius(&after) <= radius(&before) / 8.0 + tol::rounding(64));
             }

@@ -27,9 +27,7 @@ fn difference(ours: &Csr, plain: &CsrMatrix<f64>, scale: impl Fn(usize) -> f64) 
         for (j, x) in ours.row(i) {
             theirs[j] -= x;
         }
-        largest = theirs
-            .iter()
-            .fold(largest, |l, d| l.max(d.abs() / scale(i)));
+        largest = theirs.iter().fold(largest, |l, d| l.max(d.abs() / scale(i)));
     }
     largest
 }
@@ -37,52 +35,30 @@ fn difference(ours: &Csr, plain: &CsrMatrix<f64>, scale: impl Fn(usize) -> f64) 
 fn hold_against_formulas(system: &LimitSystem, scheme: Scheme, mesh: &Mesh, what: &str) {
     let plain = assemble(scheme, mesh);
     for (ours, theirs) in system.h.iter().zip(&plain.h) {
-        assert!(
-            (ours - theirs).abs() <= tol::rounding(1) * theirs,
-            "{scheme}, {what}: H"
-        );
+        assert!((ours - theirs).abs() <= tol::rounding(1) * theirs, "{scheme}, {what}: H");
     }
     // All faces at a vertex add to its diagonal entry.
-    let terms = (0..mesh.len())
-        .map(|i| system.a.row(i).len())
-        .max()
-        .unwrap();
+    let terms = (0..mesh.len()).map(|i| system.a.row(i).len()).max().unwrap();
     let a = difference(&system.a, &plain.a, |_| 1.0);
-    assert!(
-        a <= tol::rounding(terms),
-        "{scheme}, {what}: A differs by {a:e}"
-    );
+    assert!(a <= tol::rounding(terms), "{scheme}, {what}: A differs by {a:e}");
     let m = difference(&system.m, &plain.m, |i| 1.0 / plain.h[i]);
-    assert!(
-        m <= tol::rounding(terms),
-        "{scheme}, {what}: M differs by {m:e} of its row sum"
-    );
+    assert!(m <= tol::rounding(terms), "{scheme}, {what}: M differs by {m:e} of its row sum");
 }
 
 fn hold_identities(system: &LimitSystem, scheme: Scheme, what: &str) {
     let n = system.len();
     assert!(system.h.iter().all(|&h| h > 0.0 && h.is_finite()));
-    assert!(
-        system.a.values().iter().all(|&a| a >= 0.0),
-        "{scheme}, {what}: a negative entry"
-    );
+    assert!(system.a.values().iter().all(|&a| a >= 0.0), "{scheme}, {what}: a negative entry");
     let mut columns = vec![0.0; n];
     let mut largest_column = vec![0usize; n];
     for i in 0..n {
         let sum: f64 = system.a.row_values(i).iter().sum();
         let error = (sum - 1.0).abs();
-        assert!(
-            error <= tol::rounding(system.a.row(i).len()),
-            "{scheme}, {what}: row {i} sums to 1 + {error:e}"
-        );
+        assert!(error <= tol::rounding(system.a.row(i).len()), "{scheme}, {what}: row {i} sums to 1 + {error:e}");
         assert_eq!(system.diagonal[i], system.a.get(i, i));
         for ((j, a), (k, m)) in system.a.row(i).zip(system.m.row(i)) {
             assert_eq!((j, a), (k, system.h[i] * m), "{scheme}, {what}: A = H·M");
-            assert_eq!(
-                m.to_bits(),
-                system.m.get(j, i).to_bits(),
-                "{scheme}, {what}: M = Mᵀ"
-            );
+            assert_eq!(m.to_bits(), system.m.get(j, i).to_bits(), "{scheme}, {what}: M = Mᵀ");
             columns[j] += a / system.h[i];
             largest_column[j] += 1;
         }
@@ -90,10 +66,7 @@ fn hold_identities(system: &LimitSystem, scheme: Scheme, what: &str) {
     // w = H⁻¹1: wᵀA = wᵀ.
     for (j, sum) in columns.iter().enumerate() {
         let error = (sum * system.h[j] - 1.0).abs();
-        assert!(
-            error <= tol::rounding(largest_column[j]),
-            "{scheme}, {what}: wᵀA, column {j}"
-        );
+        assert!(error <= tol::rounding(largest_column[j]), "{scheme}, {what}: wᵀA, column {j}");
     }
 }
 
@@ -113,11 +86,7 @@ fn systems_are_those_of_the_formulas() {
 fn identities_hold_at_large_valences_and_on_large_faces() {
     for scheme in Scheme::ALL {
         (0..60u64).into_par_iter().for_each(|seed| {
-            let mesh = if scheme.needs_triangles() {
-                random_triangulation(seed)
-            } else {
-                random_polygons(seed)
-            };
+            let mesh = if scheme.needs_triangles() { random_triangulation(seed) } else { random_polygons(seed) };
             hold_identities(&system(&mesh, scheme), scheme, &format!("seed {seed}"));
         });
     }
@@ -136,20 +105,10 @@ fn everything_counts_with_multiplicity() {
 
     let doubled = double_torus_row(5);
     // Two edges, and all four faces of each.
-    assert_eq!(
-        system(&doubled, Scheme::CatmullClark).m.get(0, 5),
-        2.0 * 2.0 + 4.0
-    );
+    assert_eq!(system(&doubled, Scheme::CatmullClark).m.get(0, 5), 2.0 * 2.0 + 4.0);
 
     let mut meshes = vec![spliced, doubled, double_torus_row(3)];
-    for name in [
-        "tetrahedron",
-        "bipyramid:3",
-        "octahedron",
-        "prism:3",
-        "torus:3x3",
-        "tri-torus:3x3",
-    ] {
+    for name in ["tetrahedron", "bipyramid:3", "octahedron", "prism:3", "torus:3x3", "tri-torus:3x3"] {
         meshes.push(built_in(name));
     }
     for k in [50, 400] {
@@ -248,10 +207,7 @@ fn renumbering_vertices_permutes_the_system() {
         for seed in 0..20 {
             let mesh = small_mesh(scheme, seed);
             let order = Order::Random(seed + 7).order(&mesh, &topology(&mesh).incidence);
-            let (before, after) = (
-                system(&mesh, scheme),
-                system(&permute_vertices(&mesh, &order), scheme),
-            );
+            let (before, after) = (system(&mesh, scheme), system(&permute_vertices(&mesh, &order), scheme));
             for (k, &i) in order.iter().enumerate() {
                 assert_eq!(after.h[k], before.h[i as usize]);
                 assert_eq!(after.a.row(k).len(), before.a.row(i as usize).len());
@@ -269,18 +225,11 @@ fn systems_do_not_depend_on_the_number_of_threads() {
     let mesh = noisy("irregular-tri:20000");
     for scheme in Scheme::ALL {
         let systems = [1, 2, 3].map(|threads| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| system(&mesh, scheme))
         });
         for other in &systems[1..] {
-            assert_eq!(
-                (&systems[0].a, &systems[0].m),
-                (&other.a, &other.m),
-                "{scheme}"
-            );
+            assert_eq!((&systems[0].a, &systems[0].m), (&other.a, &other.m), "{scheme}");
         }
     }
 }

@@ -26,10 +26,7 @@ fn loop_and_sqrt3_name_the_first_face_that_is_no_triangle() {
             };
             let line = refused(&mesh, scheme);
             let size = mesh.faces.face(first).len();
-            assert!(
-                line.contains(&format!("face {first} has {size} corners")),
-                "{line}"
-            );
+            assert!(line.contains(&format!("face {first} has {size} corners")), "{line}");
             assert!(line.contains("--scheme catmull-clark"), "{line}");
         }
     }
@@ -43,9 +40,7 @@ fn open_torus() -> Mesh {
         .map(|(_, face)| face.to_vec())
         .collect();
     // Vertex 40 has no face left: it goes.
-    let faces = kept
-        .iter()
-        .map(|f| f.iter().map(|&v| v - u32::from(v > 40)).collect::<Vec<_>>());
+    let faces = kept.iter().map(|f| f.iter().map(|&v| v - u32::from(v > 40)).collect::<Vec<_>>());
     let mut positions = mesh.positions;
     positions.remove(40);
     Mesh::new(positions, Faces::from_lists(faces))
@@ -56,10 +51,7 @@ fn an_open_mesh_needs_masks_of_edges_alone() {
     let mesh = open_torus();
     for scheme in [Scheme::CatmullClark, Scheme::Nasri, Scheme::ZhengCai] {
         let line = refused(&mesh, scheme);
-        assert!(
-            line.contains("boundary edges") && line.contains("--boundary as-interior"),
-            "{line}"
-        );
+        assert!(line.contains("boundary edges") && line.contains("--boundary as-interior"), "{line}");
     }
     let line = validate(&mesh, None, Boundary::Refuse).summary_line();
     assert!(line.contains("--boundary as-interior"), "{line}");
@@ -74,10 +66,7 @@ fn an_open_mesh_needs_masks_of_edges_alone() {
             assert!((sum - 1.0).abs() <= tol::rounding(8), "{scheme}, row {i}");
             assert_eq!(system.a.row(i).len(), theirs.nnz());
             for (&j, &a) in theirs.col_indices().iter().zip(theirs.values()) {
-                assert!(
-                    (system.a.get(i, j) - a).abs() <= tol::rounding(2),
-                    "{scheme}"
-                );
+                assert!((system.a.get(i, j) - a).abs() <= tol::rounding(2), "{scheme}");
                 assert_eq!(system.m.get(i, j).to_bits(), system.m.get(j, i).to_bits());
             }
         }

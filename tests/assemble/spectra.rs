@@ -22,22 +22,11 @@ fn all_eigenvalues_keep_to_the_proven_bounds() {
             let slack = tol::eigenvalues(mesh.len(), 4.0);
             let what = format!("{scheme}, seed {seed}, {} vertices", mesh.len());
             let (min, max) = (values[0], values[values.len() - 1]);
-            assert!(
-                min >= bounds.lambda_min - slack,
-                "{what}: {min} < {}",
-                bounds.lambda_min
-            );
+            assert!(min >= bounds.lambda_min - slack, "{what}: {min} < {}", bounds.lambda_min);
             assert!(max <= bounds.lambda_max + slack, "{what}: {max}");
-            assert!(
-                (max - 1.0).abs() <= slack,
-                "{what}: the constant vector has {max}"
-            );
+            assert!((max - 1.0).abs() <= slack, "{what}: the constant vector has {max}");
             let largest = jacobi[jacobi.len() - 1];
-            assert!(
-                largest <= bounds.jacobi_lambda_max + slack,
-                "{what}: {largest} > {}",
-                bounds.jacobi_lambda_max
-            );
+            assert!(largest <= bounds.jacobi_lambda_max + slack, "{what}: {largest} > {}", bounds.jacobi_lambda_max);
             // Thall's ω = ½ needs less than 4, always.
             assert!(largest < 4.0, "{what}");
         }
@@ -51,16 +40,8 @@ fn the_library_s_dense_eigenvalues_are_those_of_another_library() {
             let mesh = small_mesh(scheme, seed);
             let ours = dense::eigenvalues(&system(&mesh, scheme)).unwrap();
             let plain = assemble(scheme, &mesh);
-            for (a, b) in [
-                (&ours.a, plain.eigenvalues()),
-                (&ours.jacobi, plain.jacobi_eigenvalues()),
-            ] {
-                assert_close(
-                    a,
-                    &b,
-                    tol::eigenvalues(mesh.len(), 4.0),
-                    &format!("{scheme} {seed}"),
-                );
+            for (a, b) in [(&ours.a, plain.eigenvalues()), (&ours.jacobi, plain.jacobi_eigenvalues())] {
+                assert_close(a, &b, tol::eigenvalues(mesh.len(), 4.0), &format!("{scheme} {seed}"));
             }
         }
     }
@@ -78,10 +59,7 @@ fn symbol(scheme: Scheme, triangles: bool, rows: usize, columns: usize) -> Vec<f
     let mut values = Vec::new();
     for i in 0..rows {
         for j in 0..columns {
-            let (s, t) = (
-                TAU * i as f64 / rows as f64,
-                TAU * j as f64 / columns as f64,
-            );
+            let (s, t) = (TAU * i as f64 / rows as f64, TAU * j as f64 / columns as f64);
             let six = s.cos() + t.cos() + (s + t).cos();
             values.push(match (scheme, triangles) {
                 (Scheme::CatmullClark, false) => (2.0 + s.cos()) * (2.0 + t.cos()) / 9.0,
@@ -107,12 +85,7 @@ fn hold_against_symbol(mesh: &Mesh, scheme: Scheme, triangles: bool, rows: usize
     // The diagonal is constant, so D⁻¹A is a multiple of A.
     let own = symbol_diagonal(scheme, triangles);
     let scaled: Vec<f64> = expected.iter().map(|l| l / own).collect();
-    assert_close(
-        &ours.jacobi,
-        &scaled,
-        tol::eigenvalues(mesh.len(), 3.0),
-        &what,
-    );
+    assert_close(&ours.jacobi, &scaled, tol::eigenvalues(mesh.len(), 3.0), &what);
 }
 
 fn symbol_diagonal(scheme: Scheme, triangles: bool) -> f64 {
@@ -148,17 +121,10 @@ fn torus_spectra_in_closed_form() {
 #[test]
 fn bounds_that_are_attained() {
     let smallest = |mesh: &Mesh, scheme| dense::eigenvalues(&system(mesh, scheme)).unwrap().a[0];
-    for (scheme, expected) in [
-        (Scheme::CatmullClark, 1.0 / 9.0),
-        (Scheme::Nasri, 0.25),
-        (Scheme::ZhengCai, 0.5),
-    ] {
+    for (scheme, expected) in [(Scheme::CatmullClark, 1.0 / 9.0), (Scheme::Nasri, 0.25), (Scheme::ZhengCai, 0.5)] {
         let mesh = built_in("torus:6x8");
         let slack = tol::eigenvalues(mesh.len(), 1.0);
-        assert!(
-            (smallest(&mesh, scheme) - expected).abs() <= slack,
-            "{scheme}"
-        );
+        assert!((smallest(&mesh, scheme) - expected).abs() <= slack, "{scheme}");
         let bound = system(&mesh, scheme).bounds.lambda_min;
         assert!((bound - expected).abs() <= tol::rounding(1), "{scheme}");
     }
@@ -171,10 +137,7 @@ fn bounds_that_are_attained() {
     }
     // At valence 3 the bounds 1/10 and 1/16 are not attained.
     let mesh = built_in("tetrahedron");
-    for (scheme, bound, value) in [
-        (Scheme::Loop, 0.1, 0.2),
-        (Scheme::Sqrt3, 1.0 / 16.0, 1.0 / 6.0),
-    ] {
+    for (scheme, bound, value) in [(Scheme::Loop, 0.1, 0.2), (Scheme::Sqrt3, 1.0 / 16.0, 1.0 / 6.0)] {
         assert!((system(&mesh, scheme).bounds.lambda_min - bound).abs() <= tol::rounding(1));
         assert!((smallest(&mesh, scheme) - value).abs() <= tol::eigenvalues(4, 1.0));
     }

@@ -18,9 +18,7 @@ pub struct Plain {
 
 /// A face side of the mesh, from a vertex to the next.
 fn sides(mesh: &Mesh) -> impl Iterator<Item = (usize, usize)> {
-    mesh.faces.iter().flat_map(|face| {
-        (0..face.len()).map(|k| (face[k] as usize, face[(k + 1) % face.len()] as usize))
-    })
+    mesh.faces.iter().flat_map(|face| (0..face.len()).map(|k| (face[k] as usize, face[(k + 1) % face.len()] as usize)))
 }
 
 /// How often every pair of vertices is joined: two sides make an edge, and so does a single one on a boundary.
@@ -122,12 +120,7 @@ impl Plain {
 
     /// The eigenvalues of D⁻¹A = diag(M)⁻¹M, ascending.
     pub fn jacobi_eigenvalues(&self) -> Vec<f64> {
-        let scale: Vec<f64> = self
-            .dense_m()
-            .diagonal()
-            .map(|d| 1.0 / d.sqrt())
-            .as_slice()
-            .to_vec();
+        let scale: Vec<f64> = self.dense_m().diagonal().map(|d| 1.0 / d.sqrt()).as_slice().to_vec();
         self.scaled_eigenvalues(&scale)
     }
 

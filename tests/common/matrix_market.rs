@@ -6,13 +6,8 @@ use std::path::Path;
 pub fn read_array(path: &Path) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();
-    assert_eq!(
-        lines.next(),
-        Some("%%MatrixMarket matrix array real general")
-    );
-    let mut numbers = lines
-        .filter(|l| !l.starts_with('%'))
-        .flat_map(str::split_whitespace);
+    assert_eq!(lines.next(), Some("%%MatrixMarket matrix array real general"));
+    let mut numbers = lines.filter(|l| !l.starts_with('%')).flat_map(str::split_whitespace);
     let mut size = || numbers.next().unwrap().parse::<usize>().unwrap();
     let (rows, columns) = (size(), size());
     let values: Vec<f64> = numbers.map(|t| t.parse().unwrap()).collect();

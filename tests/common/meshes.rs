@@ -3,8 +3,7 @@
 use glam::DVec3;
 use limitlab::assemble::{LimitSystem, Scheme};
 use limitlab::mesh::generate::{
-    connected_sum, dual, flip_edges, merge_faces, permute_vertices, quad_split, ring_sphere,
-    shuffle_faces, union,
+    connected_sum, dual, flip_edges, merge_faces, permute_vertices, quad_split, ring_sphere, shuffle_faces, union,
 };
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Faces, Mesh, Topology, builtin};
@@ -72,11 +71,7 @@ pub fn small_polygons(seed: u64) -> Mesh {
 
 /// A random mesh on which `scheme` is defined.
 pub fn small_mesh(scheme: Scheme, seed: u64) -> Mesh {
-    if scheme.needs_triangles() {
-        small_triangles(seed)
-    } else {
-        small_polygons(seed)
-    }
+    if scheme.needs_triangles() { small_triangles(seed) } else { small_polygons(seed) }
 }
 
 fn renumbered(mesh: &Mesh, seed: u64) -> Mesh {
@@ -86,9 +81,7 @@ fn renumbered(mesh: &Mesh, seed: u64) -> Mesh {
 
 pub fn random_points(count: usize, seed: u64) -> Vec<DVec3> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed + 7300);
-    (0..count)
-        .map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0))))
-        .collect()
+    (0..count).map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))).collect()
 }
 
 /// The same faces at random points.
@@ -100,26 +93,14 @@ pub fn scattered(mesh: &Mesh, seed: u64) -> Mesh {
 /// The validator refuses it, since a file cannot tell the two edges apart; the masks do not need to.
 pub fn double_torus_row(m: u32) -> Mesh {
     let at = |i: u32, j: u32| (i % 2) * m + j % m;
-    let faces = (0..2).flat_map(|i| {
-        (0..m).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)])
-    });
-    Mesh::new(
-        random_points(2 * m as usize, 1),
-        Faces::from_lists(faces.collect::<Vec<_>>()),
-    )
+    let faces = (0..2).flat_map(|i| (0..m).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
+    Mesh::new(random_points(2 * m as usize, 1), Faces::from_lists(faces.collect::<Vec<_>>()))
 }
 
 /// Two cubes, each with an edge cut open, joined at the loose ends: a valid mesh with two octagons that share two
 /// edges, all valences 3, bipartite.
 pub fn spliced_cubes() -> Mesh {
-    let cube = [
-        [0, 3, 2, 1],
-        [4, 5, 6, 7],
-        [0, 1, 5, 4],
-        [1, 2, 6, 5],
-        [2, 3, 7, 6],
-        [3, 0, 4, 7],
-    ];
+    let cube = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
     // Edges 0–1 and 8–9 go, edges 1–8 and 0–9 come: faces 0 and 2 of the one cube join those of the other.
     let mut faces: Vec<Vec<u32>> = Vec::new();
     for shift in [0, 8] {

@@ -13,11 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::{distance, noisy, topology};
 
 /// All points, nothing else.
-const ALL: Constraints = Constraints {
-    interpolated: None,
-    normals: None,
-    handles: None,
-};
+const ALL: Constraints = Constraints { interpolated: None, normals: None, handles: None };
 
 /// Rounding of a system of some thousand unknowns, for points of size 1.
 const SOLVED: f64 = 1e-10;
@@ -44,22 +40,14 @@ fn the_fit_meets_points_and_normals() {
         let wanted: Vec<Option<DVec3>> = before
             .iter()
             .enumerate()
-            .map(|(v, n)| {
-                (v % 2 == 0).then(|| *n + 0.3 * DVec3::new((v as f64).sin(), 0.5, (v as f64).cos()))
-            })
+            .map(|(v, n)| (v % 2 == 0).then(|| *n + 0.3 * DVec3::new((v as f64).sin(), 0.5, (v as f64).cos())))
             .collect();
-        let wishes = Constraints {
-            normals: Some(&wanted),
-            ..ALL
-        };
+        let wishes = Constraints { normals: Some(&wanted), ..ALL };
         let with = fit(&fairness, &mesh.positions, &wishes, Weights::default()).unwrap();
         let (limits, found) = limits_and_normals(&with.mesh, mesh.len());
         assert!(distance(&limits, &mesh.positions) < SOLVED);
         for (n, wanted) in found.iter().zip(&wanted) {
-            assert!(
-                wanted.is_none_or(|w| n.cross(w.normalize()).length() < 1e-8),
-                "{name}"
-            );
+            assert!(wanted.is_none_or(|w| n.cross(w.normalize()).length() < 1e-8), "{name}");
         }
         // A further constraint costs energy.
         let weights = Weights::default();
@@ -73,14 +61,8 @@ fn the_fit_meets_points_and_normals() {
 fn the_fit_is_the_fairest() {
     for (name, weights) in MESHES.iter().zip([
         Weights::default(),
-        Weights {
-            thin_plate: 1.0,
-            membrane: 0.01,
-        },
-        Weights {
-            thin_plate: 0.0,
-            membrane: 1.0,
-        },
+        Weights { thin_plate: 1.0, membrane: 0.01 },
+        Weights { thin_plate: 0.0, membrane: 1.0 },
         Weights::default(),
     ]) {
         let mesh = noisy(name);
@@ -90,9 +72,9 @@ fn the_fit_is_the_fairest() {
         let fine = topology(&best.mesh);
         for _ in 0..5 {
             let mut step = best.mesh.clone();
-            step.positions.iter_mut().for_each(|p| {
-                *p = DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))
-            });
+            step.positions
+                .iter_mut()
+                .for_each(|p| *p = DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0))));
             // The own weight n/(n+5) takes the limit of each original vertex to zero; rings are disjoint.
             let limits = catmull_clark::limit_positions(&step, &fine).unwrap();
             for (v, limit) in limits[..mesh.len()].iter().enumerate() {
@@ -100,33 +82,19 @@ fn the_fit_is_the_fairest() {
                 step.positions[v] -= (n + 5.0) / n * *limit;
             }
             let gradient = |k: &limitlab::assemble::Csr| -> f64 {
-                (0..best.mesh.len())
-                    .map(|i| step.positions[i].dot(k.row_times(i, &best.mesh.positions)))
-                    .sum()
+                (0..best.mesh.len()).map(|i| step.positions[i].dot(k.row_times(i, &best.mesh.positions))).sum()
             };
             let (thin, membrane) = (gradient(&fairness.thin_plate), gradient(&fairness.membrane));
             let slope = weights.thin_plate * thin + weights.membrane * membrane;
-            let scale = best.energies.weighted(weights)
-                + fairness.energies(&step.positions).weighted(weights);
+            let scale = best.energies.weighted(weights) + fairness.energies(&step.positions).weighted(weights);
             assert!(slope.abs() < SOLVED * scale, "{name} {slope:e} {scale:e}");
         }
         let system = LimitSystem::new(&mesh, &topology(&mesh), Scheme::CatmullClark).unwrap();
-        let solution = run(
-            &system,
-            &mesh.positions,
-            Setup::Lu,
-            &Stop {
-                tolerance: 1e-12,
-                max_iterations: 10,
-            },
-        );
+        let solution = run(&system, &mesh.positions, Setup::Lu, &Stop { tolerance: 1e-12, max_iterations: 10 });
         if solution.report.outcome == Outcome::Converged {
             let control = Mesh::new(solution.points, mesh.faces.clone());
             let other = fairness.energies_of(&control).unwrap();
-            assert!(
-                best.energies.weighted(weights) <= other.weighted(weights),
-                "{name}"
-            );
+            assert!(best.energies.weighted(weights) <= other.weighted(weights), "{name}");
         } else {
             assert_eq!(*name, "cube");
         }
@@ -149,19 +117,9 @@ fn the_fit_follows_affine_maps() {
 fn weights_and_normals_without_sense_are_errors() {
     let mesh = builtin::icosahedron();
     let fairness = Fairness::new(&mesh).unwrap();
-    for (thin_plate, membrane) in [
-        (1.0, 0.0),
-        (-1.0, 1.0),
-        (f64::NAN, 1.0),
-        (1.0, f64::INFINITY),
-    ] {
-        let weights = Weights {
-            thin_plate,
-            membrane,
-        };
-        let text = fit(&fairness, &mesh.positions, &ALL, weights)
-            .unwrap_err()
-            .to_string();
+    for (thin_plate, membrane) in [(1.0, 0.0), (-1.0, 1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY)] {
+        let weights = Weights { thin_plate, membrane };
+        let text = fit(&fairness, &mesh.positions, &ALL, weights).unwrap_err().to_string();
         assert!(text.contains("fairness weights"), "{text}");
     }
     let mut normals = vec![None; 12];
@@ -170,29 +128,16 @@ fn weights_and_normals_without_sense_are_errors() {
         let found = fit(&fairness, &mesh.positions, &wishes, Weights::default());
         found.unwrap_err().to_string()
     };
-    let text = refused(Constraints {
-        normals: Some(&normals),
-        ..ALL
-    });
+    let text = refused(Constraints { normals: Some(&normals), ..ALL });
     assert!(text.contains("vertex 3"), "{text}");
     let mut marks = vec![true; 12];
     marks[3] = false;
     normals[3] = Some(DVec3::Z);
-    let text = refused(Constraints {
-        interpolated: Some(&marks),
-        normals: Some(&normals),
-        ..ALL
-    });
+    let text = refused(Constraints { interpolated: Some(&marks), normals: Some(&normals), ..ALL });
     assert!(text.contains("vertex 3: a normal is given where"), "{text}");
-    let text = refused(Constraints {
-        handles: Some(&[1.0; 12]),
-        ..ALL
-    });
+    let text = refused(Constraints { handles: Some(&[1.0; 12]), ..ALL });
     assert!(text.contains("type-V faces"), "{text}");
-    let text = refused(Constraints {
-        interpolated: Some(&[false; 12]),
-        ..ALL
-    });
+    let text = refused(Constraints { interpolated: Some(&[false; 12]), ..ALL });
     assert!(text.contains("no vertex"), "{text}");
 }
 
@@ -206,10 +151,7 @@ fn a_subset_is_met_by_a_fairer_surface() {
         let weights = Weights::default();
         let all = fit(&fairness, &mesh.positions, &ALL, weights).unwrap();
         let marks: Vec<bool> = (0..mesh.len()).map(|v| v % 3 != 1).collect();
-        let wishes = Constraints {
-            interpolated: Some(&marks),
-            ..ALL
-        };
+        let wishes = Constraints { interpolated: Some(&marks), ..ALL };
         let some = fit(&fairness, &mesh.positions, &wishes, weights).unwrap();
         let (limits, _) = limits_and_normals(&some.mesh, mesh.len());
         let mut moved = 0.0f64;
@@ -221,10 +163,7 @@ fn a_subset_is_met_by_a_fairer_surface() {
         assert!(moved > 1e-3, "{name}: the others are free");
         assert!(some.errors.max < SOLVED);
         let energy = some.energies.weighted(weights);
-        assert!(
-            energy < all.energies.weighted(weights) * (1.0 - 1e-4),
-            "{name}"
-        );
+        assert!(energy < all.energies.weighted(weights) * (1.0 - 1e-4), "{name}");
         // Moving towards another surface through the same points costs energy to second order only.
         let towards = |t: f64| {
             let pairs = some.mesh.positions.iter().zip(&all.mesh.positions);
@@ -246,16 +185,10 @@ fn a_subset_is_met_by_a_fairer_surface() {
         two.faces.push(&moved);
     }
     let marks: Vec<bool> = (0..2 * n).map(|v| v < n).collect();
-    let wishes = Constraints {
-        interpolated: Some(&marks),
-        ..ALL
-    };
+    let wishes = Constraints { interpolated: Some(&marks), ..ALL };
     let fairness = Fairness::new(&two).unwrap();
     let error = fit(&fairness, &two.positions, &wishes, Weights::default()).unwrap_err();
-    assert!(
-        error.to_string().contains("component of vertex 20"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("component of vertex 20"), "{error}");
 }
 
 #[test]
@@ -265,20 +198,9 @@ fn every_iterate_is_measured_and_the_last_is_the_control_mesh() {
     let system = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark).unwrap();
     let fairness = Fairness::new(&mesh).unwrap();
     let normals: Vec<DVec3> = mesh.positions.iter().map(|p| p.normalize()).collect();
-    let stop = Stop {
-        tolerance: 1e-8,
-        max_iterations: 2000,
-    };
-    let (rows, solution) = follow(
-        &mesh,
-        &topology,
-        &system,
-        &fairness,
-        &normals,
-        Setup::Pia { omega: 1.0 },
-        &stop,
-    )
-    .unwrap();
+    let stop = Stop { tolerance: 1e-8, max_iterations: 2000 };
+    let (rows, solution) =
+        follow(&mesh, &topology, &system, &fairness, &normals, Setup::Pia { omega: 1.0 }, &stop).unwrap();
     assert_eq!(solution.report.outcome, Outcome::Converged);
     assert_eq!(rows.len(), solution.report.iterations + 1);
     let errors: Vec<_> = rows.iter().map(|r| r.errors).collect();
@@ -290,11 +212,7 @@ fn every_iterate_is_measured_and_the_last_is_the_control_mesh() {
     let last = rows[rows.len() - 1];
     assert_eq!(last.energies, fairness.energies_of(&control).unwrap());
     let (_, found) = limits_and_normals(&control, mesh.len());
-    let worst = found
-        .iter()
-        .zip(&normals)
-        .map(|(a, b)| a.angle_between(*b))
-        .fold(0.0, f64::max);
+    let worst = found.iter().zip(&normals).map(|(a, b)| a.angle_between(*b)).fold(0.0, f64::max);
     assert!((last.deviation_max - worst).abs() < 1e-7);
     // Interpolating noise ripples: the energy grows from the start, and the fairest surface lies below the end.
     let weights = Weights::default();

@@ -13,11 +13,7 @@ use crate::{ROUNDING, distance, noisy, topology};
 fn polygon(n: usize) -> Vec<DVec3> {
     let point = |i: usize| {
         let i = i as f64;
-        DVec3::new(
-            (2.3 * i).sin() + i,
-            (1.7 * i).cos() * 3.0,
-            (0.9 * i * i).sin(),
-        )
+        DVec3::new((2.3 * i).sin() + i, (1.7 * i).cos() * 3.0, (0.9 * i * i).sin())
     };
     (0..n).map(point).collect()
 }
@@ -47,10 +43,7 @@ fn curve_ends_are_the_four_point_scheme_and_the_cubic_spline() {
         let blend = (1.0 - a) * four_point[i] + *a * spline[i];
         assert!(mixed[i].distance(blend) < ROUNDING);
     }
-    assert_eq!(
-        (parameters[4], parameters[5]),
-        (alpha[2], 0.5 * (alpha[2] + alpha[3]))
-    );
+    assert_eq!((parameters[4], parameters[5]), (alpha[2], 0.5 * (alpha[2] + alpha[3])));
 }
 
 #[test]
@@ -71,9 +64,7 @@ fn open_curves_keep_their_ends_and_lines_and_are_the_closed_ones_inside() {
         let limit = (p[i - 1] + 4.0 * p[i] + p[i + 1]) / 6.0;
         assert!(spline[i << 14].distance(limit) < 1e-7);
     }
-    let line: Vec<DVec3> = (0..5)
-        .map(|i| DVec3::new(i as f64, 2.0, -3.0 * i as f64))
-        .collect();
+    let line: Vec<DVec3> = (0..5).map(|i| DVec3::new(i as f64, 2.0, -3.0 * i as f64)).collect();
     let (fine, _) = curve::refine_n(&line, &alpha[..5], Ends::Open, 4);
     for (k, point) in fine.iter().enumerate() {
         let t = k as f64 / 16.0;
@@ -89,11 +80,7 @@ fn a_curve_passes_through_the_points_whose_alpha_is_zero() {
     let (fine, _) = curve::refine_n(&p, &alpha, Ends::Closed, 6);
     for (i, a) in alpha.iter().enumerate() {
         let moved = fine[i << 6].distance(p[i]);
-        assert!(if *a == 0.0 {
-            moved == 0.0
-        } else {
-            moved > 1e-2
-        });
+        assert!(if *a == 0.0 { moved == 0.0 } else { moved > 1e-2 });
     }
 }
 
@@ -102,12 +89,8 @@ fn a_curve_passes_through_the_points_whose_alpha_is_zero() {
 fn jumps_follow_their_own_mask() {
     let alpha = 0.7;
     let p = polygon(12);
-    let second = |p: &[DVec3], h: f64| -> Vec<DVec3> {
-        curve::divided_differences(p, 2, h)
-            .iter()
-            .map(|d| *d * h)
-            .collect()
-    };
+    let second =
+        |p: &[DVec3], h: f64| -> Vec<DVec3> { curve::divided_differences(p, 2, h).iter().map(|d| *d * h).collect() };
     let (fine, _) = curve::refine(&p, &[alpha; 12], Ends::Closed);
     let (coarse, fine) = (second(&p, 1.0), second(&fine, 0.5));
     let (outer, inner) = ((alpha - 1.0) / 8.0, (3.0 - alpha) / 4.0);
@@ -146,10 +129,7 @@ fn constant_parameters_give_c1_curves_within_the_range_and_not_at_its_ends() {
         kink[8] = DVec3::Y;
         let jumps = curve::jumps(&kink, &[alpha; 16], 14, 1);
         let bound = curve::fixed_point_radius(alpha).powi(14);
-        assert!(
-            jumps[14] > 1e-3 * bound,
-            "{alpha}: the data's rate is not below the radius"
-        );
+        assert!(jumps[14] > 1e-3 * bound, "{alpha}: the data's rate is not below the radius");
     }
 }
 
@@ -171,15 +151,8 @@ fn mixed_parameters_between_the_ends_give_c1_curves() {
 #[test]
 fn a_closed_spline_of_a_regular_polygon_is_nearly_a_circle() {
     let n = 40;
-    let circle: Vec<DVec3> = (0..n)
-        .map(|i| {
-            DVec3::new(
-                (TAU * i as f64 / n as f64).cos(),
-                (TAU * i as f64 / n as f64).sin(),
-                0.0,
-            )
-        })
-        .collect();
+    let circle: Vec<DVec3> =
+        (0..n).map(|i| DVec3::new((TAU * i as f64 / n as f64).cos(), (TAU * i as f64 / n as f64).sin(), 0.0)).collect();
     let (fine, _) = curve::refine_n(&circle, &vec![0.0; n], Ends::Closed, 5);
     assert!(fine.iter().all(|p| (p.length() - 1.0).abs() < 1e-4));
 }
@@ -187,9 +160,7 @@ fn a_closed_spline_of_a_regular_polygon_is_nearly_a_circle() {
 #[test]
 fn surface_ends_and_chosen_vertices() {
     let mesh = noisy("icosphere:1");
-    let zero = surface::refine_n(&mesh, &vec![0.0; mesh.len()], 3)
-        .unwrap()
-        .0;
+    let zero = surface::refine_n(&mesh, &vec![0.0; mesh.len()], 3).unwrap().0;
     let kobbelt = Refinement::Sqrt3.refine_n(&mesh, 3).unwrap();
     assert_eq!(zero.faces, kobbelt.faces);
     assert!(distance(&zero.positions, &kobbelt.positions) < ROUNDING);
@@ -218,9 +189,7 @@ fn volumes_in_closed_form() {
     let cube = builtin::cube();
     assert!((surface::volume(&cube) - 8.0).abs() < ROUNDING);
     let mut far = cube.clone();
-    far.positions
-        .iter_mut()
-        .for_each(|p| *p = 0.5 * *p + DVec3::splat(1e4));
+    far.positions.iter_mut().for_each(|p| *p = 0.5 * *p + DVec3::splat(1e4));
     assert!((surface::volume(&far) - 1.0).abs() < 1e-10);
     let inside_out = Mesh::new(cube.positions.iter().map(|p| -*p).collect(), cube.faces);
     assert!((surface::volume(&inside_out) + 8.0).abs() < ROUNDING);
@@ -234,14 +203,8 @@ fn the_volume_grows_from_shrinking_to_bulging() {
         let mesh = builtin::builtin(name).unwrap();
         let popping = |a: f64| surface::popping(&mesh, &vec![a; mesh.len()], 6).unwrap();
         let rows: Vec<_> = (0..=10).map(|k| popping(f64::from(k) / 10.0)).collect();
-        assert!(
-            rows[0].volume_ratio < 1.0 && rows[10].volume_ratio > 1.0,
-            "{name}"
-        );
-        assert!(
-            rows.windows(2)
-                .all(|w| w[0].volume_ratio < w[1].volume_ratio)
-        );
+        assert!(rows[0].volume_ratio < 1.0 && rows[10].volume_ratio > 1.0, "{name}");
+        assert!(rows.windows(2).all(|w| w[0].volume_ratio < w[1].volume_ratio));
         assert!(rows[0].center_outward < 0.0 || name != "icosahedron");
         assert!(rows[10].center_outward > 0.0 && rows[10].vertex_max == 0.0);
         let limits = sqrt3::limit_positions(&mesh, &topology(&mesh)).unwrap();

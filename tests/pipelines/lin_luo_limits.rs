@@ -56,14 +56,8 @@ fn a_refined_mesh_has_the_same_limits() {
             let (fine, parameters) = refine_n(&mesh, &alpha, levels).unwrap();
             let again = limits(&fine, &parameters).unwrap();
             let n = mesh.len();
-            assert!(
-                distance(&found.positions, &again.positions[..n]) < ROUNDING,
-                "{name}"
-            );
-            assert!(
-                distance(&found.normals, &again.normals[..n]) < 1e-9,
-                "{name}"
-            );
+            assert!(distance(&found.positions, &again.positions[..n]) < ROUNDING, "{name}");
+            assert!(distance(&found.normals, &again.normals[..n]) < 1e-9, "{name}");
             let plain = |v: usize| topology(&mesh).incidence.face_count(v) > 3;
             let missing = (0..n).find(|&v| plain(v) && found.normals[v] == DVec3::ZERO);
             assert_eq!(missing, None, "{name}");
@@ -97,10 +91,7 @@ fn refinement_ends_at_the_limits() {
                 turned = turned.max(sum.normalize().distance(*normal));
             }
             let off = distance(&fine.positions[..mesh.len()], &found.positions);
-            assert!(
-                off < 0.5 * before[0] && turned < 0.8 * before[1],
-                "{name} {levels}"
-            );
+            assert!(off < 0.5 * before[0] && turned < 0.8 * before[1], "{name} {levels}");
             before = [off, turned];
         }
         assert!(before[0] < 2e-3 && before[1] < 0.05, "{name} {before:?}");
@@ -123,11 +114,7 @@ fn for_one_alpha_they_are_those_of_the_local_matrix() {
                 let root = topology.incidence.corners_at(v)[0];
                 let layout = LocalScheme::Sqrt3 { alpha }.layout();
                 let star = layout.walk(&fine.faces, &topology, root, k, 3).unwrap();
-                let limit: DVec3 = star
-                    .iter()
-                    .zip(mask.iter())
-                    .map(|(&i, w)| *w * fine.positions[i as usize])
-                    .sum();
+                let limit: DVec3 = star.iter().zip(mask.iter()).map(|(&i, w)| *w * fine.positions[i as usize]).sum();
                 assert!(limit.distance(found.positions[v]) < ROUNDING, "{k} {alpha}");
             }
         }
@@ -156,12 +143,7 @@ fn degenerate_stars_have_limits_and_no_normals() {
     let mut mesh = noisy("star:5");
     mesh.positions.fill(DVec3::ONE);
     let found = limits(&mesh, &mixed(&mesh)).unwrap();
-    assert!(
-        found
-            .positions
-            .iter()
-            .all(|p| p.distance(DVec3::ONE) < ROUNDING)
-    );
+    assert!(found.positions.iter().all(|p| p.distance(DVec3::ONE) < ROUNDING));
     assert!(found.normals.iter().all(|n| *n == DVec3::ZERO));
     // All points on a line.
     for (v, p) in mesh.positions.iter_mut().enumerate() {

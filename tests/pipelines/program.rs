@@ -18,9 +18,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        Bench {
-            folder: tempfile::tempdir().unwrap(),
-        }
+        Bench { folder: tempfile::tempdir().unwrap() }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -43,11 +41,7 @@ impl Bench {
 
     /// The JSON, and the mesh with its normals.
     fn run(&self, arguments: &str) -> (Value, io::Loaded) {
-        let output = self
-            .command(arguments)
-            .args(["--json", "--quiet"])
-            .output()
-            .unwrap();
+        let output = self.command(arguments).args(["--json", "--quiet"]).output().unwrap();
         let error = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.success(), "{arguments}: {error}");
         let json = serde_json::from_slice(&output.stdout).unwrap();
@@ -61,10 +55,7 @@ impl Bench {
         assert_eq!(output.status.code(), Some(status), "{arguments}: {error}");
         assert!(!self.path("out.ply").exists(), "{arguments}");
         if status == 1 {
-            assert!(
-                error.starts_with("error: ") && error.trim_end().lines().count() == 1,
-                "{error}"
-            );
+            assert!(error.starts_with("error: ") && error.trim_end().lines().count() == 1, "{error}");
         }
         error
     }
@@ -87,8 +78,7 @@ fn a_control_mesh_refined_again_and_again_passes_through_the_points() {
         ("icosphere:1", Refinement::Loop),
         ("icosphere:1", Refinement::Sqrt3),
     ] {
-        let (json, loaded) =
-            bench.run(&format!("{mesh} --noise 0.1 --scheme {scheme} --tol 1e-12"));
+        let (json, loaded) = bench.run(&format!("{mesh} --noise 0.1 --scheme {scheme} --tol 1e-12"));
         assert!(json["max_error"].as_f64().unwrap() < 1e-11);
         let given = with_noise(mesh);
         assert_eq!(loaded.mesh.faces, given.faces);
@@ -101,18 +91,14 @@ fn a_control_mesh_refined_again_and_again_passes_through_the_points() {
             before = now;
         }
         let limits = scheme.limit_positions(&fine, &topology(&fine)).unwrap();
-        assert!(
-            distance(&limits[..given.len()], &given.positions) < 1e-11,
-            "{mesh} {scheme}"
-        );
+        assert!(distance(&limits[..given.len()], &given.positions) < 1e-11, "{mesh} {scheme}");
     }
 }
 
 #[test]
 fn a_surface_at_its_limit_holds_the_points_and_its_normals() {
     let bench = Bench::new();
-    let (json, loaded) = bench
-        .run("irregular-poly:40 --noise 0.1 --tol 1e-13 --subdivide 2 --limit --write-normals");
+    let (json, loaded) = bench.run("irregular-poly:40 --noise 0.1 --tol 1e-13 --subdivide 2 --limit --write-normals");
     let given = with_noise("irregular-poly:40");
     assert!(distance(&loaded.mesh.positions[..given.len()], &given.positions) < ROUNDING);
     assert_eq!(json["surface"]["vertices"], loaded.mesh.len());
@@ -120,8 +106,7 @@ fn a_surface_at_its_limit_holds_the_points_and_its_normals() {
     let normals = loaded.normals.unwrap();
     assert!(normals.iter().all(|n| (n.length() - 1.0).abs() < ROUNDING));
     // The same surface one level further has the same points and normals at the vertices that both have.
-    let (_, finer) = bench
-        .run("irregular-poly:40 --noise 0.1 --tol 1e-13 --subdivide 3 --limit --write-normals");
+    let (_, finer) = bench.run("irregular-poly:40 --noise 0.1 --tol 1e-13 --subdivide 3 --limit --write-normals");
     let n = loaded.mesh.len();
     assert!(distance(&finer.mesh.positions[..n], &loaded.mesh.positions) < ROUNDING);
     assert!(distance(&finer.normals.unwrap()[..n], &normals) < 1e-9);
@@ -131,15 +116,11 @@ fn a_surface_at_its_limit_holds_the_points_and_its_normals() {
 fn given_normals_are_those_of_the_surface() {
     let bench = Bench::new();
     let lines = bench.write("n.txt", "# vertex nx ny nz\n0 1 0.2 0.1\n7 0 0.3 -1\n");
-    let wanted = [
-        (0, DVec3::new(1.0, 0.2, 0.1)),
-        (7, DVec3::new(0.0, 0.3, -1.0)),
-    ];
+    let wanted = [(0, DVec3::new(1.0, 0.2, 0.1)), (7, DVec3::new(0.0, 0.3, -1.0))];
     let given = with_noise("icosphere:1");
     let base = "icosphere:1 --noise 0.1 --tol 1e-13 --write-normals --limit";
     for scheme in ["catmull-clark", "loop", "sqrt3"] {
-        let arguments =
-            format!("{base} --scheme {scheme} --subdivide 3 --normals {lines} --normal-levels 2");
+        let arguments = format!("{base} --scheme {scheme} --subdivide 3 --normals {lines} --normal-levels 2");
         let (json, loaded) = bench.run(&arguments);
         assert_eq!(json["normals"]["given"], 2);
         assert!(distance(&loaded.mesh.positions[..given.len()], &given.positions) < ROUNDING);
@@ -148,9 +129,7 @@ fn given_normals_are_those_of_the_surface() {
             assert!(found[v].distance(n.normalize()) < ROUNDING, "{scheme} {v}");
         }
     }
-    let (_, fair) = bench.run(&format!(
-        "{base} --method halstead --subdivide 3 --normals {lines}"
-    ));
+    let (_, fair) = bench.run(&format!("{base} --method halstead --subdivide 3 --normals {lines}"));
     assert!(distance(&fair.mesh.positions[..given.len()], &given.positions) < 1e-10);
     let found = fair.normals.unwrap();
     for (v, n) in wanted {
@@ -159,11 +138,10 @@ fn given_normals_are_those_of_the_surface() {
     // A mesh file with normals: here the surface's own, so that nothing turns.
     let (_, own) = bench.run(&format!("{base} --scheme loop"));
     io::write(&bench.path("own.off"), &given, own.normals.as_deref()).unwrap();
-    let (json, _) = bench.run("icosphere:1 --noise 0.1 --tol 1e-13 --scheme loop --subdivide 2 --normals own.off --normal-threshold 0.001");
-    assert_eq!(
-        (&json["normals"]["given"], &json["normals"]["set"]),
-        (&given.len().into(), &0.into())
+    let (json, _) = bench.run(
+        "icosphere:1 --noise 0.1 --tol 1e-13 --scheme loop --subdivide 2 --normals own.off --normal-threshold 0.001",
     );
+    assert_eq!((&json["normals"]["given"], &json["normals"]["set"]), (&given.len().into(), &0.into()));
 }
 
 #[test]
@@ -181,8 +159,7 @@ fn two_phases_give_exact_centroids_with_handles_and_subsets() {
             assert!(centroid(&loaded.mesh, first + v).distance(given.positions[v]) < ROUNDING);
         }
     }
-    let (_, plain) =
-        bench.run("irregular-poly:40 --noise 0.1 --scheme nasri --tol 1e-13 --subdivide 2");
+    let (_, plain) = bench.run("irregular-poly:40 --noise 0.1 --scheme nasri --tol 1e-13 --subdivide 2");
     let (_, control) = bench.run("irregular-poly:40 --noise 0.1 --scheme nasri --tol 1e-13");
     let expected = Refinement::DooSabin.refine_n(&control.mesh, 2).unwrap();
     assert!(distance(&plain.mesh.positions, &expected.positions) < ROUNDING);
@@ -195,19 +172,14 @@ fn two_phases_give_exact_centroids_with_handles_and_subsets() {
 fn a_subset_moves_no_other_vertex() {
     let bench = Bench::new();
     let marks = bench.write("some.txt", "3 5\n8..11\n");
-    let (json, loaded) = bench.run(&format!(
-        "icosphere:1 --noise 0.1 --scheme catmull-clark --tol 1e-13 --vertices {marks}"
-    ));
+    let (json, loaded) =
+        bench.run(&format!("icosphere:1 --noise 0.1 --scheme catmull-clark --tol 1e-13 --vertices {marks}"));
     assert_eq!(json["interpolated"], 6);
     let given = with_noise("icosphere:1");
     let limits = catmull_clark::limit_positions(&loaded.mesh, &topology(&loaded.mesh)).unwrap();
     for (v, limit) in limits.iter().enumerate() {
         let marked = [3, 5, 8, 9, 10, 11].contains(&v);
-        let point = if marked {
-            *limit
-        } else {
-            loaded.mesh.positions[v]
-        };
+        let point = if marked { *limit } else { loaded.mesh.positions[v] };
         assert!(point.distance(given.positions[v]) < ROUNDING, "{v}");
     }
 }
@@ -216,17 +188,10 @@ fn a_subset_moves_no_other_vertex() {
 fn alpha_chooses_what_is_interpolated() {
     let bench = Bench::new();
     let given = with_noise("icosphere:1");
-    let (json, loaded) =
-        bench.run("icosphere:1 --noise 0.1 --alpha 0.25 --vertices 4,5 --subdivide 3");
-    assert_eq!(
-        (&json["method"], &json["scheme"]),
-        (&"lin-luo".into(), &"sqrt3".into())
-    );
+    let (json, loaded) = bench.run("icosphere:1 --noise 0.1 --alpha 0.25 --vertices 4,5 --subdivide 3");
+    assert_eq!((&json["method"], &json["scheme"]), (&"lin-luo".into(), &"sqrt3".into()));
     for v in 0..given.len() {
-        assert_eq!(
-            loaded.mesh.positions[v] == given.positions[v],
-            v == 4 || v == 5
-        );
+        assert_eq!(loaded.mesh.positions[v] == given.positions[v], v == 4 || v == 5);
     }
     let (_, kobbelt) = bench.run("icosphere:1 --noise 0.1 --alpha 0 --subdivide 3");
     let expected = Refinement::Sqrt3.refine_n(&given, 3).unwrap();
@@ -237,72 +202,30 @@ fn alpha_chooses_what_is_interpolated() {
 fn failures_say_what_is_wrong_and_write_nothing() {
     let bench = Bench::new();
     let outward = noisy("icosahedron").positions[4];
-    let opposite = bench.write(
-        "opposite.txt",
-        &format!("4 {} {} {}\n", -outward.x, -outward.y, -outward.z),
-    );
+    let opposite = bench.write("opposite.txt", &format!("4 {} {} {}\n", -outward.x, -outward.y, -outward.z));
     let twice = bench.write("twice.txt", "4 1 0 0\n4 0 1 0\n");
     let zero = bench.write("zero.txt", "4 0 0 0\n");
     let handles = bench.write("handles.txt", "4 -1\n");
     for (arguments, what) in [
-        (
-            "icosahedron --alpha -0.5 --subdivide 1".to_owned(),
-            "α = -0.5 at vertex 0",
-        ),
-        (
-            "icosahedron --method halstead --thin-plate -1".to_owned(),
-            "fairness weights -1",
-        ),
-        (
-            "icosahedron --scheme nasri --shape-handle -1 --subdivide 1".to_owned(),
-            "vertex 0: the shape handle -1",
-        ),
-        (
-            "icosahedron --alpha 2.5 --subdivide 1".to_owned(),
-            "α = 2.5 at vertex 0",
-        ),
+        ("icosahedron --alpha -0.5 --subdivide 1".to_owned(), "α = -0.5 at vertex 0"),
+        ("icosahedron --method halstead --thin-plate -1".to_owned(), "fairness weights -1"),
+        ("icosahedron --scheme nasri --shape-handle -1 --subdivide 1".to_owned(), "vertex 0: the shape handle -1"),
+        ("icosahedron --alpha 2.5 --subdivide 1".to_owned(), "α = 2.5 at vertex 0"),
         ("icosahedron --alpha 1".into(), "--subdivide"),
-        (
-            "cube --method labsik-greiner --subdivide 2".into(),
-            "face 0 has 4 corners",
-        ),
-        (
-            "icosahedron --vertices 12".into(),
-            "`12` names a vertex that the mesh lacks",
-        ),
-        (
-            "icosahedron --vertices none.txt".into(),
-            "`none.txt` is neither",
-        ),
-        (
-            format!("icosahedron --normals {twice} --subdivide 2"),
-            "line 2: vertex 4 is given twice",
-        ),
-        (
-            format!("icosahedron --normals {zero} --subdivide 2"),
-            "vertex 4",
-        ),
-        (
-            "icosahedron --normals nowhere.txt --subdivide 2".into(),
-            "nowhere.txt: cannot read",
-        ),
+        ("cube --method labsik-greiner --subdivide 2".into(), "face 0 has 4 corners"),
+        ("icosahedron --vertices 12".into(), "`12` names a vertex that the mesh lacks"),
+        ("icosahedron --vertices none.txt".into(), "`none.txt` is neither"),
+        (format!("icosahedron --normals {twice} --subdivide 2"), "line 2: vertex 4 is given twice"),
+        (format!("icosahedron --normals {zero} --subdivide 2"), "vertex 4"),
+        ("icosahedron --normals nowhere.txt --subdivide 2".into(), "nowhere.txt: cannot read"),
         (format!("icosahedron --normals {twice}"), "given twice"),
-        (
-            format!("icosahedron --normals {zero} --scheme zheng-cai"),
-            "--subdivide 1",
-        ),
+        (format!("icosahedron --normals {zero} --scheme zheng-cai"), "--subdivide 1"),
         (
             format!("icosahedron --normals {opposite} --vertices 1,2 --scheme nasri --subdivide 2"),
             "vertex 4: a normal is given where",
         ),
-        (
-            format!("icosahedron --shape-handle {handles} --scheme nasri --subdivide 2"),
-            "vertex 4: the shape handle -1",
-        ),
-        (
-            "icosahedron --shape-handle 2 --scheme loop".into(),
-            "use --scheme zheng-cai",
-        ),
+        (format!("icosahedron --shape-handle {handles} --scheme nasri --subdivide 2"), "vertex 4: the shape handle -1"),
+        ("icosahedron --shape-handle 2 --scheme loop".into(), "use --scheme zheng-cai"),
         ("icosahedron --method pia --max-iter 1".into(), "ran out"),
     ] {
         let error = bench.fail(&arguments, 1);
@@ -312,10 +235,7 @@ fn failures_say_what_is_wrong_and_write_nothing() {
     let p = builtin::icosahedron().positions[4];
     let exact = bench.write("exact.txt", &format!("4 {} {} {}\n", -p.x, -p.y, -p.z));
     let error = bench.fail(&format!("icosahedron --normals {exact} --subdivide 2"), 1);
-    assert!(
-        error.contains("vertex 4: the given normal is opposite"),
-        "{error}"
-    );
+    assert!(error.contains("vertex 4: the given normal is opposite"), "{error}");
     for arguments in [
         "icosahedron --alpha 1 --scheme loop --subdivide 1",
         "icosahedron --alpha 1 --normals n.txt",
@@ -347,17 +267,10 @@ fn surfaces_without_a_system_pass_through_the_points() {
     assert!(coarse.mesh.positions[3].distance(given.positions[3]) > 1e-3);
     let normals = coarse.normals.unwrap();
     assert!(distance(&normals, &fine.normals.unwrap()[..n]) < 1e-9);
-    for (name, scheme) in [
-        ("butterfly", Refinement::Butterfly),
-        ("labsik-greiner", Refinement::LabsikGreiner),
-    ] {
-        let (json, loaded) = bench.run(&format!(
-            "icosphere:1 --noise 0.1 --method {name} --subdivide 2 --limit --write-normals"
-        ));
-        assert_eq!(
-            (&json["scheme"], &json["method"]),
-            (&name.into(), &name.into())
-        );
+    for (name, scheme) in [("butterfly", Refinement::Butterfly), ("labsik-greiner", Refinement::LabsikGreiner)] {
+        let (json, loaded) =
+            bench.run(&format!("icosphere:1 --noise 0.1 --method {name} --subdivide 2 --limit --write-normals"));
+        assert_eq!((&json["scheme"], &json["method"]), (&name.into(), &name.into()));
         assert_eq!(loaded.mesh, scheme.refine_n(&given, 2).unwrap());
         let normals = loaded.normals.unwrap();
         assert!(normals.iter().all(|n| (n.length() - 1.0).abs() < ROUNDING));
@@ -383,19 +296,10 @@ fn degenerate_points_give_finite_files() {
     for (name, mesh) in [("some.off", mesh), ("flat.off", flat)] {
         io::write(&bench.path(name), &mesh, None).unwrap();
         for scheme in ["catmull-clark", "loop", "sqrt3", "nasri", "zheng-cai"] {
-            let arguments =
-                format!("{name} --scheme {scheme} --subdivide 2 --limit --write-normals");
+            let arguments = format!("{name} --scheme {scheme} --subdivide 2 --limit --write-normals");
             let (_, loaded) = bench.run(&arguments);
             let normals = loaded.normals.unwrap();
-            assert!(
-                loaded
-                    .mesh
-                    .positions
-                    .iter()
-                    .chain(&normals)
-                    .all(|p| p.is_finite()),
-                "{arguments}"
-            );
+            assert!(loaded.mesh.positions.iter().chain(&normals).all(|p| p.is_finite()), "{arguments}");
         }
     }
 }

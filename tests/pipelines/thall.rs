@@ -14,13 +14,7 @@ use limitlab::subdivide::{Refinement, catmull_clark};
 
 use crate::{ROUNDING, centroid, distance, noisy, topology};
 
-const MESHES: [&str; 5] = [
-    "torus:7x5",
-    "quad-sphere:2",
-    "dodecahedron",
-    "irregular-poly:60",
-    "icosphere:1",
-];
+const MESHES: [&str; 5] = ["torus:7x5", "quad-sphere:2", "dodecahedron", "irregular-poly:60", "icosphere:1"];
 
 fn run_local(mesh: &Mesh, inverse: Inverse, iterations: usize) -> Vec<Vec<DVec3>> {
     let topology = topology(mesh);
@@ -40,10 +34,7 @@ fn local_masks_are_jacobi_with_one_half_iterate_by_iterate() {
         let mesh = noisy(name);
         let system = LimitSystem::new(&mesh, &topology(&mesh), Scheme::CatmullClark).unwrap();
         let iterates = run_local(&mesh, Inverse::Exact, 12);
-        let stop = Stop {
-            tolerance: 0.0,
-            max_iterations: 12,
-        };
+        let stop = Stop { tolerance: 0.0, max_iterations: 12 };
         run_watched(&system, &mesh.positions, Setup::THALL, &stop, &mut |step| {
             let error = distance(step.points, &iterates[step.iteration]);
             assert!(error < ROUNDING, "{name} {}: {error:e}", step.iteration);
@@ -56,11 +47,7 @@ fn local_masks_are_jacobi_with_one_half_iterate_by_iterate() {
 /// not, except on quads.
 #[test]
 fn the_inverse_mask_gives_the_wanted_limit_of_one_vertex() {
-    for (name, quads) in [
-        ("torus:7x5", true),
-        ("dodecahedron", false),
-        ("irregular-poly:60", false),
-    ] {
+    for (name, quads) in [("torus:7x5", true), ("dodecahedron", false), ("irregular-poly:60", false)] {
         let mesh = noisy(name);
         let topology = topology(&mesh);
         for inverse in [Inverse::Exact, Inverse::Regular] {
@@ -86,10 +73,7 @@ fn both_inverses_converge_to_the_direct_solution() {
     let mesh = noisy("irregular-poly:60");
     let topology = topology(&mesh);
     let system = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark).unwrap();
-    let stop = Stop {
-        tolerance: 1e-13,
-        max_iterations: 5000,
-    };
+    let stop = Stop { tolerance: 1e-13, max_iterations: 5000 };
     let exact = run(&system, &mesh.positions, Setup::Lu, &stop).points;
     for inverse in [Inverse::Exact, Inverse::Regular] {
         let mut local = LocalIteration::new(&mesh, &topology, inverse);
@@ -105,10 +89,7 @@ fn local_iterates_follow_affine_maps() {
     let map = |p: DVec3| DVec3::new(p.x + 2.0 * p.y, p.z - 3.0, 0.5 * p.x - p.y + 4.0 * p.z);
     let mut moved = mesh.clone();
     moved.positions.iter_mut().for_each(|p| *p = map(*p));
-    let (here, there) = (
-        run_local(&mesh, Inverse::Exact, 6),
-        run_local(&moved, Inverse::Exact, 6),
-    );
+    let (here, there) = (run_local(&mesh, Inverse::Exact, 6), run_local(&moved, Inverse::Exact, 6));
     for (a, b) in here.iter().zip(&there) {
         let a: Vec<DVec3> = a.iter().map(|p| map(*p)).collect();
         assert!(distance(&a, b) < ROUNDING);
@@ -121,22 +102,14 @@ fn medial_metrics_in_closed_form() {
     let mesh = builtin::icosahedron();
     let center = DVec3::new(1.0, -2.0, 0.5);
     let normals: Vec<DVec3> = mesh.positions.iter().map(|p| p.normalize()).collect();
-    let at = |radius: f64, shift: DVec3| -> Vec<DVec3> {
-        normals
-            .iter()
-            .map(|n| center + shift + radius * *n)
-            .collect()
-    };
+    let at =
+        |radius: f64, shift: DVec3| -> Vec<DVec3> { normals.iter().map(|n| center + shift + radius * *n).collect() };
     let given = at(2.0, DVec3::ZERO);
     let involutes = Faces::from_lists([vec![0u32, 1], vec![2, 7, 5], vec![3]]);
     let atom = MedialAtom::fit((0..4).map(|v| (given[v], normals[v]))).unwrap();
     assert!((atom.radius - 2.0).abs() < ROUNDING && atom.position.distance(center) < ROUNDING);
     // A surface of another radius has the same centre; a moved one is off by shift over the given radius.
-    let same = medial_shifts(
-        &involutes,
-        (&at(1.7, DVec3::ZERO), &normals),
-        (&given, &normals),
-    );
+    let same = medial_shifts(&involutes, (&at(1.7, DVec3::ZERO), &normals), (&given, &normals));
     assert!(same[0].unwrap() < ROUNDING && same[1].unwrap() < ROUNDING && same[2].is_none());
     let shift = DVec3::new(0.3, 0.0, 0.4);
     let moved = medial_shifts(&involutes, (&at(2.0, shift), &normals), (&given, &normals));
@@ -150,10 +123,7 @@ fn normal_deviation_is_the_angle() {
     let turn = |angle: f64| DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), angle) * DVec3::Y;
     for wanted in [0.0, 1e-9, 0.3, 2.0, PI - 1e-9, PI] {
         let found = normal_deviations(&[turn(wanted)], &[DVec3::Y])[0];
-        assert!(
-            (found - wanted).abs() < 1e-15 + ROUNDING * wanted,
-            "{wanted}"
-        );
+        assert!((found - wanted).abs() < 1e-15 + ROUNDING * wanted, "{wanted}");
     }
     assert_eq!(normal_deviations(&[DVec3::ZERO], &[DVec3::Y]), [PI]);
 }
@@ -171,9 +141,7 @@ fn primal(name: &str) -> (Mesh, Vec<Refinement>) {
 fn leaning(mesh: &Mesh) -> Vec<Option<DVec3>> {
     let outward = catmull_clark::limit_normals(mesh, &topology(mesh)).unwrap();
     let lean = |v: usize| DVec3::new((v as f64).sin(), (3.0 * v as f64).cos(), (v as f64).cos());
-    (0..mesh.len())
-        .map(|v| (v % 3 != 2).then(|| 1.5 * outward[v] + lean(v)))
-        .collect()
+    (0..mesh.len()).map(|v| (v % 3 != 2).then(|| 1.5 * outward[v] + lean(v))).collect()
 }
 
 /// T16: exactly the wanted normals, and all limit points where they were; spread over levels too.
@@ -186,10 +154,7 @@ fn turned_rings_have_the_given_normals_and_keep_the_limits() {
             let before = scheme.limit_positions(&mesh, &topology(&mesh)).unwrap();
             let untouched = scheme.limit_normals(&mesh, &topology(&mesh)).unwrap();
             for levels in [1, 3] {
-                let rotation = Rotation {
-                    levels,
-                    ..Rotation::default()
-                };
+                let rotation = Rotation { levels, ..Rotation::default() };
                 let result = rotate_rings(&mesh, scheme, &wanted, rotation).unwrap();
                 assert_eq!(result.refinements, levels + 1);
                 // One more refinement: nothing depends on the level where it is looked at.
@@ -200,10 +165,7 @@ fn turned_rings_have_the_given_normals_and_keep_the_limits() {
                 let found = scheme.limit_normals(&fine, &fine_topology).unwrap();
                 for (v, normal) in wanted.iter().enumerate() {
                     let expected = normal.map_or(untouched[v], |n| n.normalize());
-                    assert!(
-                        found[v].distance(expected) < ROUNDING,
-                        "{name} {scheme} {v}"
-                    );
+                    assert!(found[v].distance(expected) < ROUNDING, "{name} {scheme} {v}");
                 }
             }
         }
@@ -215,11 +177,7 @@ fn rings_turn_only_beyond_the_threshold_and_stop_at_the_tolerance() {
     let mesh = noisy("irregular-poly:60");
     let wanted = leaning(&mesh);
     let before = catmull_clark::limit_normals(&mesh, &topology(&mesh)).unwrap();
-    let rotation = Rotation {
-        threshold: 0.4,
-        tolerance: 0.1,
-        levels: 2,
-    };
+    let rotation = Rotation { threshold: 0.4, tolerance: 0.1, levels: 2 };
     let result = rotate_rings(&mesh, Refinement::CatmullClark, &wanted, rotation).unwrap();
     let after = catmull_clark::limit_normals(&result.mesh, &topology(&result.mesh)).unwrap();
     let (mut turned, mut left) = (0, 0);
@@ -227,10 +185,7 @@ fn rings_turn_only_beyond_the_threshold_and_stop_at_the_tolerance() {
         let Some(normal) = normal.map(DVec3::normalize) else {
             continue;
         };
-        let (off, now) = (
-            before[v].angle_between(normal),
-            after[v].angle_between(normal),
-        );
+        let (off, now) = (before[v].angle_between(normal), after[v].angle_between(normal));
         if off > 0.4 {
             assert!((now - 0.1).abs() < 1e-7, "{v}: {off} {now}");
             turned += 1;
@@ -240,10 +195,7 @@ fn rings_turn_only_beyond_the_threshold_and_stop_at_the_tolerance() {
         }
     }
     assert_eq!(result.turned.len(), turned);
-    assert!(
-        turned > 3 && left > 3,
-        "the test sees both: {turned} {left}"
-    );
+    assert!(turned > 3 && left > 3, "the test sees both: {turned} {left}");
 }
 
 /// T15, by looking: after two refinements no vertex is in the faces of two original vertices; after one some are.
@@ -286,24 +238,17 @@ fn normals_without_sense_are_errors_that_name_the_vertex() {
     flat.positions.iter_mut().for_each(|p| *p = DVec3::X * p.x);
     let normals = vec![Some(DVec3::Z); mesh.len()];
     let result = rotate_rings(&flat, Refinement::Loop, &normals, Rotation::default());
-    assert!(
-        result
-            .unwrap_err()
-            .to_string()
-            .contains("vertex 0: the surface has no normal")
-    );
+    assert!(result.unwrap_err().to_string().contains("vertex 0: the surface has no normal"));
 }
 
 /// T17: values stay by the midpoint rule, creep by the scheme's own, and come back where they interpolate.
 #[test]
 fn attributes_stay_creep_or_interpolate() {
     let mesh = noisy("irregular-poly:60");
-    let values: Vec<DVec3> = (0..mesh.len())
-        .map(|v| DVec3::new((v as f64).sin(), v as f64 / 60.0, (0.3 * v as f64).cos()))
-        .collect();
+    let values: Vec<DVec3> =
+        (0..mesh.len()).map(|v| DVec3::new((v as f64).sin(), v as f64 / 60.0, (0.3 * v as f64).cos())).collect();
     let topology = topology(&mesh);
-    let refine =
-        |values: Vec<DVec3>, rule| refine_attributes(&mesh, &topology, values, rule).unwrap();
+    let refine = |values: Vec<DVec3>, rule| refine_attributes(&mesh, &topology, values, rule).unwrap();
     let mid = refine(values.clone(), AttributeRule::Midpoint);
     assert_eq!(mid[..mesh.len()], values);
     let fine = catmull_clark::refine(&mesh, &topology).unwrap();
@@ -322,10 +267,7 @@ fn attributes_stay_creep_or_interpolate() {
     assert!(distance(&crept[..mesh.len()], &values) > 1e-2);
     // The limit system is that of the points: solved for the values, their limits are the given ones.
     let system = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark).unwrap();
-    let stop = Stop {
-        tolerance: 1e-13,
-        max_iterations: 10,
-    };
+    let stop = Stop { tolerance: 1e-13, max_iterations: 10 };
     let control = run(&system, &values, Setup::Lu, &stop).points;
     let refined = Mesh::new(refine(control, AttributeRule::Scheme), fine.faces);
     let limits = catmull_clark::limit_positions(&refined, &crate::topology(&refined)).unwrap();

@@ -13,12 +13,7 @@ use limitlab::subdivide::doo_sabin::{self, Rule};
 
 use crate::{ROUNDING, centroid, distance, noisy, topology};
 
-const MESHES: [&str; 4] = [
-    "torus:7x5",
-    "dodecahedron",
-    "irregular-poly:60",
-    "icosphere:1",
-];
+const MESHES: [&str; 4] = ["torus:7x5", "dodecahedron", "irregular-poly:60", "icosphere:1"];
 
 /// Every second vertex or so, by no pattern of the mesh.
 fn half(mesh: &Mesh) -> Vec<bool> {
@@ -36,37 +31,15 @@ fn both_sweeps_are_the_solvers_of_the_same_system() {
         let reverse = Sweep::GaussSeidel(Some(&order));
         for (sweep, setup) in [
             (Sweep::Jacobi, Setup::Jacobi { omega: 1.0 }),
-            (
-                file,
-                Setup::Sor {
-                    omega: 1.0,
-                    order: None,
-                },
-            ),
-            (
-                reverse,
-                Setup::Sor {
-                    omega: 1.0,
-                    order: Some(&order),
-                },
-            ),
+            (file, Setup::Sor { omega: 1.0, order: None }),
+            (reverse, Setup::Sor { omega: 1.0, order: Some(&order) }),
         ] {
-            let stop = Stop {
-                tolerance: 0.0,
-                max_iterations: 8,
-            };
+            let stop = Stop { tolerance: 0.0, max_iterations: 8 };
             let mut before = mesh.positions.clone();
             run_watched(&system, &mesh.positions, setup, &stop, &mut |step| {
-                let phase = PhaseOne {
-                    sweep,
-                    max_iterations: step.iteration,
-                    eps: 0.0,
-                };
+                let phase = PhaseOne { sweep, max_iterations: step.iteration, eps: 0.0 };
                 let found = auxiliary(&mesh, &topology, None, &phase).unwrap();
-                assert!(
-                    distance(&found.mesh.positions, step.points) < ROUNDING,
-                    "{name}"
-                );
+                assert!(distance(&found.mesh.positions, step.points) < ROUNDING, "{name}");
                 if let Some(&update) = found.updates.last() {
                     assert!((update - distance(&before, step.points)).abs() < ROUNDING);
                 }
@@ -81,24 +54,11 @@ fn both_sweeps_are_the_solvers_of_the_same_system() {
 fn the_largest_update_ends_the_sweeps() {
     let mesh = noisy("irregular-poly:60");
     let topology = topology(&mesh);
-    let all = auxiliary(
-        &mesh,
-        &topology,
-        None,
-        &PhaseOne {
-            max_iterations: 40,
-            eps: 0.0,
-            ..PhaseOne::default()
-        },
-    )
-    .unwrap();
+    let all =
+        auxiliary(&mesh, &topology, None, &PhaseOne { max_iterations: 40, eps: 0.0, ..PhaseOne::default() }).unwrap();
     assert!(!all.passed && all.updates.len() == 40);
     for eps in [1e-2, 3e-3, 1e-8] {
-        let phase = PhaseOne {
-            max_iterations: 40,
-            eps,
-            ..PhaseOne::default()
-        };
+        let phase = PhaseOne { max_iterations: 40, eps, ..PhaseOne::default() };
         let found = auxiliary(&mesh, &topology, None, &phase).unwrap();
         let tolerance = eps * mesh.diagonal();
         let first = all.updates.iter().position(|&u| u <= tolerance).unwrap();
@@ -110,10 +70,7 @@ fn the_largest_update_ends_the_sweeps() {
 /// Zheng-Cai §3.5, first example: three sweeps at 0.3 % on the model with 562 vertices.
 #[test]
 fn the_paper_s_first_example_takes_three_sweeps() {
-    let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../shared/meshes/closed/psb_m1630_hat_562v.off"
-    );
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/meshes/closed/psb_m1630_hat_562v.off");
     let Ok(loaded) = io::read(path.as_ref()) else {
         use std::io::Write;
         writeln!(std::io::stderr(), "skipped: {path} is not there").unwrap();
@@ -125,26 +82,19 @@ fn the_paper_s_first_example_takes_three_sweeps() {
     assert!(found.passed);
     let relative: Vec<f64> = found.updates.iter().map(|u| u / mesh.diagonal()).collect();
     assert_eq!(relative.len(), 3);
-    assert!(
-        (relative[1] - 0.0106).abs() < 1e-4 && (relative[2] - 0.00145).abs() < 1e-5,
-        "{relative:?}"
-    );
+    assert!((relative[1] - 0.0106).abs() < 1e-4 && (relative[2] - 0.00145).abs() < 1e-5, "{relative:?}");
 }
 
 fn is_planar(mesh: &Mesh, f: usize, normal: DVec3, center: DVec3) -> bool {
     let corners = mesh.faces.face(f).iter();
-    corners
-        .map(|&c| (mesh.positions[c as usize] - center).dot(normal))
-        .all(|d| d.abs() < ROUNDING)
+    corners.map(|&c| (mesh.positions[c as usize] - center).dot(normal)).all(|d| d.abs() < ROUNDING)
 }
 
 /// Directions that lean away from the mean direction of the faces, at some interpolated vertices.
 fn leaning(mesh: &Mesh, interpolated: &[bool]) -> Vec<Option<DVec3>> {
     let outward = doo_sabin::limit_normals(Rule::ZhengCai, mesh, &topology(mesh)).unwrap();
     let lean = |v: usize| DVec3::new((v as f64).sin(), (3.0 * v as f64).cos(), (v as f64).cos());
-    (0..mesh.len())
-        .map(|v| (interpolated[v] && v % 3 == 0).then(|| 2.0 * outward[v] + 0.4 * lean(v)))
-        .collect()
+    (0..mesh.len()).map(|v| (interpolated[v] && v % 3 == 0).then(|| 2.0 * outward[v] + 0.4 * lean(v))).collect()
 }
 
 /// Z7, Z14, Z15, Z16, Z17: exact centroids, planes and normals after one sweep as after many, at every level, with
@@ -156,26 +106,12 @@ fn centroids_planes_and_normals_are_exact_at_every_level() {
         let topology = topology(&mesh);
         let some = half(&mesh);
         let normals = leaning(&mesh, &some);
-        let handles: Vec<f64> = (0..mesh.len())
-            .map(|v| {
-                if some[v] {
-                    0.4 + 0.1 * (v % 20) as f64
-                } else {
-                    1.0
-                }
-            })
-            .collect();
+        let handles: Vec<f64> =
+            (0..mesh.len()).map(|v| if some[v] { 0.4 + 0.1 * (v % 20) as f64 } else { 1.0 }).collect();
         for sweeps in [0, 1, 7] {
-            let phase = PhaseOne {
-                max_iterations: sweeps,
-                eps: 0.0,
-                ..PhaseOne::default()
-            };
-            let constraints = Constraints {
-                interpolated: Some(&some),
-                normals: Some(&normals),
-                handles: Some(&handles),
-            };
+            let phase = PhaseOne { max_iterations: sweeps, eps: 0.0, ..PhaseOne::default() };
+            let constraints =
+                Constraints { interpolated: Some(&some), normals: Some(&normals), handles: Some(&handles) };
             let result = interpolate(&mesh, &topology, &constraints, &phase).unwrap();
             assert!(result.first.not_flattened.is_empty());
             for v in (0..mesh.len()).filter(|&v| !some[v]) {
@@ -187,15 +123,9 @@ fn centroids_planes_and_normals_are_exact_at_every_level() {
                 for v in (0..mesh.len()).filter(|&v| some[v]) {
                     let f = result.first.first_vertex_face + v;
                     assert!(centroid(&fine, f).distance(mesh.positions[v]) < ROUNDING);
-                    assert!(
-                        is_planar(&fine, f, found[f], mesh.positions[v]),
-                        "{name} {level} {v}"
-                    );
+                    assert!(is_planar(&fine, f, found[f], mesh.positions[v]), "{name} {level} {v}");
                     if let Some(n) = normals[v] {
-                        assert!(
-                            found[f].cross(n.normalize()).length() < ROUNDING,
-                            "{name} {v}"
-                        );
+                        assert!(found[f].cross(n.normalize()).length() < ROUNDING, "{name} {v}");
                     }
                 }
             }
@@ -212,24 +142,15 @@ fn opposite_normals_are_the_same_and_handles_scale() {
     let turned: Vec<Option<DVec3>> = normals.iter().map(|n| n.map(|n| -3.0 * n)).collect();
     let handles: Vec<f64> = (0..mesh.len()).map(|v| 0.5 + (v % 4) as f64).collect();
     let first = |normals: &[Option<DVec3>], handles: Option<&[f64]>| {
-        let constraints = Constraints {
-            normals: Some(normals),
-            handles,
-            ..Constraints::default()
-        };
-        interpolate(&mesh, &topology, &constraints, &PhaseOne::default())
-            .unwrap()
-            .first
+        let constraints = Constraints { normals: Some(normals), handles, ..Constraints::default() };
+        interpolate(&mesh, &topology, &constraints, &PhaseOne::default()).unwrap().first
     };
     let plain = first(&normals, None);
     assert!(distance(&plain.mesh.positions, &first(&turned, None).mesh.positions) < ROUNDING);
     let scaled = first(&normals, Some(&handles));
     for (v, &s) in handles.iter().enumerate() {
         for &c in plain.mesh.faces.face(plain.first_vertex_face + v) {
-            let (p, q) = (
-                plain.mesh.positions[c as usize],
-                scaled.mesh.positions[c as usize],
-            );
+            let (p, q) = (plain.mesh.positions[c as usize], scaled.mesh.positions[c as usize]);
             let expected = mesh.positions[v] + s * (p - mesh.positions[v]);
             assert!(q.distance(expected) < ROUNDING);
         }
@@ -242,11 +163,7 @@ fn opposite_normals_are_the_same_and_handles_scale() {
 fn the_correction_is_the_smallest() {
     let mesh = noisy("irregular-poly:60");
     let topology = topology(&mesh);
-    let phase = PhaseOne {
-        max_iterations: 1,
-        eps: 0.0,
-        ..PhaseOne::default()
-    };
+    let phase = PhaseOne { max_iterations: 1, eps: 0.0, ..PhaseOne::default() };
     let result = interpolate(&mesh, &topology, &Constraints::default(), &phase).unwrap();
     let before = doo_sabin::refine_by(Rule::ZhengCai, &result.auxiliary.mesh, &topology).unwrap();
     let normals = doo_sabin::face_normals(&result.first.mesh);
@@ -255,15 +172,10 @@ fn the_correction_is_the_smallest() {
         // Eq. 10, the paper's average normal, up to sign the normal of the planar face.
         let face = before.faces.face(f);
         let ring = || face.iter().map(|&c| before.positions[c as usize]);
-        let average: DVec3 = ring()
-            .zip(ring().cycle().skip(1))
-            .map(|(a, b)| a.cross(b))
-            .sum();
+        let average: DVec3 = ring().zip(ring().cycle().skip(1)).map(|(a, b)| a.cross(b)).sum();
         assert!(average.normalize().cross(normals[f]).length() < 1e-10);
-        let moves: Vec<DVec3> = face
-            .iter()
-            .map(|&c| result.first.mesh.positions[c as usize] - before.positions[c as usize])
-            .collect();
+        let moves: Vec<DVec3> =
+            face.iter().map(|&c| result.first.mesh.positions[c as usize] - before.positions[c as usize]).collect();
         let mean = moves.iter().sum::<DVec3>() / moves.len() as f64;
         for m in moves {
             // Free moves are within the plane and of sum 0: the correction's part there is constant.
@@ -278,16 +190,8 @@ fn affine_maps_commute_with_phase_one() {
     let mesh = noisy("irregular-poly:60");
     let map = |p: &DVec3| DVec3::new(p.x + 2.0 * p.y, p.z - 3.0, 0.5 * p.x - p.y + 4.0 * p.z);
     let moved = Mesh::new(mesh.positions.iter().map(map).collect(), mesh.faces.clone());
-    let phase = PhaseOne {
-        eps: 0.0,
-        ..PhaseOne::default()
-    };
-    let [here, there] = [&mesh, &moved].map(|m| {
-        auxiliary(m, &topology(m), None, &phase)
-            .unwrap()
-            .mesh
-            .positions
-    });
+    let phase = PhaseOne { eps: 0.0, ..PhaseOne::default() };
+    let [here, there] = [&mesh, &moved].map(|m| auxiliary(m, &topology(m), None, &phase).unwrap().mesh.positions);
     let here: Vec<DVec3> = here.iter().map(map).collect();
     assert!(distance(&here, &there) < 1e-11);
 }
@@ -297,74 +201,35 @@ fn constraints_without_sense_are_errors_that_name_the_vertex() {
     let mesh = builtin::icosahedron();
     let topology = topology(&mesh);
     let refused = |constraints: &Constraints| {
-        interpolate(&mesh, &topology, constraints, &PhaseOne::default())
-            .unwrap_err()
-            .to_string()
+        interpolate(&mesh, &topology, constraints, &PhaseOne::default()).unwrap_err().to_string()
     };
     let mut some = vec![true; 12];
     some[5] = false;
     let mut normals = vec![None; 12];
     normals[5] = Some(DVec3::X);
-    let text = refused(&Constraints {
-        interpolated: Some(&some),
-        normals: Some(&normals),
-        handles: None,
-    });
+    let text = refused(&Constraints { interpolated: Some(&some), normals: Some(&normals), handles: None });
     assert!(text.contains("vertex 5: a normal is given where"), "{text}");
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let mut handles = [1.0; 12];
         handles[3] = bad;
-        let text = refused(&Constraints {
-            handles: Some(&handles),
-            ..Constraints::default()
-        });
+        let text = refused(&Constraints { handles: Some(&handles), ..Constraints::default() });
         assert!(text.contains("vertex 3: the shape handle"), "{text}");
     }
     let mut handles = [1.0; 12];
     handles[5] = 2.0;
-    let text = refused(&Constraints {
-        interpolated: Some(&some),
-        handles: Some(&handles),
-        normals: None,
-    });
-    assert!(
-        text.contains("vertex 5: a shape handle is given where"),
-        "{text}"
-    );
+    let text = refused(&Constraints { interpolated: Some(&some), handles: Some(&handles), normals: None });
+    assert!(text.contains("vertex 5: a shape handle is given where"), "{text}");
     let none = [false; 12];
-    assert!(
-        refused(&Constraints {
-            interpolated: Some(&none),
-            ..Constraints::default()
-        })
-        .contains("at least one")
-    );
+    assert!(refused(&Constraints { interpolated: Some(&none), ..Constraints::default() }).contains("at least one"));
     // Z24: a normal in the plane of the face. Before any sweep the face lies square to the axis, by symmetry.
     let mut normals = vec![None; 12];
     normals[0] = Some(mesh.positions[0].any_orthogonal_vector());
-    let edge_on = Constraints {
-        normals: Some(&normals),
-        ..Constraints::default()
-    };
-    let none = PhaseOne {
-        max_iterations: 0,
-        ..PhaseOne::default()
-    };
-    let text = interpolate(&mesh, &topology, &edge_on, &none)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        text.contains("vertex 0: the given normal lies in the plane"),
-        "{text}"
-    );
+    let edge_on = Constraints { normals: Some(&normals), ..Constraints::default() };
+    let none = PhaseOne { max_iterations: 0, ..PhaseOne::default() };
+    let text = interpolate(&mesh, &topology, &edge_on, &none).unwrap_err().to_string();
+    assert!(text.contains("vertex 0: the given normal lies in the plane"), "{text}");
     normals[0] = Some(DVec3::ZERO);
-    assert!(
-        refused(&Constraints {
-            normals: Some(&normals),
-            ..Constraints::default()
-        })
-        .contains("vertex 0")
-    );
+    assert!(refused(&Constraints { normals: Some(&normals), ..Constraints::default() }).contains("vertex 0"));
 }
 
 #[test]
@@ -378,13 +243,7 @@ fn coincident_points_give_finite_meshes() {
     let mut flat = mesh.clone();
     flat.positions.iter_mut().for_each(|q| *q = DVec3::X * q.x);
     for mesh in [mesh, flat] {
-        let result = interpolate(
-            &mesh,
-            &topology,
-            &Constraints::default(),
-            &PhaseOne::default(),
-        )
-        .unwrap();
+        let result = interpolate(&mesh, &topology, &Constraints::default(), &PhaseOne::default()).unwrap();
         let fine = result.first.surface(3).unwrap();
         assert!(fine.positions.iter().all(|p| p.is_finite()));
         for v in 0..mesh.len() {
@@ -400,26 +259,15 @@ fn nasri_s_faces_have_the_given_centroids() {
         let mesh = noisy(name);
         let topology = topology(&mesh);
         let some = half(&mesh);
-        let stop = Stop {
-            tolerance: 1e-13,
-            max_iterations: 5000,
-        };
+        let stop = Stop { tolerance: 1e-13, max_iterations: 5000 };
         for marks in [None, Some(&some[..])] {
-            let solution =
-                nasri::control_points(&mesh, &topology, marks, Setup::Cholesky, &stop).unwrap();
+            let solution = nasri::control_points(&mesh, &topology, marks, Setup::Cholesky, &stop).unwrap();
             assert_eq!(solution.report.outcome, Outcome::Converged);
             let control = Mesh::new(solution.points, mesh.faces.clone());
             let limits = doo_sabin::limit_positions(Rule::DooSabin, &control, &topology).unwrap();
             for v in 0..mesh.len() {
-                let expected = if marks.is_none_or(|m| m[v]) {
-                    limits[v]
-                } else {
-                    control.positions[v]
-                };
-                assert!(
-                    expected.distance(mesh.positions[v]) < ROUNDING,
-                    "{name} {v}"
-                );
+                let expected = if marks.is_none_or(|m| m[v]) { limits[v] } else { control.positions[v] };
+                assert!(expected.distance(mesh.positions[v]) < ROUNDING, "{name} {v}");
             }
         }
     }
@@ -431,10 +279,7 @@ fn a_subset_is_interpolated_by_every_scheme_and_method() {
     let mesh = noisy("icosphere:1");
     let topology = topology(&mesh);
     let some = half(&mesh);
-    let stop = Stop {
-        tolerance: 1e-12,
-        max_iterations: 5000,
-    };
+    let stop = Stop { tolerance: 1e-12, max_iterations: 5000 };
     for scheme in Scheme::ALL {
         let full = LimitSystem::new(&mesh, &topology, scheme).unwrap();
         let part = Restriction::new(&full, &some).unwrap();
@@ -448,28 +293,13 @@ fn a_subset_is_interpolated_by_every_scheme_and_method() {
             Setup::THALL,
             Setup::Pia { omega: 1.0 },
             Setup::Cg,
-            Setup::Sor {
-                omega: 1.0,
-                order: Some(&order),
-            },
-            Setup::Chebyshev {
-                spectrum: (full.bounds.lambda_min.max(0.02), 1.0),
-            },
+            Setup::Sor { omega: 1.0, order: Some(&order) },
+            Setup::Chebyshev { spectrum: (full.bounds.lambda_min.max(0.02), 1.0) },
         ] {
-            let solution = part.solve(&full, &mesh.positions, setup, &stop, &mut |_| {
-                ControlFlow::Continue(())
-            });
-            assert_eq!(
-                solution.report.outcome,
-                Outcome::Converged,
-                "{scheme} {setup:?}"
-            );
+            let solution = part.solve(&full, &mesh.positions, setup, &stop, &mut |_| ControlFlow::Continue(()));
+            assert_eq!(solution.report.outcome, Outcome::Converged, "{scheme} {setup:?}");
             for (v, &marked) in some.iter().enumerate() {
-                let value = if marked {
-                    full.a.row_times(v, &solution.points)
-                } else {
-                    solution.points[v]
-                };
+                let value = if marked { full.a.row_times(v, &solution.points) } else { solution.points[v] };
                 assert!(value.distance(mesh.positions[v]) < 1e-11);
             }
             match &first {
@@ -483,25 +313,10 @@ fn a_subset_is_interpolated_by_every_scheme_and_method() {
     let part = Restriction::new(&full, &vec![true; mesh.len()]).unwrap();
     assert_eq!(part.system.a, full.a);
     let pia = Setup::Pia { omega: 1.0 };
-    let ahead = part.solve(
-        &full,
-        &mesh.positions,
-        pia,
-        &Stop {
-            tolerance: 0.0,
-            max_iterations: 4,
-        },
-        &mut |_| ControlFlow::Continue(()),
-    );
-    let five = run(
-        &full,
-        &mesh.positions,
-        pia,
-        &Stop {
-            tolerance: 0.0,
-            max_iterations: 5,
-        },
-    );
+    let ahead = part.solve(&full, &mesh.positions, pia, &Stop { tolerance: 0.0, max_iterations: 4 }, &mut |_| {
+        ControlFlow::Continue(())
+    });
+    let five = run(&full, &mesh.positions, pia, &Stop { tolerance: 0.0, max_iterations: 5 });
     assert!(distance(&ahead.points, &five.points) < ROUNDING);
     assert!(Restriction::new(&full, &vec![false; mesh.len()]).is_err());
 }

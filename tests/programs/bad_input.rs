@@ -16,10 +16,7 @@ fn assert_all_refuse(folder: &TempDir, mesh: &str, more: &[&str]) -> String {
     let mut lines = Vec::new();
     for program in ON_MESHES {
         let what = format!("{program} {mesh}");
-        lines.push(assert_refused(
-            &run_on(program, folder.path(), mesh, more),
-            &what,
-        ));
+        lines.push(assert_refused(&run_on(program, folder.path(), mesh, more), &what));
         let result = folder.path().join("result");
         if result.exists() {
             assert_no_files(&result, &what);
@@ -37,10 +34,7 @@ fn refused(name: &str, bytes: &[u8]) -> String {
     let folder = tempdir().unwrap();
     fs::write(folder.path().join(name), bytes).unwrap();
     let line = assert_all_refuse(&folder, name, &[]);
-    assert!(
-        line.starts_with(&format!("error: {name}")),
-        "the file is named: {line}"
-    );
+    assert!(line.starts_with(&format!("error: {name}")), "the file is named: {line}");
     line
 }
 
@@ -55,9 +49,7 @@ fn every_bad_model_is_refused_with_its_reason() {
         let absolute = path.canonicalize().unwrap();
         let line = assert_all_refuse(&folder, absolute.to_str().unwrap(), &[]);
         assert!(line.contains(name), "{line}");
-        let place = ["face ", "vertex ", "vertices ", "line "]
-            .iter()
-            .any(|word| line.contains(word));
+        let place = ["face ", "vertex ", "vertices ", "line "].iter().any(|word| line.contains(word));
         assert!(place, "no place is named: {line}");
     }
 }
@@ -75,14 +67,8 @@ fn open_models_are_refused_and_the_option_is_named() {
 
 #[test]
 fn an_open_mesh_is_refused_and_the_option_is_named() {
-    let line = refused(
-        "open.obj",
-        b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n",
-    );
-    assert!(
-        line.contains("3 boundary edges") && line.contains("face 0, line 5, vertices 0 and 2"),
-        "{line}"
-    );
+    let line = refused("open.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n");
+    assert!(line.contains("3 boundary edges") && line.contains("face 0, line 5, vertices 0 and 2"), "{line}");
     assert!(line.contains("--boundary as-interior"), "{line}");
 }
 
@@ -97,25 +83,14 @@ fn missing_files_folders_and_unknown_names() {
         let line = assert_all_refuse(&folder, name, &[]);
         assert!(line.contains(name), "{line}");
     }
-    for name in [
-        "cub",
-        "torus",
-        "torus:8",
-        "torus:2x5",
-        "torus:ax5",
-        "prism:2",
-        "icosphere:99",
-        "",
-        "torus:99999999x99999999",
-    ] {
+    for name in
+        ["cub", "torus", "torus:8", "torus:2x5", "torus:ax5", "prism:2", "icosphere:99", "", "torus:99999999x99999999"]
+    {
         let line = assert_all_refuse(&folder, name, &[]);
         assert!(line.contains(&format!("`{name}`")), "{line}");
     }
     let line = assert_all_refuse(&folder, "cub", &[]);
-    assert!(
-        line.contains("cube") && line.contains("quad-sphere:K"),
-        "the names are listed: {line}"
-    );
+    assert!(line.contains("cube") && line.contains("quad-sphere:K"), "the names are listed: {line}");
     fs::write(folder.path().join("mesh.stl"), "solid").unwrap();
     let line = assert_all_refuse(&folder, "mesh.stl", &[]);
     assert!(line.contains(".obj, .off or .ply"), "{line}");
@@ -125,28 +100,15 @@ fn missing_files_folders_and_unknown_names() {
 
 #[test]
 fn garbage_is_refused_in_every_format() {
-    let noise: Vec<u8> = (0..4000u32)
-        .map(|k| (k.wrapping_mul(2_654_435_761) >> 13) as u8)
-        .collect();
+    let noise: Vec<u8> = (0..4000u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
     for name in ["x.obj", "x.off", "x.ply"] {
-        for bytes in [
-            &b""[..],
-            b"\n\n\n",
-            b"\0\0\0\0",
-            b"\xff\xfe\xfd",
-            b"hello world\n",
-            &noise,
-        ] {
+        for bytes in [&b""[..], b"\n\n\n", b"\0\0\0\0", b"\xff\xfe\xfd", b"hello world\n", &noise] {
             refused(name, bytes);
         }
     }
-    for text in [
-        "v 1 2\nf 1 2 3\n",
-        "v 0 0 0\nf 1 2\n",
-        "v a b c\n",
-        "v 0 0 0\nf 0 1 2\n",
-        "v 0 0 0\nf 1 2 99999999999\n",
-    ] {
+    for text in
+        ["v 1 2\nf 1 2 3\n", "v 0 0 0\nf 1 2\n", "v a b c\n", "v 0 0 0\nf 0 1 2\n", "v 0 0 0\nf 1 2 99999999999\n"]
+    {
         refused("x.obj", text.as_bytes());
     }
     for text in [
@@ -160,11 +122,8 @@ fn garbage_is_refused_in_every_format() {
     ] {
         refused("x.off", text.as_bytes());
     }
-    for text in [
-        "ply",
-        "ply\nformat ascii 2.0\nend_header\n",
-        "ply\nformat ascii 1.0\nelement vertex -1\nend_header\n",
-    ] {
+    for text in ["ply", "ply\nformat ascii 2.0\nend_header\n", "ply\nformat ascii 1.0\nelement vertex -1\nend_header\n"]
+    {
         refused("x.ply", text.as_bytes());
     }
 }
@@ -197,16 +156,10 @@ fn numbers_that_are_not_finite_are_refused_with_their_place() {
             assert!(line.contains("vertex 4"), "{line}");
         }
     }
-    let line = refused(
-        "x.obj",
-        b"v nan 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n",
-    );
+    let line = refused("x.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
     assert!(line.contains("line 1"), "{line}");
     // Finite as text, not as a double.
-    refused(
-        "x.obj",
-        b"v 1e999 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n",
-    );
+    refused("x.obj", b"v 1e999 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
 }
 
 #[test]
@@ -236,29 +189,13 @@ fn absurd_counts_ask_for_no_memory() {
 fn runs_that_do_not_converge_leave_no_control_mesh() {
     let folder = tempdir().unwrap();
     for (mesh, more, reason) in [
-        (
-            "cube",
-            &["--noise", "0.1"][..],
-            "ldlt under catmull-clark ended as singular",
-        ),
+        ("cube", &["--noise", "0.1"][..], "ldlt under catmull-clark ended as singular"),
         ("cube", &["--noise", "0.1", "--method", "pia"], "stagnated"),
-        (
-            "cube",
-            &["--noise", "0.1", "--method", "cholesky"],
-            "singular",
-        ),
+        ("cube", &["--noise", "0.1", "--method", "cholesky"], "singular"),
         ("cube", &["--method", "lu"], "singular"),
         ("icosphere:1", &["--max-iter", "1"], "max-iterations"),
-        (
-            "icosphere:1",
-            &["--max-iter", "0", "--method", "cg"],
-            "max-iterations",
-        ),
-        (
-            "icosphere:1",
-            &["--tol", "1e-30", "--method", "pia"],
-            "stagnated",
-        ),
+        ("icosphere:1", &["--max-iter", "0", "--method", "cg"], "max-iterations"),
+        ("icosphere:1", &["--tol", "1e-30", "--method", "pia"], "stagnated"),
     ] {
         let mut arguments = vec![mesh, "-o", "v.obj", "--quiet"];
         arguments.extend(more);
@@ -273,11 +210,7 @@ fn runs_that_do_not_converge_leave_no_control_mesh() {
         fs::remove_file(kept).unwrap();
     }
     // The cube's own points have a control mesh, which iterations find.
-    let output = run(
-        INTERPOLATE,
-        folder.path(),
-        ["cube", "-o", "v.obj", "--method", "pia", "--quiet"],
-    );
+    let output = run(INTERPOLATE, folder.path(), ["cube", "-o", "v.obj", "--method", "pia", "--quiet"]);
     assert_done(&output, "pia on the cube");
 }
 
@@ -300,43 +233,22 @@ fn defects_are_printed_as_json() {
         let output = run_on(program, folder.path(), "tetrahedron", &["--defects"]);
         assert_eq!(json(&output)["valid"], true);
     }
-    assert_eq!(
-        below(folder.path())
-            .iter()
-            .filter(|n| n.ends_with("obj"))
-            .count(),
-        1
-    );
+    assert_eq!(below(folder.path()).iter().filter(|n| n.ends_with("obj")).count(), 1);
 }
 
 #[test]
 fn the_output_s_name_tells_its_format() {
     let folder = tempdir().unwrap();
     for name in ["v", "v.stl", "v.obj.bak", "/dev/stdout"] {
-        let output = run(
-            INTERPOLATE,
-            folder.path(),
-            ["cube", "-o", name, "--quiet", "--method", "pia"],
-        );
+        let output = run(INTERPOLATE, folder.path(), ["cube", "-o", name, "--quiet", "--method", "pia"]);
         let line = assert_refused(&output, name);
-        assert!(
-            line.contains(name) && line.contains(".obj, .off or .ply"),
-            "{line}"
-        );
+        assert!(line.contains(name) && line.contains(".obj, .off or .ply"), "{line}");
     }
-    let output = run(
-        INTERPOLATE,
-        folder.path(),
-        ["cube", "-o", "no/such/v.obj", "--quiet", "--method", "pia"],
-    );
+    let output = run(INTERPOLATE, folder.path(), ["cube", "-o", "no/such/v.obj", "--quiet", "--method", "pia"]);
     let line = assert_refused(&output, "missing folder");
     assert!(line.contains("there is no folder"), "{line}");
     fs::create_dir(folder.path().join("dir.obj")).unwrap();
-    let output = run(
-        INTERPOLATE,
-        folder.path(),
-        ["cube", "-o", "dir.obj", "--quiet", "--method", "pia"],
-    );
+    let output = run(INTERPOLATE, folder.path(), ["cube", "-o", "dir.obj", "--quiet", "--method", "pia"]);
     assert!(assert_refused(&output, "a folder").contains("it is a folder"));
     assert_no_files(folder.path(), "refused outputs");
     // A file where the folder for the results should be.
@@ -368,11 +280,7 @@ mod linux {
             let line = assert_refused(&run(program, folder.path(), arguments), program);
             assert!(line.contains("/proc/"), "{line}");
         }
-        let output = run(
-            REPRODUCE,
-            folder.path(),
-            ["--out", "/proc/results", "--quiet", "--only", "pia-table1"],
-        );
+        let output = run(REPRODUCE, folder.path(), ["--out", "/proc/results", "--quiet", "--only", "pia-table1"]);
         assert_refused(&output, "reproduce");
     }
 
@@ -385,22 +293,14 @@ mod linux {
             path
         };
         let control = full("v.off");
-        let output = run(
-            INTERPOLATE,
-            folder.path(),
-            ["icosphere:2", "-o", "v.off", "--quiet"],
-        );
+        let output = run(INTERPOLATE, folder.path(), ["icosphere:2", "-o", "v.off", "--quiet"]);
         let line = assert_refused(&output, "interpolate");
         assert!(line.contains("v.off: cannot write"), "{line}");
         assert!(control.is_symlink());
         // The third of five files: the others do not appear.
         fs::create_dir(folder.path().join("m")).unwrap();
         full("m/H.mtx");
-        let output = run(
-            ASSEMBLE,
-            folder.path(),
-            ["icosphere:2", "--out", "m", "--quiet"],
-        );
+        let output = run(ASSEMBLE, folder.path(), ["icosphere:2", "--out", "m", "--quiet"]);
         assert!(assert_refused(&output, "assemble").contains("H.mtx"));
         assert_eq!(below(&folder.path().join("m")), ["H.mtx"]);
     }
@@ -410,50 +310,25 @@ mod linux {
         let folder = tempdir().unwrap();
         let arguments: [(&str, &[&str]); 5] = [
             (ASSEMBLE, &["octahedron", "--out", "m", "--json", "--quiet"]),
-            (
-                INTERPOLATE,
-                &["octahedron", "-o", "v.obj", "--json", "--quiet"],
-            ),
+            (INTERPOLATE, &["octahedron", "-o", "v.obj", "--json", "--quiet"]),
             (COMPARE, &["octahedron", "--method", "pia", "--quiet"]),
-            (
-                SWEEP,
-                &[
-                    "octahedron",
-                    "--method",
-                    "pia",
-                    "--omega",
-                    "1:1:1",
-                    "--quiet",
-                ],
-            ),
+            (SWEEP, &["octahedron", "--method", "pia", "--omega", "1:1:1", "--quiet"]),
             (REPRODUCE, &["--list"]),
         ];
         for (program, arguments) in arguments {
             let command = |stdout: Stdio| {
                 let mut command = std::process::Command::new(program);
-                command
-                    .current_dir(folder.path())
-                    .args(arguments)
-                    .stdout(stdout);
+                command.current_dir(folder.path()).args(arguments).stdout(stdout);
                 command
             };
-            let full = fs::OpenOptions::new()
-                .write(true)
-                .open("/dev/full")
-                .unwrap();
-            let output = command(full.into())
-                .stderr(Stdio::piped())
-                .output()
-                .unwrap();
+            let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+            let output = command(full.into()).stderr(Stdio::piped()).output().unwrap();
             let line = assert_refused(&output, program);
             assert!(line.contains("standard output"), "{line}");
 
             let (reader, writer) = std::io::pipe().unwrap();
             drop(reader);
-            let output = command(writer.into())
-                .stderr(Stdio::piped())
-                .output()
-                .unwrap();
+            let output = command(writer.into()).stderr(Stdio::piped()).output().unwrap();
             assert_done(&output, program);
         }
     }
@@ -464,36 +339,21 @@ mod linux {
         let path = |name: &str| -> PathBuf { folder.path().join(name) };
         fs::create_dir(path("deep")).unwrap();
         symlink("deep/target.ply", path("link.obj")).unwrap();
-        let output = run(
-            INTERPOLATE,
-            folder.path(),
-            ["octahedron", "-o", "link.obj", "--quiet"],
-        );
+        let output = run(INTERPOLATE, folder.path(), ["octahedron", "-o", "link.obj", "--quiet"]);
         assert_done(&output, "through a link");
         assert!(path("link.obj").is_symlink());
         // The name that was asked for tells the format.
-        assert!(
-            fs::read_to_string(path("deep/target.ply"))
-                .unwrap()
-                .starts_with('v')
-        );
+        assert!(fs::read_to_string(path("deep/target.ply")).unwrap().starts_with('v'));
         let linked = io::read(&path("link.obj")).unwrap().mesh;
         assert_eq!(linked.faces, built_in("octahedron").faces);
 
         // A link with a known ending is the way to standard output.
         symlink("/dev/stdout", path("out.off")).unwrap();
-        let output = run(
-            INTERPOLATE,
-            folder.path(),
-            ["octahedron", "-o", "out.off", "--quiet"],
-        );
+        let output = run(INTERPOLATE, folder.path(), ["octahedron", "-o", "out.off", "--quiet"]);
         assert_done(&output, "to standard output");
         assert!(text(&output.stdout).starts_with("OFF"));
         assert_eq!(text(&output.stdout).lines().count(), 2 + 6 + 8);
-        assert_eq!(
-            below(folder.path()),
-            ["deep", "deep/target.ply", "link.obj", "out.off"]
-        );
+        assert_eq!(below(folder.path()), ["deep", "deep/target.ply", "link.obj", "out.off"]);
     }
 
     #[test]
@@ -502,11 +362,7 @@ mod linux {
         let path = folder.path().join("mesh.ply");
         let mesh = noisy("irregular-tri:100");
         io::write(&path, &mesh, None).unwrap();
-        let output = run(
-            INTERPOLATE,
-            folder.path(),
-            ["mesh.ply", "-o", "mesh.ply", "--quiet"],
-        );
+        let output = run(INTERPOLATE, folder.path(), ["mesh.ply", "-o", "mesh.ply", "--quiet"]);
         assert_done(&output, "in place");
         let control = io::read(&path).unwrap().mesh;
         assert_eq!(control.faces, mesh.faces);

@@ -12,18 +12,11 @@ fn help_and_version_end_with_success() {
         let help = run(program, folder.path(), ["--help"]);
         assert_done(&help, program);
         let out = text(&help.stdout);
-        assert!(
-            out.contains("Usage:") && out.contains("--threads") && out.contains("--quiet"),
-            "{out}"
-        );
+        assert!(out.contains("Usage:") && out.contains("--threads") && out.contains("--quiet"), "{out}");
         assert!(help.stderr.is_empty());
         let version = run(program, folder.path(), ["--version"]);
         assert_done(&version, program);
-        assert!(
-            text(&version.stdout)
-                .trim_end()
-                .ends_with(env!("CARGO_PKG_VERSION"))
-        );
+        assert!(text(&version.stdout).trim_end().ends_with(env!("CARGO_PKG_VERSION")));
     }
     assert_no_files(folder.path(), "help");
 }
@@ -31,12 +24,7 @@ fn help_and_version_end_with_success() {
 #[test]
 fn bad_arguments_end_with_2() {
     let folder = tempdir().unwrap();
-    let everywhere = [
-        &["--no-such-flag"][..],
-        &["--threads", "0"],
-        &["--threads", "many"],
-        &["--threads"],
-    ];
+    let everywhere = [&["--no-such-flag"][..], &["--threads", "0"], &["--threads", "many"], &["--threads"]];
     let on_meshes = [
         &["cube", "--scheme", "no-such-scheme"][..],
         &["cube", "--noise", "-1"],
@@ -61,15 +49,8 @@ fn bad_arguments_end_with_2() {
         }
         let output = run(program, folder.path(), &arguments);
         let error = text(&output.stderr);
-        assert_eq!(
-            output.status.code(),
-            Some(2),
-            "{program} {arguments:?}: {error}"
-        );
-        assert!(
-            !error.contains("panicked") && output.stdout.is_empty(),
-            "{error}"
-        );
+        assert_eq!(output.status.code(), Some(2), "{program} {arguments:?}: {error}");
+        assert!(!error.contains("panicked") && output.stdout.is_empty(), "{error}");
     };
     for arguments in everywhere {
         for program in [ASSEMBLE, INTERPOLATE, COMPARE, SWEEP, REPRODUCE, SPLITTING] {
@@ -77,33 +58,15 @@ fn bad_arguments_end_with_2() {
         }
     }
     for arguments in on_meshes {
-        ON_MESHES
-            .iter()
-            .for_each(|program| check(program, arguments));
+        ON_MESHES.iter().for_each(|program| check(program, arguments));
     }
     for arguments in iterating {
-        [INTERPOLATE, COMPARE, SWEEP]
-            .iter()
-            .for_each(|program| check(program, arguments));
+        [INTERPOLATE, COMPARE, SWEEP].iter().for_each(|program| check(program, arguments));
     }
-    for grid in [
-        "",
-        "1",
-        "1:2",
-        "2:1:0.1",
-        "0.1:1:0",
-        "0.1:1:-1",
-        "a:b:c",
-        "0.1:1:nan",
-        "0:1:0.5",
-    ] {
+    for grid in ["", "1", "1:2", "2:1:0.1", "0.1:1:0", "0.1:1:-1", "a:b:c", "0.1:1:nan", "0:1:0.5"] {
         check(SWEEP, &["cube", "--omega", grid]);
     }
-    for (program, arguments) in [
-        (INTERPOLATE, &["cube"][..]),
-        (ASSEMBLE, &["cube"]),
-        (ASSEMBLE, &["--out", "x"]),
-    ] {
+    for (program, arguments) in [(INTERPOLATE, &["cube"][..]), (ASSEMBLE, &["cube"]), (ASSEMBLE, &["--out", "x"])] {
         let output = run(program, folder.path(), arguments);
         assert_eq!(output.status.code(), Some(2), "{program} {arguments:?}");
     }
@@ -119,21 +82,11 @@ fn assert_fields(object: &Value, fields: &[&str]) {
 fn assert_numbers(object: &Value, fields: &[&str]) {
     for field in fields {
         let value = &object[field];
-        assert!(
-            value.is_number() || value.is_null(),
-            "{field} is {value} in {object}"
-        );
+        assert!(value.is_number() || value.is_null(), "{field} is {value} in {object}");
     }
 }
 
-const STATUS: [&str; 6] = [
-    "converged",
-    "diverged",
-    "max-iterations",
-    "stagnated",
-    "singular",
-    "breakdown",
-];
+const STATUS: [&str; 6] = ["converged", "diverged", "max-iterations", "stagnated", "singular", "breakdown"];
 
 #[test]
 fn compare_solvers_prints_the_fields_of_the_contract() {
@@ -144,31 +97,17 @@ fn compare_solvers_prints_the_fields_of_the_contract() {
     let object = json(&output);
     assert_eq!(object["mesh"], "cube");
     assert_eq!(object["scheme"], "catmull-clark");
-    assert_eq!(
-        (&object["vertices"], &object["faces"]),
-        (&8.into(), &6.into())
-    );
+    assert_eq!((&object["vertices"], &object["faces"]), (&8.into(), &6.into()));
     let rows = object["rows"].as_array().unwrap();
-    let names = "lu cholesky ldlt jacobi thall gauss-seidel sor ssor pia w-pia chebyshev cg pcg-jacobi pcg-ssor pcg-ic0";
+    let names =
+        "lu cholesky ldlt jacobi thall gauss-seidel sor ssor pia w-pia chebyshev cg pcg-jacobi pcg-ssor pcg-ic0";
     let order: Vec<&str> = rows.iter().map(|r| r["method"].as_str().unwrap()).collect();
     // One row for each method, in the contract's order; further rows come after.
     assert_eq!(order[..15].join(" "), names);
     for row in rows {
-        assert_fields(
-            row,
-            &[
-                "parameter",
-                "max_error",
-                "mean_error",
-                "observed_rate",
-                "predicted_rate",
-            ],
-        );
+        assert_fields(row, &["parameter", "max_error", "mean_error", "observed_rate", "predicted_rate"]);
         assert!(row["iterations"].is_u64());
-        assert_numbers(
-            row,
-            &["max_error", "mean_error", "observed_rate", "predicted_rate"],
-        );
+        assert_numbers(row, &["max_error", "mean_error", "observed_rate", "predicted_rate"]);
         assert_numbers(&row["seconds"], &["setup", "solve"]);
         let status = row["status"].as_str().unwrap();
         assert!(STATUS.contains(&status), "{status}");
@@ -177,25 +116,13 @@ fn compare_solvers_prints_the_fields_of_the_contract() {
         assert_ne!(status, "converged", "{row}");
     }
     let files = below(&folder.path().join("out"));
-    assert_eq!(
-        files,
-        ["csv", "md", "png"].map(|e| format!("compare-solvers-cube-catmull-clark.{e}"))
-    );
+    assert_eq!(files, ["csv", "md", "png"].map(|e| format!("compare-solvers-cube-catmull-clark.{e}")));
 }
 
 #[test]
 fn sweep_omega_prints_the_fields_of_the_contract() {
     let folder = tempdir().unwrap();
-    let arguments = [
-        "torus:32x32",
-        "--noise",
-        "0.1",
-        "--omega",
-        "0.5:0.9:0.1",
-        "--json",
-        "--out",
-        "out",
-    ];
+    let arguments = ["torus:32x32", "--noise", "0.1", "--omega", "0.5:0.9:0.1", "--json", "--out", "out"];
     let output = run(SWEEP, folder.path(), arguments);
     assert_done(&output, "sweep-omega");
     let object = json(&output);
@@ -208,8 +135,7 @@ fn sweep_omega_prints_the_fields_of_the_contract() {
     }
     let find = |method: &str, omega: f64| {
         let mut rows = rows.iter();
-        rows.find(|r| r["method"] == method && r["omega"] == omega)
-            .unwrap()
+        rows.find(|r| r["method"] == method && r["omega"] == omega).unwrap()
     };
     assert_eq!(find("jacobi", 0.8)["status"], "converged");
     assert_eq!(find("jacobi", 0.9)["status"], "diverged");
@@ -219,39 +145,19 @@ fn sweep_omega_prints_the_fields_of_the_contract() {
     assert!((critical - 8.0 / 9.0).abs() < 1e-9, "{critical}");
     let out = folder.path().join("out");
     let stem = "sweep-omega-torus-32x32-catmull-clark";
-    assert_eq!(
-        below(&out),
-        ["csv", "md", "png"].map(|e| format!("{stem}.{e}"))
-    );
+    assert_eq!(below(&out), ["csv", "md", "png"].map(|e| format!("{stem}.{e}")));
     let table = fs::read_to_string(out.join(format!("{stem}.md"))).unwrap();
-    assert!(
-        table.contains("ω_crit = 0.888889") && table.contains("best on the grid: ω = 0.8 "),
-        "{table}"
-    );
+    assert!(table.contains("ω_crit = 0.888889") && table.contains("best on the grid: ω = 0.8 "), "{table}");
     assert!(table.contains("--noise 0.1"), "the noise is told: {table}");
 }
 
 #[test]
 fn interpolate_and_assemble_print_the_fields_of_the_contract() {
     let folder = tempdir().unwrap();
-    let output = run(
-        INTERPOLATE,
-        folder.path(),
-        ["icosahedron", "-o", "v.off", "--json"],
-    );
+    let output = run(INTERPOLATE, folder.path(), ["icosahedron", "-o", "v.off", "--json"]);
     assert_done(&output, "interpolate");
     let object = json(&output);
-    assert_fields(
-        &object,
-        &[
-            "mesh",
-            "scheme",
-            "vertices",
-            "faces",
-            "method",
-            "iterations",
-        ],
-    );
+    assert_fields(&object, &["mesh", "scheme", "vertices", "faces", "method", "iterations"]);
     assert_eq!(object["scheme"], "loop");
     assert_eq!(object["status"], "converged");
     assert!(object["max_error"].as_f64().unwrap() >= object["mean_error"].as_f64().unwrap());
@@ -260,32 +166,18 @@ fn interpolate_and_assemble_print_the_fields_of_the_contract() {
     }
     assert_eq!(below(folder.path()), ["v.off"]);
 
-    let output = run(
-        ASSEMBLE,
-        folder.path(),
-        ["prism:5", "--out", "m", "--scheme", "nasri", "--json"],
-    );
+    let output = run(ASSEMBLE, folder.path(), ["prism:5", "--out", "m", "--scheme", "nasri", "--json"]);
     assert_done(&output, "assemble");
     let object = json(&output);
     assert_fields(&object, &["mesh", "scheme", "vertices", "faces", "files"]);
-    assert_eq!(
-        below(&folder.path().join("m")),
-        ["A.mtx", "H.mtx", "M.mtx", "P.mtx", "R.mtx"]
-    );
+    assert_eq!(below(&folder.path().join("m")), ["A.mtx", "H.mtx", "M.mtx", "P.mtx", "R.mtx"]);
 }
 
 #[test]
 fn several_meshes_make_a_list_of_results() {
     let folder = tempdir().unwrap();
     for program in [COMPARE, SWEEP] {
-        let mut more = vec![
-            "tetrahedron",
-            "octahedron",
-            "--json",
-            "--quiet",
-            "--method",
-            "pia",
-        ];
+        let mut more = vec!["tetrahedron", "octahedron", "--json", "--quiet", "--method", "pia"];
         if program == SWEEP {
             more.extend(["--omega", "1:1:1"]);
         }
@@ -295,10 +187,7 @@ fn several_meshes_make_a_list_of_results() {
         let object = json(&output);
         let results = object["results"].as_array().unwrap();
         assert_eq!(object.as_object().unwrap().len(), 1);
-        let names: Vec<&str> = results
-            .iter()
-            .map(|r| r["mesh"].as_str().unwrap())
-            .collect();
+        let names: Vec<&str> = results.iter().map(|r| r["mesh"].as_str().unwrap()).collect();
         assert_eq!(names, ["tetrahedron", "octahedron"]);
     }
     // The default folder.
@@ -326,10 +215,7 @@ fn reproduce_lists_its_items_and_refuses_others() {
     assert!(list.lines().any(|l| l.starts_with("pia-table1 ")), "{list}");
     for (arguments, what) in [
         (&["--only", "no-such-item", "--quiet"][..], "no-such-item"),
-        (
-            &["--only", "pia-table1", "--only", "nor-this", "--quiet"],
-            "nor-this",
-        ),
+        (&["--only", "pia-table1", "--only", "nor-this", "--quiet"], "nor-this"),
         (&["--meshes", "no-such-folder", "--quiet"], "no-such-folder"),
     ] {
         let line = assert_refused(&run(REPRODUCE, folder.path(), arguments), what);

@@ -25,16 +25,8 @@ pub const SPLITTING: &str = env!("CARGO_BIN_EXE_splitting");
 pub const ON_MESHES: [&str; 4] = [ASSEMBLE, INTERPOLATE, COMPARE, SWEEP];
 
 /// Runs a program in `folder`.
-pub fn run<A: AsRef<std::ffi::OsStr>>(
-    program: &str,
-    folder: &Path,
-    arguments: impl IntoIterator<Item = A>,
-) -> Output {
-    Command::new(program)
-        .current_dir(folder)
-        .args(arguments)
-        .output()
-        .unwrap()
+pub fn run<A: AsRef<std::ffi::OsStr>>(program: &str, folder: &Path, arguments: impl IntoIterator<Item = A>) -> Output {
+    Command::new(program).current_dir(folder).args(arguments).output().unwrap()
 }
 
 /// Runs a program on a mesh, with its results below `folder`, by the shortest way.
@@ -56,12 +48,7 @@ pub fn text(bytes: &[u8]) -> &str {
 }
 
 pub fn assert_done(output: &Output, what: &str) {
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{what}: {}",
-        text(&output.stderr)
-    );
+    assert_eq!(output.status.code(), Some(0), "{what}: {}", text(&output.stderr));
 }
 
 /// Exit status 1, nothing on standard output, one line `error: …` on standard error. Returns the line.
@@ -70,10 +57,7 @@ pub fn assert_refused(output: &Output, what: &str) -> String {
     assert_eq!(output.status.code(), Some(1), "{what}: {error}");
     assert!(error.starts_with("error: "), "{what}: {error}");
     assert_eq!(error.lines().count(), 1, "{what}: {error}");
-    assert!(
-        error.ends_with('\n') && !error.contains("panicked"),
-        "{what}: {error}"
-    );
+    assert!(error.ends_with('\n') && !error.contains("panicked"), "{what}: {error}");
     assert!(output.stdout.is_empty(), "{what}: {}", text(&output.stdout));
     error.trim_end().to_owned()
 }
@@ -90,13 +74,7 @@ pub fn below(folder: &Path) -> Vec<String> {
     fn collect(root: &Path, folder: &Path, names: &mut Vec<String>) {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
-            names.push(
-                path.strip_prefix(root)
-                    .unwrap()
-                    .to_str()
-                    .unwrap()
-                    .to_owned(),
-            );
+            names.push(path.strip_prefix(root).unwrap().to_str().unwrap().to_owned());
             if path.is_dir() && !path.is_symlink() {
                 collect(root, &path, names);
             }

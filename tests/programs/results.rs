@@ -44,9 +44,7 @@ fn hold_assembled(folder: &Path, name: &str, mesh: &Mesh, scheme: Scheme) {
     let plain = formulas::assemble(scheme, mesh);
     let ones = vec![1.0; mesh.len()];
     for (file, matrix, h) in [("A.mtx", &plain.a, &ones), ("M.mtx", &plain.m, &plain.h)] {
-        let read = read_matrix_market::<f64, usize, _>(path(file))
-            .unwrap()
-            .to_csr();
+        let read = read_matrix_market::<f64, usize, _>(path(file)).unwrap().to_csr();
         let error = largest_difference(&read, matrix, h);
         assert!(error < ENTRIES, "{what}, {file}: {error:e}");
     }
@@ -59,10 +57,7 @@ fn hold_assembled(folder: &Path, name: &str, mesh: &Mesh, scheme: Scheme) {
         for axis in 0..3 {
             assert_eq!(columns[axis][i], p[axis], "{what}, P {i}");
             let expected = p[axis] / plain.h[i];
-            assert!(
-                (right[axis][i] - expected).abs() <= ENTRIES * expected.abs(),
-                "{what}, R {i}"
-            );
+            assert!((right[axis][i] - expected).abs() <= ENTRIES * expected.abs(), "{what}, R {i}");
         }
     }
 }
@@ -70,13 +65,7 @@ fn hold_assembled(folder: &Path, name: &str, mesh: &Mesh, scheme: Scheme) {
 #[test]
 fn assembled_files_are_the_formulas_on_built_in_meshes() {
     let folder = tempdir().unwrap();
-    for name in [
-        "cube",
-        "icosphere:2",
-        "irregular-poly:200",
-        "torus:6x7",
-        "star:5",
-    ] {
+    for name in ["cube", "icosphere:2", "irregular-poly:200", "torus:6x7", "star:5"] {
         let mesh = built_in(name);
         for scheme in Scheme::ALL {
             if scheme.first_unsuitable_face(&mesh.faces).is_none() {
@@ -96,10 +85,8 @@ fn assembled_files_are_the_formulas_on_every_small_closed_model() {
         if mesh.len() > 3000 {
             continue;
         }
-        let suitable: Vec<Scheme> = Scheme::ALL
-            .into_iter()
-            .filter(|s| s.first_unsuitable_face(&mesh.faces).is_none())
-            .collect();
+        let suitable: Vec<Scheme> =
+            Scheme::ALL.into_iter().filter(|s| s.first_unsuitable_face(&mesh.faces).is_none()).collect();
         // Two schemes a model, all schemes in turn.
         for turn in [0, suitable.len().div_ceil(2)] {
             let scheme = suitable[(k + turn) % suitable.len()];
@@ -114,54 +101,29 @@ fn assembled_files_are_the_formulas_on_every_small_closed_model() {
 /// max_i ‖p_i − (A v)_i‖ by the formulas.
 fn residual(scheme: Scheme, mesh: &Mesh, control: &Mesh) -> f64 {
     let a = formulas::assemble(scheme, mesh).a;
-    a.row_iter()
-        .enumerate()
-        .fold(0.0, |largest: f64, (i, row)| {
-            let limit: DVec3 = (row.col_indices().iter().zip(row.values()))
-                .map(|(&j, &x)| x * control.positions[j])
-                .sum();
-            largest.max((mesh.positions[i] - limit).length())
-        })
+    a.row_iter().enumerate().fold(0.0, |largest: f64, (i, row)| {
+        let limit: DVec3 = (row.col_indices().iter().zip(row.values())).map(|(&j, &x)| x * control.positions[j]).sum();
+        largest.max((mesh.positions[i] - limit).length())
+    })
 }
 
 #[test]
 fn the_control_mesh_satisfies_the_equation_and_keeps_the_faces() {
     let folder = tempdir().unwrap();
     for scheme in Scheme::ALL {
-        let mesh = noisy(if scheme.needs_triangles() {
-            "irregular-tri:300"
-        } else {
-            "irregular-poly:300"
-        });
+        let mesh = noisy(if scheme.needs_triangles() { "irregular-tri:300" } else { "irregular-poly:300" });
         for (given, wanted) in [("p.obj", "v.ply"), ("p.off", "v.obj"), ("p.ply", "v.off")] {
             io::write(&folder.path().join(given), &mesh, None).unwrap();
-            for (flag, tolerance, relative) in
-                [("--tol", 1e-8, true), ("--tol-absolute", 1e-4, false)]
-            {
+            for (flag, tolerance, relative) in [("--tol", 1e-8, true), ("--tol-absolute", 1e-4, false)] {
                 let tol = tolerance.to_string();
-                let arguments = [
-                    given,
-                    "-o",
-                    wanted,
-                    "--scheme",
-                    scheme.name(),
-                    flag,
-                    &tol,
-                    "--quiet",
-                ];
+                let arguments = [given, "-o", wanted, "--scheme", scheme.name(), flag, &tol, "--quiet"];
                 assert_done(&run(INTERPOLATE, folder.path(), arguments), scheme.name());
                 let control = io::read(&folder.path().join(wanted)).unwrap().mesh;
                 assert_eq!(control.faces, mesh.faces, "{scheme} {wanted}");
                 let allowed = tolerance * if relative { mesh.diagonal() } else { 1.0 };
                 let error = residual(scheme, &mesh, &control);
-                assert!(
-                    error <= allowed * (1.0 + 1e-6),
-                    "{scheme} {wanted}: {error:e}"
-                );
-                assert!(
-                    error > 1e-4 * allowed,
-                    "{scheme}: the tolerance asked for is the one used"
-                );
+                assert!(error <= allowed * (1.0 + 1e-6), "{scheme} {wanted}: {error:e}");
+                assert!(error > 1e-4 * allowed, "{scheme}: the tolerance asked for is the one used");
             }
         }
     }
@@ -198,25 +160,18 @@ fn every_method_gives_the_same_control_mesh() {
     let folder = tempdir().unwrap();
     let mesh = noisy("irregular-quad:400");
     io::write(&folder.path().join("p.obj"), &mesh, None).unwrap();
-    let methods = "auto lu cholesky ldlt jacobi thall gauss-seidel sor ssor pia w-pia chebyshev cg pcg-jacobi pcg-ssor pcg-ic0";
+    let methods =
+        "auto lu cholesky ldlt jacobi thall gauss-seidel sor ssor pia w-pia chebyshev cg pcg-jacobi pcg-ssor pcg-ic0";
     let by_colours = ["gauss-seidel", "sor"].map(|method| (method, "multicolour"));
     let mut first: Option<Mesh> = None;
     for (method, order) in methods.split(' ').map(|m| (m, "rcm")).chain(by_colours) {
-        let arguments = [
-            "p.obj", "-o", "v.obj", "--method", method, "--order", order, "--quiet",
-        ];
+        let arguments = ["p.obj", "-o", "v.obj", "--method", method, "--order", order, "--quiet"];
         assert_done(&run(INTERPOLATE, folder.path(), arguments), method);
         let control = io::read(&folder.path().join("v.obj")).unwrap().mesh;
         let scheme = Scheme::CatmullClark;
-        assert!(
-            residual(scheme, &mesh, &control) <= 1.001e-10 * mesh.diagonal(),
-            "{method}, {order}"
-        );
+        assert!(residual(scheme, &mesh, &control) <= 1.001e-10 * mesh.diagonal(), "{method}, {order}");
         let reference = first.get_or_insert_with(|| control.clone());
-        assert!(
-            distance(&control.positions, &reference.positions) < 1e-6,
-            "{method}, {order}"
-        );
+        assert!(distance(&control.positions, &reference.positions) < 1e-6, "{method}, {order}");
     }
 }
 
@@ -224,15 +179,7 @@ fn every_method_gives_the_same_control_mesh() {
 #[test]
 fn a_nearly_singular_system_is_solved_by_the_automatic_choice() {
     let folder = tempdir().unwrap();
-    let arguments = [
-        "prism:1001",
-        "--noise",
-        "0.1",
-        "-o",
-        "v.obj",
-        "--json",
-        "--quiet",
-    ];
+    let arguments = ["prism:1001", "--noise", "0.1", "-o", "v.obj", "--json", "--quiet"];
     let output = run(INTERPOLATE, folder.path(), arguments);
     assert_done(&output, "prism:1001");
     assert_eq!(json(&output)["method"], "ldlt");
@@ -249,36 +196,15 @@ fn as_interior_serves_loop_and_sqrt3() {
     let model = root.join("open/cathead_131v.off").canonicalize().unwrap();
     let (name, mesh) = (model.to_str().unwrap(), io::read(&model).unwrap().mesh);
     for scheme in [Scheme::Loop, Scheme::Sqrt3] {
-        let arguments = [
-            name,
-            "-o",
-            "v.obj",
-            "--scheme",
-            scheme.name(),
-            "--boundary",
-            "as-interior",
-            "--quiet",
-        ];
+        let arguments = [name, "-o", "v.obj", "--scheme", scheme.name(), "--boundary", "as-interior", "--quiet"];
         assert_done(&run(INTERPOLATE, folder.path(), arguments), scheme.name());
         let control = io::read(&folder.path().join("v.obj")).unwrap().mesh;
         assert!(residual(scheme, &mesh, &control) <= 1.001e-10 * mesh.diagonal());
     }
     for scheme in ["catmull-clark", "nasri", "zheng-cai"] {
-        let arguments = [
-            name,
-            "--out",
-            "m",
-            "--scheme",
-            scheme,
-            "--boundary",
-            "as-interior",
-            "--quiet",
-        ];
+        let arguments = [name, "--out", "m", "--scheme", scheme, "--boundary", "as-interior", "--quiet"];
         let line = assert_refused(&run(ASSEMBLE, folder.path(), arguments), scheme);
-        assert!(
-            line.contains("cathead") && line.contains("boundary edges"),
-            "{line}"
-        );
+        assert!(line.contains("cathead") && line.contains("boundary edges"), "{line}");
     }
 }
 
@@ -286,14 +212,8 @@ fn as_interior_serves_loop_and_sqrt3() {
 fn without_times(path: &Path) -> Vec<Vec<String>> {
     let mut reader = csv::Reader::from_path(path).unwrap();
     let header = reader.headers().unwrap().clone();
-    let kept: Vec<usize> = (0..header.len())
-        .filter(|&k| !header[k].contains("seconds"))
-        .collect();
-    let pick = |record: &csv::StringRecord| {
-        kept.iter()
-            .map(|&k| record[k].to_owned())
-            .collect::<Vec<_>>()
-    };
+    let kept: Vec<usize> = (0..header.len()).filter(|&k| !header[k].contains("seconds")).collect();
+    let pick = |record: &csv::StringRecord| kept.iter().map(|&k| record[k].to_owned()).collect::<Vec<_>>();
     let mut rows = vec![pick(&header)];
     rows.extend(reader.records().map(|r| pick(&r.unwrap())));
     rows
@@ -306,43 +226,17 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let bytes = |name: &str| fs::read(path(name)).unwrap();
     for threads in ["1", "2"] {
         let common = ["--noise", "0.1", "--threads", threads, "--quiet"];
-        let with = |more: &[&str]| -> Vec<String> {
-            more.iter().chain(&common).map(|s| s.to_string()).collect()
-        };
+        let with = |more: &[&str]| -> Vec<String> { more.iter().chain(&common).map(|s| s.to_string()).collect() };
         // Above 10 000 vertices the sums over vertices are made of parts.
         let control = format!("v{threads}.obj");
-        let arguments = with(&[
-            "icosphere:5",
-            "-o",
-            &control,
-            "--tol",
-            "1e-7",
-            "--method",
-            "cg",
-        ]);
+        let arguments = with(&["icosphere:5", "-o", &control, "--tol", "1e-7", "--method", "cg"]);
         assert_done(&run(INTERPOLATE, folder.path(), arguments), "interpolate");
         let out = format!("out{threads}");
         let arguments = with(&["irregular-tri:12000", "--out", &out]);
         assert_done(&run(ASSEMBLE, folder.path(), arguments), "assemble");
-        let arguments = with(&[
-            "torus:75x70",
-            "--out",
-            &out,
-            "--omega",
-            "0.7:0.9:0.1",
-            "--tol",
-            "1e-4",
-        ]);
+        let arguments = with(&["torus:75x70", "--out", &out, "--omega", "0.7:0.9:0.1", "--tol", "1e-4"]);
         assert_done(&run(SWEEP, folder.path(), arguments), "sweep-omega");
-        let arguments = with(&[
-            "torus:75x70",
-            "--out",
-            &out,
-            "--method",
-            "lu,pia,chebyshev,cg,sor",
-            "--tol",
-            "1e-4",
-        ]);
+        let arguments = with(&["torus:75x70", "--out", &out, "--method", "lu,pia,chebyshev,cg,sor", "--tol", "1e-4"]);
         assert_done(&run(COMPARE, folder.path(), arguments), "compare-solvers");
     }
     assert!(bytes("v1.obj") == bytes("v2.obj"), "control meshes differ");
@@ -364,15 +258,7 @@ fn pia_table_1_is_reproduced_on_the_paper_s_models() {
     let Some(root) = collection() else { return };
     let folder = tempdir().unwrap();
     let root = root.canonicalize().unwrap();
-    let arguments = [
-        "--only",
-        "pia-table1",
-        "--out",
-        "r",
-        "--quiet",
-        "--meshes",
-        root.to_str().unwrap(),
-    ];
+    let arguments = ["--only", "pia-table1", "--out", "r", "--quiet", "--meshes", root.to_str().unwrap()];
     assert_done(&run(REPRODUCE, folder.path(), arguments), "reproduce");
     let path = folder.path().join("r/pia-table1.csv");
     let mut reader = csv::Reader::from_path(path).unwrap();
@@ -387,10 +273,7 @@ fn pia_table_1_is_reproduced_on_the_paper_s_models() {
         ("Boy", 6, 0.000913795, 9.5615e-5),
         ("Mushroom", 8, 0.000813821, 0.000235506),
     ];
-    let reproduced: Vec<_> = rows
-        .iter()
-        .filter(|r| &r[column("verdict")] == "reproduced")
-        .collect();
+    let reproduced: Vec<_> = rows.iter().filter(|r| &r[column("verdict")] == "reproduced").collect();
     assert_eq!(reproduced.len(), printed.len());
     for (row, (model, iterations, max, mean)) in reproduced.iter().zip(printed) {
         let number = |name: &str| row[column(name)].parse::<f64>().unwrap();
@@ -398,28 +281,17 @@ fn pia_table_1_is_reproduced_on_the_paper_s_models() {
         assert_eq!(number("measured_iterations"), f64::from(iterations));
         assert_eq!(number("updates"), f64::from(iterations - 1));
         for (name, value) in [("measured_max_error", max), ("measured_mean_error", mean)] {
-            assert!(
-                (number(name) / value - 1.0).abs() <= 2e-5,
-                "{model} {name}: {}",
-                number(name)
-            );
+            assert!((number(name) / value - 1.0).abs() <= 2e-5, "{model} {name}: {}", number(name));
         }
         for (name, value) in [("printed_max_error", max), ("printed_mean_error", mean)] {
             assert_eq!(number(name), value);
         }
     }
     // The Mushroom under the true limit mask, in a row of its own.
-    let [corrected] = rows
-        .iter()
-        .filter(|r| &r[column("verdict")] != "reproduced")
-        .collect::<Vec<_>>()
-        .try_into()
-        .unwrap();
+    let [corrected] =
+        rows.iter().filter(|r| &r[column("verdict")] != "reproduced").collect::<Vec<_>>().try_into().unwrap();
     assert_eq!(&corrected[column("model")], "Mushroom");
-    for (name, value) in [
-        ("measured_max_error", 0.00080917),
-        ("measured_mean_error", 0.00023088),
-    ] {
+    for (name, value) in [("measured_max_error", 0.00080917), ("measured_mean_error", 0.00023088)] {
         let measured: f64 = corrected[column(name)].parse().unwrap();
         assert!((measured / value - 1.0).abs() < 2e-5, "{name}: {measured}");
     }
@@ -433,13 +305,7 @@ fn stand_ins_never_overwrite_results_on_the_real_models() {
     fs::write(&kept, "results on the real models\n").unwrap();
     let arguments = ["--only", "pia-table1", "--out", "r", "--quick", "--quiet"];
     assert_done(&run(REPRODUCE, folder.path(), arguments), "reproduce");
-    assert_eq!(
-        fs::read_to_string(&kept).unwrap(),
-        "results on the real models\n"
-    );
+    assert_eq!(fs::read_to_string(&kept).unwrap(), "results on the real models\n");
     let table = fs::read_to_string(folder.path().join("r/built-in/pia-table1.md")).unwrap();
-    assert!(
-        table.contains("stand-in") && !table.contains("reproduced |"),
-        "{table}"
-    );
+    assert!(table.contains("stand-in") && !table.contains("reproduced |"), "{table}");
 }

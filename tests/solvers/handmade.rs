@@ -41,12 +41,7 @@ fn inner(x: &Points, y: &Points) -> f64 {
 impl Dense {
     fn new(mesh: &Mesh, scheme: Scheme, tolerance: f64) -> Self {
         let plain = assemble(scheme, mesh);
-        Dense {
-            a: plain.dense_a(),
-            plain,
-            p: rows(&mesh.positions),
-            tolerance,
-        }
+        Dense { a: plain.dense_a(), plain, p: rows(&mesh.positions), tolerance }
     }
 
     fn e(&self, v: &Points) -> Points {
@@ -85,11 +80,7 @@ impl Dense {
     /// V + (D/ω + L)⁻¹ e, with U for a backward sweep.
     fn sweep(&self, omega: f64, forward: bool, v: &Points, e: &Points) -> Points {
         let t = self.triangle(omega, forward);
-        let d = if forward {
-            t.solve_lower_triangular(e)
-        } else {
-            t.solve_upper_triangular(e)
-        };
+        let d = if forward { t.solve_lower_triangular(e) } else { t.solve_upper_triangular(e) };
         v + d.unwrap()
     }
 
@@ -192,12 +183,7 @@ impl Dense {
 }
 
 /// The iterates of the library.
-fn watched(
-    system: &LimitSystem,
-    points: &[DVec3],
-    setup: Setup,
-    stop: &Stop,
-) -> (Vec<Points>, Report) {
+fn watched(system: &LimitSystem, points: &[DVec3], setup: Setup, stop: &Stop) -> (Vec<Points>, Report) {
     let mut seen = Vec::new();
     let solution = run_watched(system, points, setup, stop, &mut |step| {
         assert_eq!(step.iteration, seen.len());
@@ -211,18 +197,9 @@ fn watched(
 /// Meshes of mixed shapes with points that excite everything.
 fn meshes(scheme: Scheme) -> Vec<Mesh> {
     let mut meshes = if scheme.needs_triangles() {
-        vec![
-            noisy("icosphere:1"),
-            noisy("bipyramid:9"),
-            noisy("irregular-tri:60"),
-        ]
+        vec![noisy("icosphere:1"), noisy("bipyramid:9"), noisy("irregular-tri:60")]
     } else {
-        vec![
-            noisy("torus:6x5"),
-            noisy("irregular-quad:50"),
-            noisy("irregular-poly:60"),
-            noisy("prism:5"),
-        ]
+        vec![noisy("torus:6x5"), noisy("irregular-quad:50"), noisy("irregular-poly:60"), noisy("prism:5")]
     };
     meshes.extend((1..4).map(|seed| scattered(&small_triangles(seed), seed)));
     meshes
@@ -237,17 +214,8 @@ struct Case<'a> {
 
 impl Case<'_> {
     /// Equal counts, equal iterates, equal histories.
-    fn hold(
-        &self,
-        name: &str,
-        setup: Setup,
-        expected: &[Points],
-        allowed: impl Fn(usize, f64) -> f64,
-    ) {
-        let stop = Stop {
-            tolerance: self.dense.tolerance,
-            max_iterations: 6000,
-        };
+    fn hold(&self, name: &str, setup: Setup, expected: &[Points], allowed: impl Fn(usize, f64) -> f64) {
+        let stop = Stop { tolerance: self.dense.tolerance, max_iterations: 6000 };
         let (seen, report) = watched(self.system, &self.mesh.positions, setup, &stop);
         let what = format!("{name}, {}, {} vertices", self.scheme, self.mesh.len());
         assert_eq!(report.outcome, Outcome::Converged, "{what}");
@@ -260,14 +228,8 @@ impl Case<'_> {
             let e = self.dense.e(w);
             let mean = e.row_iter().map(|r| r.norm()).sum::<f64>() / e.nrows() as f64;
             let slack = allowed(k, scale);
-            assert!(
-                (report.history[k].max - max_row(&e)).abs() <= slack,
-                "{what}: history"
-            );
-            assert!(
-                (report.history[k].mean - mean).abs() <= slack,
-                "{what}: history"
-            );
+            assert!((report.history[k].max - max_row(&e)).abs() <= slack, "{what}: history");
+            assert!((report.history[k].mean - mean).abs() <= slack, "{what}: history");
         }
     }
 }
@@ -277,12 +239,7 @@ fn for_each_case(tolerance: f64, mut visit: impl FnMut(&Case)) {
         for mesh in meshes(scheme) {
             let system = system(&mesh, scheme);
             let dense = Dense::new(&mesh, scheme, tolerance * mesh.diagonal());
-            visit(&Case {
-                mesh: &mesh,
-                scheme,
-                system: &system,
-                dense: &dense,
-            });
+            visit(&Case { mesh: &mesh, scheme, system: &system, dense: &dense });
         }
     }
 }
@@ -292,12 +249,7 @@ fn relaxations_are_their_splittings() {
     for_each_case(1e-7, |case| {
         let Case { dense, .. } = case;
         case.hold("thall", Setup::THALL, &dense.jacobi(0.5), tol::iterates);
-        case.hold(
-            "jacobi",
-            Setup::Jacobi { omega: 0.4 },
-            &dense.jacobi(0.4),
-            tol::iterates,
-        );
+        case.hold("jacobi", Setup::Jacobi { omega: 0.4 }, &dense.jacobi(0.4), tol::iterates);
         for (name, omega) in [("pia", 1.0), ("w-pia", 1.3)] {
             let expected = dense.iterate(|v, e| v + omega * e);
             case.hold(name, Setup::Pia { omega }, &expected, tol::iterates);
@@ -314,16 +266,8 @@ fn sweeps_are_triangular_solves() {
             let forward = Setup::Sor { omega, order: None };
             case.hold("sor", forward, &dense.sor(omega, true), tol::iterates);
             // The reversed order is the splitting by the other triangle.
-            let backward = Setup::Sor {
-                omega,
-                order: Some(&order),
-            };
-            case.hold(
-                "sor reversed",
-                backward,
-                &dense.sor(omega, false),
-                tol::iterates,
-            );
+            let backward = Setup::Sor { omega, order: Some(&order) };
+            case.hold("sor reversed", backward, &dense.sor(omega, false), tol::iterates);
             let both = Setup::Ssor { omega, order: None };
             case.hold("ssor", both, &dense.ssor(omega), tol::iterates);
         }
@@ -339,12 +283,7 @@ fn chebyshev_is_the_textbook_s() {
             let expected = case.dense.chebyshev(spectrum);
             // The recurrence forgets no error of its two terms at once.
             let allowed = |k, scale| 8.0 * tol::iterates(k, scale);
-            case.hold(
-                "chebyshev",
-                Setup::Chebyshev { spectrum },
-                &expected,
-                allowed,
-            );
+            case.hold("chebyshev", Setup::Chebyshev { spectrum }, &expected, allowed);
         }
     });
 }
@@ -358,30 +297,20 @@ fn hold_cg(case: &Case, name: &str, setup: Setup, loops: impl Fn(&Dense) -> Vec<
     for (k, x) in other.p.iter_mut().enumerate() {
         *x *= 1.0 + f64::EPSILON * [1.0, -2.0, 3.0][k % 3];
     }
-    let mut spread: Vec<f64> = (expected.iter().zip(loops(&other)))
-        .map(|(v, w)| max_row(&(v - w)))
-        .collect();
+    let mut spread: Vec<f64> = (expected.iter().zip(loops(&other))).map(|(v, w)| max_row(&(v - w))).collect();
     for k in 1..spread.len() {
         spread[k] = spread[k].max(spread[k - 1]);
     }
     let last = spread.len() - 1;
-    case.hold(name, setup, &expected, |k, scale| {
-        tol::iterates(k, scale) + FACTOR * spread[k.min(last)]
-    });
+    case.hold(name, setup, &expected, |k, scale| tol::iterates(k, scale) + FACTOR * spread[k.min(last)]);
     // Not so much that the comparison would be idle.
-    assert!(
-        spread[last] < 1e-2 * case.dense.tolerance,
-        "{name}: {:e}",
-        spread[last]
-    );
+    assert!(spread[last] < 1e-2 * case.dense.tolerance, "{name}: {:e}", spread[last]);
 }
 
 #[test]
 fn conjugate_gradients_are_the_textbook_s() {
     for_each_case(1e-4, |case| {
-        hold_cg(case, "cg", Setup::Cg, |d| {
-            d.cg(|r| d.scaled_rows(r, |i| d.plain.h[i]))
-        });
+        hold_cg(case, "cg", Setup::Cg, |d| d.cg(|r| d.scaled_rows(r, |i| d.plain.h[i])));
         hold_cg(case, "plain cg", Setup::PlainCg, |d| d.cg(Points::clone));
         hold_cg(case, "pcg-jacobi", Setup::PcgJacobi, |d| {
             let diagonal = d.plain.dense_m().diagonal();
@@ -389,9 +318,7 @@ fn conjugate_gradients_are_the_textbook_s() {
         });
         for omega in [1.0, 1.2] {
             let setup = Setup::PcgSsor { omega };
-            hold_cg(case, "pcg-ssor", setup, |d| {
-                d.cg(|r| d.symmetric_sweep(omega, r))
-            });
+            hold_cg(case, "pcg-ssor", setup, |d| d.cg(|r| d.symmetric_sweep(omega, r)));
         }
         hold_cg(case, "pcg-ic0", Setup::PcgIc0, |d| {
             let l = d.incomplete_cholesky();
@@ -415,21 +342,13 @@ fn sor_at_1_is_gauss_seidel_at_every_sweep() {
                 for k in 0..n {
                     let i = order.map_or(k, |o| o[k] as usize);
                     for axis in 0..3 {
-                        let others: f64 = (0..n)
-                            .filter(|&j| j != i)
-                            .map(|j| case.dense.a[(i, j)] * v[(j, axis)])
-                            .sum();
+                        let others: f64 = (0..n).filter(|&j| j != i).map(|j| case.dense.a[(i, j)] * v[(j, axis)]).sum();
                         v[(i, axis)] = (case.dense.p[(i, axis)] - others) / case.dense.a[(i, i)];
                     }
                 }
                 v
             });
-            case.hold(
-                "sor(1)",
-                Setup::Sor { omega: 1.0, order },
-                &expected,
-                tol::iterates,
-            );
+            case.hold("sor(1)", Setup::Sor { omega: 1.0, order }, &expected, tol::iterates);
         }
     });
 }
@@ -439,52 +358,28 @@ fn sor_at_1_is_gauss_seidel_at_every_sweep() {
 #[test]
 fn chebyshev_keeps_its_promise() {
     for scheme in Scheme::ALL {
-        let name = if scheme.needs_triangles() {
-            "irregular-tri:300"
-        } else {
-            "torus:16x15"
-        };
+        let name = if scheme.needs_triangles() { "irregular-tri:300" } else { "torus:16x15" };
         let mesh = noisy(name);
         let system = system(&mesh, scheme);
         let spectrum = (system.bounds.lambda_min, system.bounds.lambda_max);
         assert!(spectrum.0 > 0.0);
         let norm = |v: &[DVec3]| -> f64 {
-            let squares = (0..v.len()).map(|i| {
-                (mesh.positions[i] - system.a.row_times(i, v)).length_squared() / system.h[i]
-            });
+            let squares =
+                (0..v.len()).map(|i| (mesh.positions[i] - system.a.row_times(i, v)).length_squared() / system.h[i]);
             squares.sum::<f64>().sqrt()
         };
         let start = norm(&mesh.positions);
         for factor in [1e-2, 1e-5, 1e-9] {
             let promised = promised_iterations(spectrum, factor);
-            let stop = Stop {
-                tolerance: 0.0,
-                max_iterations: promised as usize,
-            };
-            let solution = crate::setups::checked(
-                &system,
-                &mesh.positions,
-                Setup::Chebyshev { spectrum },
-                &stop,
-            );
+            let stop = Stop { tolerance: 0.0, max_iterations: promised as usize };
+            let solution = crate::setups::checked(&system, &mesh.positions, Setup::Chebyshev { spectrum }, &stop);
             assert_eq!(solution.report.iterations as f64, promised, "{scheme}");
             let reached = norm(&solution.points) / start;
-            assert!(
-                reached <= factor * (1.0 + 1e-6),
-                "{scheme}: {reached:e} > {factor:e}"
-            );
+            assert!(reached <= factor * (1.0 + 1e-6), "{scheme}: {reached:e} > {factor:e}");
 
             let h_max = system.h.iter().copied().fold(0.0, f64::max);
-            let stop = Stop {
-                tolerance: factor * h_max.sqrt() * start,
-                max_iterations: 1000,
-            };
-            let solution = crate::setups::checked(
-                &system,
-                &mesh.positions,
-                Setup::Chebyshev { spectrum },
-                &stop,
-            );
+            let stop = Stop { tolerance: factor * h_max.sqrt() * start, max_iterations: 1000 };
+            let solution = crate::setups::checked(&system, &mesh.positions, Setup::Chebyshev { spectrum }, &stop);
             assert_eq!(solution.report.outcome, Outcome::Converged);
             assert!(solution.report.iterations as f64 <= promised, "{scheme}");
         }

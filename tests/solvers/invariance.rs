@@ -15,10 +15,7 @@ fn is_krylov(setup: Setup) -> bool {
     matches!(setup, Cg | PlainCg | PcgJacobi | PcgSsor { .. } | PcgIc0)
 }
 
-const FEW: Stop = Stop {
-    tolerance: 0.0,
-    max_iterations: 12,
-};
+const FEW: Stop = Stop { tolerance: 0.0, max_iterations: 12 };
 
 /// Rows of A sum to 1, so affine maps commute with every step that is linear in the data. The step sizes of conjugate
 /// gradients are not, but similarities keep them.
@@ -28,11 +25,7 @@ fn affine_maps_of_the_data_are_affine_maps_of_every_iterate() {
     let rotation = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, -2.0) / 3.0, 0.7) * 2.5;
     let shift = DVec3::new(0.5, -2.0, 1.0);
     for scheme in Scheme::ALL {
-        let name = if scheme.needs_triangles() {
-            "irregular-tri:80"
-        } else {
-            "torus:9x8"
-        };
+        let name = if scheme.needs_triangles() { "irregular-tri:80" } else { "torus:9x8" };
         let mesh = noisy(name);
         let system = system(&mesh, scheme);
         let order = reversed(mesh.len());
@@ -40,13 +33,7 @@ fn affine_maps_of_the_data_are_affine_maps_of_every_iterate() {
             let (map, stop) = match setup {
                 _ if is_krylov(setup) => (rotation, FEW),
                 // One solve; a second one would refine rounding errors.
-                _ if DIRECT.iter().any(|d| d.1 == setup) => (
-                    shear,
-                    Stop {
-                        max_iterations: 1,
-                        ..FEW
-                    },
-                ),
+                _ if DIRECT.iter().any(|d| d.1 == setup) => (shear, Stop { max_iterations: 1, ..FEW }),
                 _ => (shear, FEW),
             };
             let moved: Vec<DVec3> = mesh.positions.iter().map(|p| map * *p + shift).collect();
@@ -56,11 +43,7 @@ fn affine_maps_of_the_data_are_affine_maps_of_every_iterate() {
             let error = distance(&found.points, &expected);
             // The shear stretches by less than 2.
             let scale = 2.0 * mesh.diagonal();
-            let allowed = if is_krylov(setup) {
-                tol::krylov(scale)
-            } else {
-                tol::iterates(stop.max_iterations, scale)
-            };
+            let allowed = if is_krylov(setup) { tol::krylov(scale) } else { tol::iterates(stop.max_iterations, scale) };
             assert!(error <= allowed, "{name}, {scheme}: {error:e}");
             assert_eq!(found.report.iterations, plain.report.iterations);
         }
@@ -70,62 +53,32 @@ fn affine_maps_of_the_data_are_affine_maps_of_every_iterate() {
 #[test]
 fn renumbering_leaves_simultaneous_updates_alone_but_not_sweeps() {
     for scheme in Scheme::ALL {
-        let name = if scheme.needs_triangles() {
-            "irregular-tri:150"
-        } else {
-            "irregular-quad:150"
-        };
+        let name = if scheme.needs_triangles() { "irregular-tri:150" } else { "irregular-quad:150" };
         let mesh = noisy(name);
         let order = Order::Random(77).order(&mesh, &topology(&mesh).incidence);
         let renumbered = permute_vertices(&mesh, &order);
         let (before, after) = (system(&mesh, scheme), system(&renumbered, scheme));
-        let maxima = |solution: &Solution| -> Vec<f64> {
-            solution.report.history.iter().map(|e| e.max).collect()
-        };
+        let maxima = |solution: &Solution| -> Vec<f64> { solution.report.history.iter().map(|e| e.max).collect() };
         let histories = |setup: Setup| {
             let runs = [(&before, &mesh), (&after, &renumbered)];
             runs.map(|(system, mesh)| maxima(&checked(system, &mesh.positions, setup, &FEW)))
         };
         let largest = |[a, b]: [Vec<f64>; 2]| {
             assert_eq!(a.len(), b.len());
-            a.iter()
-                .zip(&b)
-                .map(|(a, b)| (a - b).abs() / mesh.diagonal())
-                .fold(0.0, f64::max)
+            a.iter().zip(&b).map(|(a, b)| (a - b).abs() / mesh.diagonal()).fold(0.0, f64::max)
         };
-        for setup in [
-            Setup::Pia { omega: 1.0 },
-            Setup::THALL,
-            Setup::Chebyshev {
-                spectrum: (0.1, 1.0),
-            },
-        ] {
+        for setup in [Setup::Pia { omega: 1.0 }, Setup::THALL, Setup::Chebyshev { spectrum: (0.1, 1.0) }] {
             let difference = largest(histories(setup));
-            assert!(
-                difference <= tol::iterates(12, 1.0),
-                "{scheme} {setup:?}: {difference:e}"
-            );
+            assert!(difference <= tol::iterates(12, 1.0), "{scheme} {setup:?}: {difference:e}");
         }
-        let sweeps = Setup::Sor {
-            omega: 1.0,
-            order: None,
-        };
-        assert!(
-            largest(histories(sweeps)) > 1e-6,
-            "{scheme}: the order does not matter?"
-        );
+        let sweeps = Setup::Sor { omega: 1.0, order: None };
+        assert!(largest(histories(sweeps)) > 1e-6, "{scheme}: the order does not matter?");
         // Told the old order in new numbers, the sweeps are the same.
         let told = limitlab::mesh::order::inverse(&order);
-        let in_order = Setup::Sor {
-            omega: 1.0,
-            order: Some(&told),
-        };
+        let in_order = Setup::Sor { omega: 1.0, order: Some(&told) };
         let first = maxima(&checked(&before, &mesh.positions, sweeps, &FEW));
         let second = maxima(&checked(&after, &renumbered.positions, in_order, &FEW));
-        assert!(
-            largest([first, second]) <= tol::iterates(12, 1.0),
-            "{scheme}"
-        );
+        assert!(largest([first, second]) <= tol::iterates(12, 1.0), "{scheme}");
     }
 }
 
@@ -141,14 +94,8 @@ fn results_are_bit_by_bit_the_same_with_any_number_of_threads() {
         let setups = [
             Setup::Pia { omega: 1.0 },
             Setup::THALL,
-            Setup::Sor {
-                omega: 1.1,
-                order: Some(&order),
-            },
-            Setup::Ssor {
-                omega: 1.0,
-                order: None,
-            },
+            Setup::Sor { omega: 1.1, order: Some(&order) },
+            Setup::Ssor { omega: 1.0, order: None },
             Setup::Chebyshev { spectrum },
             Setup::Cg,
             Setup::PlainCg,
@@ -160,19 +107,13 @@ fn results_are_bit_by_bit_the_same_with_any_number_of_threads() {
         ];
         for setup in setups {
             let [one, two, three] = [1, 2, 3].map(|threads| {
-                let pool = rayon::ThreadPoolBuilder::new()
-                    .num_threads(threads)
-                    .build()
-                    .unwrap();
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| checked(&system, &mesh.positions, setup, &FEW))
             });
             for other in [two, three] {
                 assert_eq!(one.report, other.report, "{scheme} {setup:?}");
                 let bits = |s: &Solution| -> Vec<[u64; 3]> {
-                    s.points
-                        .iter()
-                        .map(|p| p.to_array().map(f64::to_bits))
-                        .collect()
+                    s.points.iter().map(|p| p.to_array().map(f64::to_bits)).collect()
                 };
                 assert_eq!(bits(&one), bits(&other), "{scheme} {setup:?}");
             }

@@ -32,25 +32,15 @@ impl Masks for Neighbours {
 fn a_breakdown_is_an_outcome_that_says_where() {
     let mesh = noisy("icosahedron");
     let system = LimitSystem::with_masks(&mesh, &topology(&mesh), &Neighbours).unwrap();
-    let stop = Stop {
-        tolerance: 1e-10,
-        max_iterations: 100,
-    };
+    let stop = Stop { tolerance: 1e-10, max_iterations: 100 };
     let report = checked(&system, &mesh.positions, Setup::PcgIc0, &stop).report;
     assert_eq!((report.outcome, report.iterations), (Outcome::Breakdown, 0));
     let detail = report.detail.unwrap();
-    assert!(
-        detail.contains("vertex 0") && detail.contains("pivot"),
-        "{detail}"
-    );
+    assert!(detail.contains("vertex 0") && detail.contains("pivot"), "{detail}");
     // M is indefinite, which conjugate gradients find out or live with: never a false claim.
     for setup in [Setup::Cg, Setup::PlainCg] {
         let report = checked(&system, &mesh.positions, setup, &stop).report;
-        assert!(
-            matches!(report.outcome, Outcome::Breakdown | Outcome::Converged),
-            "{:?}",
-            report.outcome
-        );
+        assert!(matches!(report.outcome, Outcome::Breakdown | Outcome::Converged), "{:?}", report.outcome);
     }
     // Cholesky wants positive pivots, LDLᵀ and LU do not.
     let report = checked(&system, &mesh.positions, Setup::Cholesky, &stop).report;
@@ -66,16 +56,9 @@ fn incomplete_cholesky_breaks_down_on_the_cube() {
     for name in ["cube", "prism:4", "cubes:3"] {
         let mesh = noisy(name);
         let system = system(&mesh, Scheme::CatmullClark);
-        let stop = Stop {
-            tolerance: 1e-10,
-            max_iterations: 100,
-        };
+        let stop = Stop { tolerance: 1e-10, max_iterations: 100 };
         let report = checked(&system, &mesh.positions, Setup::PcgIc0, &stop).report;
-        assert_eq!(
-            (report.outcome, report.iterations),
-            (Outcome::Breakdown, 0),
-            "{name}"
-        );
+        assert_eq!((report.outcome, report.iterations), (Outcome::Breakdown, 0), "{name}");
         assert!(report.detail.unwrap().contains("is not positive"));
     }
 }
@@ -91,10 +74,7 @@ fn numbers_that_are_not_finite_never_converge() {
                 let mut points = mesh.positions.clone();
                 points[42][axis] = bad;
                 for (name, setup) in all(&system, &order) {
-                    let stop = Stop {
-                        tolerance: 1e-3,
-                        max_iterations: 50,
-                    };
+                    let stop = Stop { tolerance: 1e-3, max_iterations: 50 };
                     let report = checked(&system, &points, setup, &stop).report;
                     assert_eq!(report.outcome, Outcome::Diverged, "{name}, {scheme}, {bad}");
                 }
@@ -103,10 +83,7 @@ fn numbers_that_are_not_finite_never_converge() {
         // Nor do points so large that their squares overflow.
         let huge: Vec<DVec3> = mesh.positions.iter().map(|p| 1e200 * *p).collect();
         for (name, setup) in all(&system, &order) {
-            let stop = Stop {
-                tolerance: 1e-3,
-                max_iterations: 500,
-            };
+            let stop = Stop { tolerance: 1e-3, max_iterations: 500 };
             let outcome = checked(&system, &huge, setup, &stop).report.outcome;
             assert_ne!(outcome, Outcome::Converged, "{name}, {scheme}");
         }
@@ -116,34 +93,15 @@ fn numbers_that_are_not_finite_never_converge() {
 #[test]
 fn a_tolerance_below_rounding_ends_in_stagnation() {
     for scheme in Scheme::ALL {
-        let mesh = noisy(if scheme.needs_triangles() {
-            "irregular-tri:200"
-        } else {
-            "torus:14x15"
-        });
+        let mesh = noisy(if scheme.needs_triangles() { "irregular-tri:200" } else { "torus:14x15" });
         let system = system(&mesh, scheme);
         let order = reversed(mesh.len());
-        let stop = Stop {
-            tolerance: 1e-22 * mesh.diagonal(),
-            max_iterations: 10_000,
-        };
+        let stop = Stop { tolerance: 1e-22 * mesh.diagonal(), max_iterations: 10_000 };
         for (name, setup) in all(&system, &order) {
             let report = checked(&system, &mesh.positions, setup, &stop).report;
-            assert_eq!(
-                report.outcome,
-                Outcome::Stagnated,
-                "{name}, {scheme}, {:?}",
-                report.detail
-            );
-            let floor = report
-                .history
-                .iter()
-                .map(|e| e.max)
-                .fold(f64::INFINITY, f64::min);
-            assert!(
-                floor < 1e-13 * mesh.diagonal(),
-                "{name}, {scheme}: {floor:e}"
-            );
+            assert_eq!(report.outcome, Outcome::Stagnated, "{name}, {scheme}, {:?}", report.detail);
+            let floor = report.history.iter().map(|e| e.max).fold(f64::INFINITY, f64::min);
+            assert!(floor < 1e-13 * mesh.diagonal(), "{name}, {scheme}: {floor:e}");
         }
     }
 }
@@ -155,28 +113,14 @@ fn limits_on_iterations_are_kept() {
     let order = reversed(mesh.len());
     for (name, setup) in all(&system, &order) {
         for limit in [0, 1, 2] {
-            let stop = Stop {
-                tolerance: 0.0,
-                max_iterations: limit,
-            };
+            let stop = Stop { tolerance: 0.0, max_iterations: limit };
             let report = checked(&system, &mesh.positions, setup, &stop).report;
-            assert_eq!(
-                (report.outcome, report.iterations),
-                (Outcome::MaxIterations, limit),
-                "{name}"
-            );
+            assert_eq!((report.outcome, report.iterations), (Outcome::MaxIterations, limit), "{name}");
         }
         // A start within the tolerance is a solution.
-        let stop = Stop {
-            tolerance: mesh.diagonal(),
-            max_iterations: 5,
-        };
+        let stop = Stop { tolerance: mesh.diagonal(), max_iterations: 5 };
         let report = checked(&system, &mesh.positions, setup, &stop).report;
-        assert_eq!(
-            (report.outcome, report.iterations),
-            (Outcome::Converged, 0),
-            "{name}"
-        );
+        assert_eq!((report.outcome, report.iterations), (Outcome::Converged, 0), "{name}");
     }
 }
 
@@ -187,10 +131,7 @@ fn the_smallest_mesh_is_solved_by_every_method() {
         let system = system(&mesh, scheme);
         let order = reversed(4);
         for (name, setup) in all(&system, &order) {
-            let stop = Stop {
-                tolerance: 1e-12,
-                max_iterations: 1000,
-            };
+            let stop = Stop { tolerance: 1e-12, max_iterations: 1000 };
             let report = checked(&system, &mesh.positions, setup, &stop).report;
             assert_eq!(report.outcome, Outcome::Converged, "{name}, {scheme}");
         }

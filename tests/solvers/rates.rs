@@ -12,10 +12,7 @@ use crate::common::tol;
 use crate::setups::checked;
 
 fn solved(mesh: &Mesh, scheme: Scheme, setup: Setup) -> Solution {
-    let stop = Stop {
-        tolerance: 1e-12 * mesh.diagonal(),
-        max_iterations: 20_000,
-    };
+    let stop = Stop { tolerance: 1e-12 * mesh.diagonal(), max_iterations: 20_000 };
     checked(&system(mesh, scheme), &mesh.positions, setup, &stop)
 }
 
@@ -34,20 +31,10 @@ fn rates_on_tori_are_those_of_the_symbols() {
     let triangles = noisy("tri-torus:6x6");
     for (mesh, scheme, setup, expected) in [
         // D⁻¹A has its spectrum in [1/4, 9/4].
-        (
-            &quads,
-            Scheme::CatmullClark,
-            Setup::Jacobi { omega: 0.8 },
-            0.8,
-        ),
+        (&quads, Scheme::CatmullClark, Setup::Jacobi { omega: 0.8 }, 0.8),
         (&quads, Scheme::CatmullClark, Setup::THALL, 7.0 / 8.0),
         // A in [1/9, 1].
-        (
-            &quads,
-            Scheme::CatmullClark,
-            Setup::Pia { omega: 1.0 },
-            8.0 / 9.0,
-        ),
+        (&quads, Scheme::CatmullClark, Setup::Pia { omega: 1.0 }, 8.0 / 9.0),
         (&quads, Scheme::CatmullClark, Setup::Pia { omega: 1.8 }, 0.8),
         // A in [1/4, 1], [1/2, 1].
         (&quads, Scheme::Nasri, Setup::Pia { omega: 1.0 }, 0.75),
@@ -58,10 +45,7 @@ fn rates_on_tori_are_those_of_the_symbols() {
         (&triangles, Scheme::Loop, Setup::THALL, 0.75),
     ] {
         let found = rate(mesh, scheme, setup);
-        assert!(
-            (found - expected).abs() <= tol::RATE,
-            "{scheme} {setup:?}: {found} instead of {expected}"
-        );
+        assert!((found - expected).abs() <= tol::RATE, "{scheme} {setup:?}: {found} instead of {expected}");
     }
 }
 
@@ -79,10 +63,7 @@ fn undamped_jacobi_diverges_on_regular_quads_and_is_found_out_early() {
 fn torus_sweep(grid: &[f64]) -> Sweep {
     let mesh = noisy("torus:32x32");
     let system = system(&mesh, Scheme::CatmullClark);
-    let stop = Stop {
-        tolerance: 1e-10 * mesh.diagonal(),
-        max_iterations: 20_000,
-    };
+    let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 20_000 };
     let floor = rounding_floor(mesh.diagonal());
     let grids = [(Method::Jacobi, grid.to_vec())];
     sweep(&system, &mesh.positions, &grids, None, &stop, floor, &|| {}).unwrap()
@@ -94,32 +75,18 @@ fn the_noisy_torus_is_best_at_four_fifths_and_diverges_where_an_excited_mode_gro
     let excited = 0.75 * (2.0 + (TAU / 32.0).cos());
     let threshold = 2.0 / excited;
     // The grid has a point between the thresholds of the matrix, 0.8889, and of the data, 0.8946.
-    let grid: Vec<f64> = (1..=190)
-        .map(|k| k as f64 / 200.0)
-        .filter(|w| *w >= 0.7)
-        .collect();
+    let grid: Vec<f64> = (1..=190).map(|k| k as f64 / 200.0).filter(|w| *w >= 0.7).collect();
     let sweep = torus_sweep(&grid);
     let thresholds = sweep.thresholds[0];
     assert!((thresholds.matrix.critical_omega() - 8.0 / 9.0).abs() < tol::ESTIMATE);
     assert!((thresholds.matrix.optimal_omega() - 0.8).abs() < tol::ESTIMATE);
     let data = thresholds.data.unwrap();
-    assert!(
-        (data.critical_omega() - threshold).abs() < tol::ESTIMATE,
-        "{}",
-        data.critical_omega()
-    );
+    assert!((data.critical_omega() - threshold).abs() < tol::ESTIMATE, "{}", data.critical_omega());
     for row in &sweep.rows {
         let omega = row.omega;
         let radius = (1.0 - 0.25 * omega).max((1.0 - 2.25 * omega).abs());
-        assert!(
-            (row.predicted_rho - radius).abs() < tol::ESTIMATE,
-            "ω = {omega}"
-        );
-        let expected = if omega < threshold {
-            Outcome::Converged
-        } else {
-            Outcome::Diverged
-        };
+        assert!((row.predicted_rho - radius).abs() < tol::ESTIMATE, "ω = {omega}");
+        let expected = if omega < threshold { Outcome::Converged } else { Outcome::Diverged };
         assert_eq!(row.outcome, expected, "ω = {omega}");
     }
     let between: Vec<f64> = (sweep.rows.iter())
@@ -132,11 +99,7 @@ fn the_noisy_torus_is_best_at_four_fifths_and_diverges_where_an_excited_mode_gro
     let coarse: Vec<f64> = (1..=24).map(|k| k as f64 / 20.0).collect();
     let sweep = torus_sweep(&coarse);
     assert_eq!(sweep.best(Method::Jacobi).unwrap().omega, 0.8);
-    let first = sweep
-        .rows
-        .iter()
-        .find(|r| r.outcome == Outcome::Diverged)
-        .unwrap();
+    let first = sweep.rows.iter().find(|r| r.outcome == Outcome::Diverged).unwrap();
     assert_eq!(first.omega, 0.9);
 }
 
@@ -145,10 +108,7 @@ fn the_noisy_torus_is_best_at_four_fifths_and_diverges_where_an_excited_mode_gro
 fn a_smooth_torus_says_little_about_the_matrix() {
     let smooth = built_in("torus:32x32");
     let system = system(&smooth, Scheme::CatmullClark);
-    let stop = Stop {
-        tolerance: 1e-10 * smooth.diagonal(),
-        max_iterations: 1000,
-    };
+    let stop = Stop { tolerance: 1e-10 * smooth.diagonal(), max_iterations: 1000 };
     let pia = Setup::Pia { omega: 1.0 };
     let report = checked(&system, &smooth.positions, pia, &stop).report;
     assert_eq!((report.outcome, report.iterations), (Outcome::Converged, 4));

@@ -24,42 +24,15 @@ pub fn iterative<'a>(system: &LimitSystem, order: &'a [u32]) -> Vec<(&'static st
     let order = Some(order);
     vec![
         ("thall", Setup::THALL),
-        (
-            "jacobi",
-            Setup::Jacobi {
-                omega: optimal(&eigenvalues.jacobi),
-            },
-        ),
-        (
-            "gauss-seidel",
-            Setup::Sor {
-                omega: 1.0,
-                order: None,
-            },
-        ),
+        ("jacobi", Setup::Jacobi { omega: optimal(&eigenvalues.jacobi) }),
+        ("gauss-seidel", Setup::Sor { omega: 1.0, order: None }),
         ("gauss-seidel in order", Setup::Sor { omega: 1.0, order }),
         ("sor", Setup::Sor { omega: 1.2, order }),
-        (
-            "ssor",
-            Setup::Ssor {
-                omega: 1.0,
-                order: None,
-            },
-        ),
+        ("ssor", Setup::Ssor { omega: 1.0, order: None }),
         ("ssor in order", Setup::Ssor { omega: 1.3, order }),
         ("pia", Setup::Pia { omega: 1.0 }),
-        (
-            "w-pia",
-            Setup::Pia {
-                omega: optimal(&eigenvalues.a),
-            },
-        ),
-        (
-            "chebyshev",
-            Setup::Chebyshev {
-                spectrum: (eigenvalues.a[0].max(LOWEST), 1.0),
-            },
-        ),
+        ("w-pia", Setup::Pia { omega: optimal(&eigenvalues.a) }),
+        ("chebyshev", Setup::Chebyshev { spectrum: (eigenvalues.a[0].max(LOWEST), 1.0) }),
         ("cg", Setup::Cg),
         ("plain cg", Setup::PlainCg),
         ("pcg-jacobi", Setup::PcgJacobi),
@@ -91,37 +64,20 @@ pub fn residual(system: &LimitSystem, points: &[DVec3], v: &[DVec3]) -> f64 {
 pub fn checked(system: &LimitSystem, points: &[DVec3], setup: Setup, stop: &Stop) -> Solution {
     let solution = run(system, points, setup, stop);
     let report = &solution.report;
-    assert_eq!(
-        report.history.len(),
-        report.iterations + 1,
-        "{setup:?}: {:?}",
-        report.outcome
-    );
+    assert_eq!(report.history.len(), report.iterations + 1, "{setup:?}: {:?}", report.outcome);
     assert_eq!(solution.points.len(), points.len());
     assert!(report.iterations <= stop.max_iterations, "{setup:?}");
     // The same operations in the same order: the same number.
     let same = |a: f64, b: f64| a == b || a.is_nan() && b.is_nan();
     let (start, first) = (residual(system, points, points), report.history[0].max);
-    assert!(
-        same(first, start),
-        "{setup:?}: {first:e} at the start is {start:e}"
-    );
+    assert!(same(first, start), "{setup:?}: {first:e} at the start is {start:e}");
     for errors in &report.history {
         let limit = errors.max * (1.0 + tol::rounding(points.len()));
-        assert!(
-            errors.mean <= limit || errors.mean.is_nan(),
-            "{setup:?}: mean above maximum"
-        );
+        assert!(errors.mean <= limit || errors.mean.is_nan(), "{setup:?}: mean above maximum");
     }
-    let (truth, last) = (
-        residual(system, points, &solution.points),
-        report.last().max,
-    );
+    let (truth, last) = (residual(system, points, &solution.points), report.last().max);
     if report.outcome == Outcome::Converged {
-        assert!(
-            same(last, truth),
-            "{setup:?} claims {last:e} but has {truth:e}"
-        );
+        assert!(same(last, truth), "{setup:?} claims {last:e} but has {truth:e}");
         assert!(truth <= stop.tolerance);
     }
     solution

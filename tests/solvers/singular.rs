@@ -12,22 +12,11 @@ use crate::common::tol;
 use crate::setups::*;
 
 fn stop(mesh: &Mesh) -> Stop {
-    Stop {
-        tolerance: 1e-10 * mesh.diagonal(),
-        max_iterations: 20_000,
-    }
+    Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 20_000 }
 }
 
 fn singular_meshes() -> Vec<(String, Mesh)> {
-    let names = [
-        "cube",
-        "prism:4",
-        "prism:6",
-        "prism:8",
-        "prism:50",
-        "truncated-octahedron",
-        "cubes:3",
-    ];
+    let names = ["cube", "prism:4", "prism:6", "prism:8", "prism:50", "truncated-octahedron", "cubes:3"];
     let mut meshes: Vec<_> = names.map(|n| (n.to_owned(), built_in(n))).to_vec();
     meshes.push(("spliced cubes".into(), spliced_cubes()));
     // Cubes beside a component that is not singular.
@@ -46,15 +35,11 @@ fn kernel(mesh: &Mesh) -> Vec<f64> {
     let (component, count) = topology.components(&mesh.faces);
     let mut colour = vec![0.0; mesh.len()];
     for k in 0..count {
-        let members: Vec<usize> = (0..mesh.len())
-            .filter(|&v| component[v] as usize == k)
-            .collect();
+        let members: Vec<usize> = (0..mesh.len()).filter(|&v| component[v] as usize == k).collect();
         let start = members[0];
         colour[start] = 1.0;
         let mut open = vec![start];
-        let mut bipartite = members
-            .iter()
-            .all(|&v| topology.incidence.face_count(v) == 3);
+        let mut bipartite = members.iter().all(|&v| topology.incidence.face_count(v) == 3);
         while let Some(v) = open.pop() {
             for face in mesh.faces.iter() {
                 for (i, &a) in face.iter().enumerate() {
@@ -83,16 +68,9 @@ fn direct_methods_call_singular_what_is_singular_whatever_the_data() {
         let colour = kernel(&mesh);
         assert!(colour.iter().any(|c| *c != 0.0), "{name} has a kernel");
         let image = |i: usize| system.a.row_times_scalar(i, &colour);
-        assert!(
-            (0..mesh.len()).all(|i| image(i).abs() <= tol::rounding(32)),
-            "{name}: A colour = 0"
-        );
+        assert!((0..mesh.len()).all(|i| image(i).abs() <= tol::rounding(32)), "{name}: A colour = 0");
         let consistent = product(&system, &random_points(mesh.len(), 4));
-        let inconsistent: Vec<DVec3> = consistent
-            .iter()
-            .zip(&colour)
-            .map(|(p, c)| *p + 0.1 * *c)
-            .collect();
+        let inconsistent: Vec<DVec3> = consistent.iter().zip(&colour).map(|(p, c)| *p + 0.1 * *c).collect();
         for points in [&mesh.positions, &consistent, &inconsistent] {
             for (method, setup) in DIRECT {
                 let solution = checked(&system, points, setup, &stop(&mesh));
@@ -100,10 +78,7 @@ fn direct_methods_call_singular_what_is_singular_whatever_the_data() {
                 assert_eq!(report.outcome, Outcome::Singular, "{name}, {method}");
                 assert_eq!(report.iterations, 0);
                 assert_eq!(&solution.points, points);
-                assert!(
-                    report.detail.as_ref().is_some_and(|d| !d.contains('\n')),
-                    "{name}, {method}"
-                );
+                assert!(report.detail.as_ref().is_some_and(|d| !d.contains('\n')), "{name}, {method}");
             }
         }
     }
@@ -112,25 +87,12 @@ fn direct_methods_call_singular_what_is_singular_whatever_the_data() {
 #[test]
 fn meshes_beside_the_singular_ones_are_regular() {
     // Odd prisms have λ_min ≈ 0.82/k²; a valence above 3, or an odd face, is enough.
-    for name in [
-        "prism:3",
-        "prism:5",
-        "prism:101",
-        "prism:1001",
-        "dodecahedron",
-        "tetrahedron",
-        "octahedron",
-    ] {
+    for name in ["prism:3", "prism:5", "prism:101", "prism:1001", "dodecahedron", "tetrahedron", "octahedron"] {
         let mesh = noisy(name);
         let system = system(&mesh, Scheme::CatmullClark);
         for (method, setup) in DIRECT {
             let report = checked(&system, &mesh.positions, setup, &stop(&mesh)).report;
-            assert_eq!(
-                report.outcome,
-                Outcome::Converged,
-                "{name}, {method}: {:?}",
-                report.detail
-            );
+            assert_eq!(report.outcome, Outcome::Converged, "{name}, {method}: {:?}", report.detail);
         }
     }
     // The singular ones are regular under the schemes that are regular always.
@@ -163,13 +125,7 @@ fn pia_converges_on_the_cube_s_own_points_and_stagnates_on_perturbed_ones() {
             assert_eq!(report.outcome, Outcome::Stagnated, "seed {seed}");
             // What is left is the points' part in the kernel, H-weighted: the same at all vertices.
             let colour = kernel(&cube);
-            let part: DVec3 = perturbed
-                .positions
-                .iter()
-                .zip(&colour)
-                .map(|(p, c)| *p * *c)
-                .sum::<DVec3>()
-                / 8.0;
+            let part: DVec3 = perturbed.positions.iter().zip(&colour).map(|(p, c)| *p * *c).sum::<DVec3>() / 8.0;
             assert!((report.last().max - part.length()).abs() < tol::SOLVED);
         }
     }
@@ -186,30 +142,14 @@ fn no_method_claims_a_solution_that_does_not_exist() {
             // (A V)_i has no part in the left kernel H⁻¹·colour; neither have consistent data.
             let consistent = product(&system, &random);
             let amount = 0.05 * (seed + 1) as f64;
-            let inconsistent: Vec<DVec3> = consistent
-                .iter()
-                .zip(&colour)
-                .map(|(p, c)| *p + amount * *c)
-                .collect();
+            let inconsistent: Vec<DVec3> = consistent.iter().zip(&colour).map(|(p, c)| *p + amount * *c).collect();
             for (method, setup) in all(&system, &order) {
                 let report = checked(&system, &inconsistent, setup, &stop(&mesh)).report;
-                assert_ne!(
-                    report.outcome,
-                    Outcome::Converged,
-                    "{name}, {method}, seed {seed}"
-                );
+                assert_ne!(report.outcome, Outcome::Converged, "{name}, {method}, seed {seed}");
                 // Consistent data: relaxation finds one of infinitely many solutions.
-                if matches!(
-                    setup,
-                    Setup::Pia { omega: 1.0 } | Setup::Sor { .. } | Setup::Cg
-                ) && mesh.len() < 60
-                {
+                if matches!(setup, Setup::Pia { omega: 1.0 } | Setup::Sor { .. } | Setup::Cg) && mesh.len() < 60 {
                     let report = checked(&system, &consistent, setup, &stop(&mesh)).report;
-                    assert_eq!(
-                        report.outcome,
-                        Outcome::Converged,
-                        "{name}, {method}, seed {seed}"
-                    );
+                    assert_eq!(report.outcome, Outcome::Converged, "{name}, {method}, seed {seed}");
                 }
             }
         }

@@ -10,10 +10,7 @@ use crate::common::meshes::*;
 use crate::common::tol;
 use crate::setups::*;
 
-const STOP: Stop = Stop {
-    tolerance: 1e-11,
-    max_iterations: 200_000,
-};
+const STOP: Stop = Stop { tolerance: 1e-11, max_iterations: 200_000 };
 
 /// Below, a system is singular or so nearly so that its solution says little: duals and other meshes of valence 3 under
 /// Catmull-Clark. They have their own tests.
@@ -56,34 +53,22 @@ fn every_method_finds_the_solution_chosen_beforehand() {
 #[test]
 fn every_method_agrees_with_dense_elimination_of_the_formulas() {
     for scheme in Scheme::ALL {
-        let name = if scheme.needs_triangles() {
-            "irregular-tri:150"
-        } else {
-            "irregular-poly:150"
-        };
+        let name = if scheme.needs_triangles() { "irregular-tri:150" } else { "irregular-poly:150" };
         let mesh = noisy(name);
         let system = system(&mesh, scheme);
         let plain = assemble(scheme, &mesh);
         let right = DMatrix::from_fn(mesh.len(), 3, |i, axis| mesh.positions[i][axis]);
         let solved = plain.dense_a().lu().solve(&right).unwrap();
-        let expected: Vec<DVec3> = (0..mesh.len())
-            .map(|i| DVec3::new(solved[(i, 0)], solved[(i, 1)], solved[(i, 2)]))
-            .collect();
+        let expected: Vec<DVec3> =
+            (0..mesh.len()).map(|i| DVec3::new(solved[(i, 0)], solved[(i, 1)], solved[(i, 2)])).collect();
         let lambda_min = plain.eigenvalues()[0];
         let allowed = tol::solution(&system, lambda_min, STOP.tolerance, mesh.diagonal());
         let order = reversed(mesh.len());
         for (name, setup) in all(&system, &order) {
             let solution = checked(&system, &mesh.positions, setup, &STOP);
-            assert_eq!(
-                solution.report.outcome,
-                Outcome::Converged,
-                "{name}, {scheme}"
-            );
+            assert_eq!(solution.report.outcome, Outcome::Converged, "{name}, {scheme}");
             let error = distance(&solution.points, &expected);
-            assert!(
-                error <= allowed,
-                "{name}, {scheme}: {error:e} > {allowed:e}"
-            );
+            assert!(error <= allowed, "{name}, {scheme}: {error:e} > {allowed:e}");
         }
     }
 }
@@ -92,16 +77,10 @@ fn every_method_agrees_with_dense_elimination_of_the_formulas() {
 #[test]
 fn every_solution_keeps_the_weighted_sum() {
     for scheme in Scheme::ALL {
-        let name = if scheme.needs_triangles() {
-            "star:6"
-        } else {
-            "irregular-quad:100"
-        };
+        let name = if scheme.needs_triangles() { "star:6" } else { "irregular-quad:100" };
         let mesh = noisy(name);
         let system = system(&mesh, scheme);
-        let sum = |points: &[DVec3]| -> DVec3 {
-            points.iter().zip(&system.h).map(|(p, h)| *p / *h).sum()
-        };
+        let sum = |points: &[DVec3]| -> DVec3 { points.iter().zip(&system.h).map(|(p, h)| *p / *h).sum() };
         let total: f64 = system.h.iter().map(|h| 1.0 / h).sum();
         let order = reversed(mesh.len());
         for (name, setup) in all(&system, &order) {
@@ -121,23 +100,11 @@ fn direct_methods_need_one_iteration_and_tell_their_fill() {
     let lower = (system.m.values().len() + mesh.len()) / 2;
     for (name, setup) in DIRECT {
         let solution = checked(&system, &mesh.positions, setup, &STOP);
-        assert_eq!(
-            (solution.report.outcome, solution.report.iterations),
-            (Outcome::Converged, 1),
-            "{name}"
-        );
+        assert_eq!((solution.report.outcome, solution.report.iterations), (Outcome::Converged, 1), "{name}");
         // Factors hold at least the matrix's own entries.
-        assert!(
-            solution.fill.is_none_or(|fill| fill >= lower),
-            "{name}: {:?}",
-            solution.fill
-        );
+        assert!(solution.fill.is_none_or(|fill| fill >= lower), "{name}: {:?}", solution.fill);
     }
-    let fill = |setup| {
-        checked(&system, &mesh.positions, setup, &STOP)
-            .fill
-            .unwrap()
-    };
+    let fill = |setup| checked(&system, &mesh.positions, setup, &STOP).fill.unwrap();
     // The two libraries factor in the same order; faer's supernodes store some zeros too.
     assert!(fill(Setup::SecondCholesky) <= fill(Setup::Cholesky));
 }

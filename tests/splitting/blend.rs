@@ -1,32 +1,19 @@
 //! Lin & Luo's eigenvalue condition, §6: it does not hold over all of [0, 2].
 
-use limitlab::analysis::splitting::{
-    LocalScheme, SplittingMatrix, condition_over_alpha, crossings,
-};
+use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix, condition_over_alpha, crossings};
 
 use crate::EIGEN;
 
 /// Found with an independent implementation, to the digits given.
-const CROSSINGS: [(usize, f64); 7] = [
-    (3, 0.7992),
-    (4, 1.716),
-    (5, 1.817),
-    (6, 1.886),
-    (7, 1.923),
-    (8, 1.942),
-    (12, 1.961),
-];
+const CROSSINGS: [(usize, f64); 7] =
+    [(3, 0.7992), (4, 1.716), (5, 1.817), (6, 1.886), (7, 1.923), (8, 1.942), (12, 1.961)];
 
 #[test]
 fn the_condition_ceases_to_hold_once_and_where_it_was_found_to() {
     for (n, alpha) in CROSSINGS {
         let found = crossings(n).unwrap();
         assert_eq!(found.len(), 1, "{n}");
-        assert!(
-            (found[0].alpha - alpha).abs() < 5.1e-4,
-            "{n} {}",
-            found[0].alpha
-        );
+        assert!((found[0].alpha - alpha).abs() < 5.1e-4, "{n} {}", found[0].alpha);
         assert!(!found[0].holds_above);
         assert_eq!(found[0].frequency, 0);
     }
@@ -44,18 +31,9 @@ fn the_condition_ceases_to_hold_once_and_where_it_was_found_to() {
 fn matrices_on_both_sides_of_a_crossing_agree_with_the_sweep() {
     for n in [3, 4, 6, 12, 30] {
         let crossing = crossings(n).unwrap()[0];
-        for (alpha, leads) in [
-            (crossing.alpha - 1e-4, true),
-            (crossing.alpha + 1e-4, false),
-        ] {
+        for (alpha, leads) in [(crossing.alpha - 1e-4, true), (crossing.alpha + 1e-4, false)] {
             let scheme = LocalScheme::Sqrt3 { alpha };
-            assert_eq!(
-                SplittingMatrix::new(scheme, n)
-                    .unwrap()
-                    .pair_leads()
-                    .unwrap(),
-                leads
-            );
+            assert_eq!(SplittingMatrix::new(scheme, n).unwrap().pair_leads().unwrap(), leads);
         }
     }
 }
@@ -65,17 +43,11 @@ fn the_sweep_has_the_eigenvalues_of_the_matrices() {
     let alphas = [0.0, 0.3, 0.7, 1.0, 1.3, 2.0];
     for n in [3, 4, 5, 6, 9, 16] {
         for condition in condition_over_alpha(&[n], &alphas).unwrap() {
-            let scheme = LocalScheme::Sqrt3 {
-                alpha: condition.alpha,
-            };
+            let scheme = LocalScheme::Sqrt3 { alpha: condition.alpha };
             let matrix = SplittingMatrix::on_rings(scheme, n, 3).unwrap();
             let eigenvalues = matrix.eigenvalues().unwrap();
             for (ours, direct) in condition.lambda.iter().zip(&eigenvalues[1..]) {
-                assert!(
-                    (ours.norm() - direct.norm()).abs() < 1e-7,
-                    "{n} {}",
-                    condition.alpha
-                );
+                assert!((ours.norm() - direct.norm()).abs() < 1e-7, "{n} {}", condition.alpha);
             }
             assert_eq!(condition.holds, matrix.pair_leads().unwrap());
         }
@@ -101,21 +73,15 @@ fn at_valence_three_a_complex_pair_leads() {
     assert!((leading.re - 0.0859).abs() < 5e-5 && (leading.im.abs() - 0.1020).abs() < 5e-5);
     assert_eq!(conditions[2].leading_frequency, 0);
     for condition in &conditions {
-        let scheme = LocalScheme::Sqrt3 {
-            alpha: condition.alpha,
-        };
-        let pair = SplittingMatrix::new(scheme, 3)
-            .unwrap()
-            .leading_pair()
-            .unwrap();
+        let scheme = LocalScheme::Sqrt3 { alpha: condition.alpha };
+        let pair = SplittingMatrix::new(scheme, 3).unwrap().leading_pair().unwrap();
         assert!((pair - 1.0 / 9.0).abs() < EIGEN);
     }
 }
 
 #[test]
 fn the_third_eigenvalue_is_not_always_double() {
-    let doubled =
-        |n, alpha: f64| condition_over_alpha(&[n], &[alpha]).unwrap()[0].third_equals_fourth;
+    let doubled = |n, alpha: f64| condition_over_alpha(&[n], &[alpha]).unwrap()[0].third_equals_fourth;
     // A simple rotation-invariant eigenvalue comes third at small valences, a pair of frequency 2 at large ones.
     assert!(!doubled(4, 0.0) && !doubled(5, 1.5) && !doubled(6, 1.0) && !doubled(4, 1.0));
     assert!(doubled(8, 1.0) && doubled(12, 0.0) && doubled(50, 1.0));

@@ -15,9 +15,5 @@ const ROUNDING: f64 = 1e-13;
 /// Eigenvalues of blocks of some rows with entries of size 1, well conditioned.
 const EIGEN: f64 = 1e-12;
 
-const SCHEMES: [LocalScheme; 4] = [
-    LocalScheme::CatmullClark,
-    LocalScheme::Loop,
-    LocalScheme::DooSabin,
-    LocalScheme::Sqrt3 { alpha: 0.0 },
-];
+const SCHEMES: [LocalScheme; 4] =
+    [LocalScheme::CatmullClark, LocalScheme::Loop, LocalScheme::DooSabin, LocalScheme::Sqrt3 { alpha: 0.0 }];

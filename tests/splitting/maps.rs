@@ -6,11 +6,8 @@ use limitlab::analysis::splitting::{LocalScheme, Net, SplittingMatrix, character
 use crate::{EIGEN, SCHEMES};
 
 const VALENCES: [usize; 8] = [3, 4, 5, 6, 7, 8, 12, 50];
-const BLENDS: [LocalScheme; 3] = [
-    LocalScheme::Sqrt3 { alpha: 0.5 },
-    LocalScheme::Sqrt3 { alpha: 1.0 },
-    LocalScheme::LabsikGreiner,
-];
+const BLENDS: [LocalScheme; 3] =
+    [LocalScheme::Sqrt3 { alpha: 0.5 }, LocalScheme::Sqrt3 { alpha: 1.0 }, LocalScheme::LabsikGreiner];
 
 fn map(scheme: LocalScheme, n: usize) -> Net {
     characteristic_map(scheme, n, scheme.map_rings()).unwrap()
@@ -21,17 +18,11 @@ fn refinement_scales_a_characteristic_net_by_its_eigenvalue() {
     for scheme in SCHEMES.into_iter().chain(BLENDS) {
         for n in VALENCES {
             let net = map(scheme, n);
-            let lambda = SplittingMatrix::new(scheme, n)
-                .unwrap()
-                .leading_pair()
-                .unwrap();
+            let lambda = SplittingMatrix::new(scheme, n).unwrap().leading_pair().unwrap();
             let refined = net.refine(2).unwrap();
             assert!(refined.rings > net.rings, "{scheme} {n}");
             for (coarse, fine) in net.points.iter().zip(&refined.points) {
-                assert!(
-                    (lambda * lambda * coarse - fine).length() < EIGEN,
-                    "{scheme} {n}"
-                );
+                assert!((lambda * lambda * coarse - fine).length() < EIGEN, "{scheme} {n}");
             }
         }
     }
@@ -39,44 +30,19 @@ fn refinement_scales_a_characteristic_net_by_its_eigenvalue() {
 
 #[test]
 fn the_rings_that_a_net_determines() {
-    let rings = |scheme, start, rounds| {
-        characteristic_map(scheme, 5, start)
-            .unwrap()
-            .refine(rounds)
-            .unwrap()
-            .rings
-    };
-    for scheme in [
-        LocalScheme::CatmullClark,
-        LocalScheme::Loop,
-        LocalScheme::DooSabin,
-    ] {
-        assert_eq!(
-            [
-                rings(scheme, 3, 1),
-                rings(scheme, 3, 2),
-                rings(scheme, 3, 3)
-            ],
-            [5, 9, 17]
-        );
+    let rings = |scheme, start, rounds| characteristic_map(scheme, 5, start).unwrap().refine(rounds).unwrap().rings;
+    for scheme in [LocalScheme::CatmullClark, LocalScheme::Loop, LocalScheme::DooSabin] {
+        assert_eq!([rings(scheme, 3, 1), rings(scheme, 3, 2), rings(scheme, 3, 3)], [5, 9, 17]);
     }
     let sqrt3 = LocalScheme::Sqrt3 { alpha: 0.0 };
     assert_eq!([rings(sqrt3, 3, 1), rings(sqrt3, 3, 2)], [6, 15]);
     let blend = LocalScheme::Sqrt3 { alpha: 1.0 };
-    assert_eq!(
-        [rings(blend, 3, 1), rings(blend, 4, 1), rings(blend, 4, 2)],
-        [3, 6, 12]
-    );
+    assert_eq!([rings(blend, 3, 1), rings(blend, 4, 1), rings(blend, 4, 2)], [3, 6, 12]);
 }
 
 #[test]
 fn regular_valences_give_affine_maps() {
-    let hexagon = |scheme| {
-        (
-            map(scheme, 6),
-            DVec2::from_angle(std::f64::consts::FRAC_PI_3),
-        )
-    };
+    let hexagon = |scheme| (map(scheme, 6), DVec2::from_angle(std::f64::consts::FRAC_PI_3));
     for (net, second) in [hexagon(LocalScheme::Loop), hexagon(BLENDS[1])] {
         for line in net.lines(1) {
             for point in line {
@@ -99,10 +65,7 @@ fn the_maps_of_all_schemes_are_regular_and_injective() {
             // On every level: a single level could hide a fold between its samples.
             for rounds in 0..=3 {
                 let check = map(scheme, n).refine(rounds).unwrap().check();
-                assert!(
-                    check.regular && check.injective,
-                    "{scheme} {n} {rounds} {check:?}"
-                );
+                assert!(check.regular && check.injective, "{scheme} {n} {rounds} {check:?}");
                 assert!((check.winding - 1.0).abs() < 1e-9);
             }
         }
@@ -132,10 +95,7 @@ fn folded_and_mirrored_maps_are_not_regular() {
         let last = folded.points.len() / 2;
         folded.points[last] *= -0.5;
         let check = folded.check();
-        assert!(
-            !check.regular && !check.injective && check.least_sine < 0.0,
-            "{scheme}"
-        );
+        assert!(!check.regular && !check.injective && check.least_sine < 0.0, "{scheme}");
         assert!(check.folded_corners > 0 && check.folded_corners < 30);
         // All of it turned over.
         let mut mirrored = net.clone();

@@ -29,9 +29,7 @@ fn the_blend_closes_on_three_rings_and_no_fewer() {
     let scheme = LocalScheme::Sqrt3 { alpha: 1.0 };
     for n in [3, 5, 6, 9] {
         for rings in [1, 2] {
-            let refused = SplittingMatrix::on_rings(scheme, n, rings)
-                .unwrap_err()
-                .to_string();
+            let refused = SplittingMatrix::on_rings(scheme, n, rings).unwrap_err().to_string();
             assert!(refused.contains("take 3 or more"), "{refused}");
         }
         assert!(SplittingMatrix::on_rings(scheme, n, 3).is_ok());
@@ -41,9 +39,7 @@ fn the_blend_closes_on_three_rings_and_no_fewer() {
 #[test]
 fn valences_out_of_range_are_refused_with_the_range() {
     for n in [0, 2, 101, 1_000_000_000] {
-        let refused = SplittingMatrix::new(LocalScheme::Loop, n)
-            .unwrap_err()
-            .to_string();
+        let refused = SplittingMatrix::new(LocalScheme::Loop, n).unwrap_err().to_string();
         assert!(refused.contains("outside 3..100"), "{refused}");
     }
 }
@@ -55,16 +51,9 @@ fn rows_sum_to_one_and_are_the_same_in_every_sector() {
             for rings in [scheme.least_rings(), 3] {
                 let s = SplittingMatrix::on_rings(scheme, n, rings).unwrap();
                 let sums = &s.entries * DVector::from_element(s.size(), 1.0);
-                assert!(
-                    sums.iter().all(|x| (x - 1.0).abs() < ROUNDING),
-                    "{scheme} {n}"
-                );
+                assert!(sums.iter().all(|x| (x - 1.0).abs() < ROUNDING), "{scheme} {n}");
                 // The order of summation differs between sectors.
-                assert!(
-                    s.circulance() < ROUNDING,
-                    "{scheme} {n} {:e}",
-                    s.circulance()
-                );
+                assert!(s.circulance() < ROUNDING, "{scheme} {n} {:e}", s.circulance());
             }
         }
     }
@@ -96,9 +85,7 @@ fn loop_and_sqrt3_matrices_entry_by_entry() {
         // e''_j = (v' + q_{j−1} + q_j)/3.
         let a = (4.0 - 2.0 * turn.cos()) / 9.0;
         let share = 1.0 / n as f64;
-        let s = SplittingMatrix::new(LocalScheme::Sqrt3 { alpha: 0.0 }, n)
-            .unwrap()
-            .entries;
+        let s = SplittingMatrix::new(LocalScheme::Sqrt3 { alpha: 0.0 }, n).unwrap().entries;
         let expected = DMatrix::from_fn(n + 1, n + 1, |i, j| {
             let apart = (i + n - j.max(1)) % n;
             let around = match apart {
@@ -113,11 +100,7 @@ fn loop_and_sqrt3_matrices_entry_by_entry() {
                 _ => a * share / 3.0 + around,
             }
         });
-        assert!(
-            (&s - &expected).amax() < ROUNDING,
-            "√3 {n}: {:e}",
-            (&s - &expected).amax()
-        );
+        assert!((&s - &expected).amax() < ROUNDING, "√3 {n}: {:e}", (&s - &expected).amax());
     }
 }
 
@@ -127,39 +110,18 @@ fn eigenvalues_masks_and_subspaces_meet_the_closed_forms() {
     for scheme in SCHEMES {
         for row in rows(scheme, &valences).unwrap() {
             let n = row.valence;
-            assert!(
-                row.eigenvalue_error.unwrap() < EIGEN,
-                "{scheme} {n} {:?}",
-                row.eigenvalue_error
-            );
+            assert!(row.eigenvalue_error.unwrap() < EIGEN, "{scheme} {n} {:?}", row.eigenvalue_error);
             let formula = row.lambda_subdominant_formula.unwrap();
-            assert!(
-                (row.lambda_subdominant - formula).norm() < EIGEN,
-                "{scheme} {n}"
-            );
+            assert!((row.lambda_subdominant - formula).norm() < EIGEN, "{scheme} {n}");
             assert!(row.limit_mask_error.unwrap() < EIGEN, "{scheme} {n}");
-            assert!(
-                row.tangent_mask_distance.unwrap() < EIGEN,
-                "{scheme} {n} {:?}",
-                row.tangent_mask_distance
-            );
-            assert!(
-                row.residual_right < EIGEN,
-                "{scheme} {n} {:e}",
-                row.residual_right
-            );
-            assert!(
-                row.residual_left < EIGEN,
-                "{scheme} {n} {:e}",
-                row.residual_left
-            );
+            assert!(row.tangent_mask_distance.unwrap() < EIGEN, "{scheme} {n} {:?}", row.tangent_mask_distance);
+            assert!(row.residual_right < EIGEN, "{scheme} {n} {:e}", row.residual_right);
+            assert!(row.residual_left < EIGEN, "{scheme} {n} {:e}", row.residual_left);
             let [cosine, sine] = row.tangent_masks.unwrap();
             let (first, turn) = (scheme.layout().centre(), std::f64::consts::TAU / n as f64);
             for j in 0..n {
                 let (s, c) = (turn * j as f64).sin_cos();
-                assert!(
-                    (cosine[first + j] - c).abs() < EIGEN && (sine[first + j] - s).abs() < EIGEN
-                );
+                assert!((cosine[first + j] - c).abs() < EIGEN && (sine[first + j] - s).abs() < EIGEN);
             }
         }
     }
@@ -219,11 +181,7 @@ fn invariant_subspaces_fill_the_space_also_where_eigenvalues_are_defective() {
                     let identity = DMatrix::identity(gram.nrows(), gram.nrows());
                     assert!((gram - identity).amax() < EIGEN);
                     for residual in space.residuals(&s.entries) {
-                        assert!(
-                            residual < EIGEN,
-                            "{scheme} {n} {rings} λ = {} {residual:e}",
-                            space.value
-                        );
+                        assert!(residual < EIGEN, "{scheme} {n} {rings} λ = {} {residual:e}", space.value);
                     }
                 }
                 // Left spaces annihilate the right spaces of other eigenvalues.
@@ -241,10 +199,7 @@ fn more_rings_keep_the_leading_eigenvalues_and_the_masks() {
             let small = SplittingMatrix::new(scheme, n).unwrap();
             let large = SplittingMatrix::on_rings(scheme, n, 3).unwrap();
             let (a, b) = (small.limit_mask().unwrap(), large.limit_mask().unwrap());
-            assert!(
-                (b.rows(0, small.size()) - &a).amax() < EIGEN,
-                "{scheme} {n}"
-            );
+            assert!((b.rows(0, small.size()) - &a).amax() < EIGEN, "{scheme} {n}");
             assert!(b.rows(small.size(), large.size() - small.size()).amax() < EIGEN);
             let (a, b) = (small.eigenvalues().unwrap(), large.eigenvalues().unwrap());
             assert!((a[1] - b[1]).norm() < EIGEN && (a[2] - b[2]).norm() < EIGEN);
@@ -280,12 +235,6 @@ fn powers_tend_to_the_limit_mask() {
 #[test]
 fn distances_to_a_subspace() {
     let basis = DMatrix::from_column_slice(3, 1, &[1.0, 0.0, 0.0]);
-    assert_eq!(
-        distance_to_space(&DVector::from_vec(vec![2.0, 0.0, 0.0]), &basis),
-        0.0
-    );
-    assert_eq!(
-        distance_to_space(&DVector::from_vec(vec![0.0, 3.0, 0.0]), &basis),
-        1.0
-    );
+    assert_eq!(distance_to_space(&DVector::from_vec(vec![2.0, 0.0, 0.0]), &basis), 0.0);
+    assert_eq!(distance_to_space(&DVector::from_vec(vec![0.0, 3.0, 0.0]), &basis), 1.0);
 }

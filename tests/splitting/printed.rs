@@ -12,9 +12,8 @@ fn difference(entry: &Entry) -> f64 {
 #[test]
 fn matrices_and_table_i_are_right_entry_by_entry() {
     let tables = thall_tables().unwrap();
-    let of = |test: &dyn Fn(&Entry) -> bool| -> Vec<Entry> {
-        tables.entries.iter().filter(|e| test(e)).cloned().collect()
-    };
+    let of =
+        |test: &dyn Fn(&Entry) -> bool| -> Vec<Entry> { tables.entries.iter().filter(|e| test(e)).cloned().collect() };
     let matrices = of(&|e| e.item.starts_with('S'));
     assert_eq!(matrices.len(), 81 + 49);
     assert!(matrices.iter().all(|e| difference(e) < EIGEN));
@@ -27,10 +26,7 @@ fn matrices_and_table_i_are_right_entry_by_entry() {
 fn a_digit_is_missing_in_the_eigenvalue_of_valence_3() {
     let tables = thall_tables().unwrap();
     let lambda = |n| {
-        let found = tables
-            .entries
-            .iter()
-            .find(|e| e.item.starts_with('λ') && e.valence == n);
+        let found = tables.entries.iter().find(|e| e.item.starts_with('λ') && e.valence == n);
         found.unwrap()
     };
     assert!(difference(lambda(4)) < EIGEN);
@@ -42,8 +38,8 @@ fn a_digit_is_missing_in_the_eigenvalue_of_valence_3() {
 fn tables_ii_and_iii_follow_the_formulas_but_for_c_3_at_valence_3() {
     let tables = thall_tables().unwrap();
     for entry in tables.entries.iter().filter(|e| e.item.starts_with('c')) {
-        let slip = entry.valence == 3
-            && ["c_3[f_2]", "c_3[f_3]", "c_3[e_1]", "c_3[e_3]"].contains(&entry.item.as_str());
+        let slip =
+            entry.valence == 3 && ["c_3[f_2]", "c_3[f_3]", "c_3[e_1]", "c_3[e_3]"].contains(&entry.item.as_str());
         assert_eq!(difference(entry) > 1e-9, slip, "{entry:?}");
     }
 }
@@ -67,18 +63,10 @@ fn printed_masks_are_in_the_left_eigenspace_but_havemanns_are_not() {
 #[test]
 fn the_printed_normal_of_valence_3_points_inward() {
     let tables = thall_tables().unwrap();
-    let signs: Vec<(usize, &str, bool)> = tables
-        .orientations
-        .iter()
-        .map(|o| (o.valence, o.masks, o.sine > 0.0))
-        .collect();
+    let signs: Vec<(usize, &str, bool)> =
+        tables.orientations.iter().map(|o| (o.valence, o.masks, o.sine > 0.0)).collect();
     assert_eq!(
         signs,
-        [
-            (3, "printed", false),
-            (3, "by the formulas", true),
-            (4, "printed", true),
-            (4, "by the formulas", true),
-        ]
+        [(3, "printed", false), (3, "by the formulas", true), (4, "printed", true), (4, "by the formulas", true),]
     );
 }

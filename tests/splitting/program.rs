@@ -5,21 +5,12 @@ use serde_json::Value;
 
 fn splitting(arguments: &[&str], out: &std::path::Path) -> std::process::Output {
     let mut command = Command::cargo_bin("splitting").unwrap();
-    command
-        .args(arguments)
-        .arg("--out")
-        .arg(out)
-        .output()
-        .unwrap()
+    command.args(arguments).arg("--out").arg(out).output().unwrap()
 }
 
 fn json(arguments: &[&str], out: &std::path::Path) -> Value {
     let output = splitting(arguments, out);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
@@ -31,29 +22,18 @@ fn json_has_the_fields_that_others_rely_on() {
     assert_eq!(rows.len(), 3);
     assert_eq!(rows[1]["valence"], 4);
     assert_eq!(rows[1]["eigenvalues"].as_array().unwrap().len(), 9);
-    let mask: Vec<f64> = rows[1]["limit_mask"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|x| x.as_f64().unwrap())
-        .collect();
+    let mask: Vec<f64> = rows[1]["limit_mask"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
     assert!((mask[0] - 4.0 / 9.0).abs() < 1e-12 && (mask.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     assert!((rows[1]["lambda_subdominant_formula"].as_f64().unwrap() - 0.5).abs() < 1e-15);
     assert_eq!(rows[1]["positions"][0], "v");
     assert_eq!(rows[1]["positions"][5], "0:1,1");
     for file in ["", "-eigenvalues", "-masks"] {
         for ending in ["csv", "md"] {
-            let path = out
-                .path()
-                .join(format!("splitting-catmull-clark{file}.{ending}"));
+            let path = out.path().join(format!("splitting-catmull-clark{file}.{ending}"));
             assert!(path.exists(), "{}", path.display());
         }
     }
-    for file in [
-        "splitting-catmull-clark-maps.png",
-        "splitting-thall.csv",
-        "splitting-thall-normals.md",
-    ] {
+    for file in ["splitting-catmull-clark-maps.png", "splitting-thall.csv", "splitting-thall-normals.md"] {
         assert!(out.path().join(file).exists(), "{file}");
     }
 }
@@ -61,25 +41,12 @@ fn json_has_the_fields_that_others_rely_on() {
 #[test]
 fn sqrt3_reports_the_condition() {
     let out = tempfile::tempdir().unwrap();
-    let object = json(
-        &[
-            "--scheme",
-            "sqrt3",
-            "--alpha",
-            "1",
-            "--valence",
-            "3..4",
-            "--json",
-        ],
-        out.path(),
-    );
+    let object = json(&["--scheme", "sqrt3", "--alpha", "1", "--valence", "3..4", "--json"], out.path());
     assert_eq!(object["alpha"], 1.0);
     assert_eq!(object["rows"][0]["pair_leads"], false);
     assert_eq!(object["rows"][1]["pair_leads"], true);
     assert!(object["rows"][1]["lambda_subdominant_formula"].is_null());
-    let alpha = object["condition"][1]["crossings"][0]["alpha"]
-        .as_f64()
-        .unwrap();
+    let alpha = object["condition"][1]["crossings"][0]["alpha"].as_f64().unwrap();
     assert!((alpha - 1.7156).abs() < 1e-4);
     assert!(out.path().join("splitting-sqrt3-condition.png").exists());
 }
@@ -87,24 +54,11 @@ fn sqrt3_reports_the_condition() {
 #[test]
 fn bad_arguments_end_with_2_and_say_the_range() {
     let out = tempfile::tempdir().unwrap();
-    for valence in [
-        "2",
-        "0",
-        "0..5",
-        "3..1000000000",
-        "1000000000",
-        "7..3",
-        "x",
-        "3..",
-        "-1",
-    ] {
+    for valence in ["2", "0", "0..5", "3..1000000000", "1000000000", "7..3", "x", "3..", "-1"] {
         let output = splitting(&[&format!("--valence={valence}")], out.path());
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{valence}: {message}");
-        assert!(
-            message.contains("3..100") || valence == "7..3",
-            "{valence}: {message}"
-        );
+        assert!(message.contains("3..100") || valence == "7..3", "{valence}: {message}");
     }
     for arguments in [
         &["--scheme", "butterfly"][..],
@@ -112,11 +66,7 @@ fn bad_arguments_end_with_2_and_say_the_range() {
         &["--scheme", "sqrt3", "--alpha", "2.5"],
         &["--scheme", "sqrt3", "--alpha", "nan"],
     ] {
-        assert_eq!(
-            splitting(arguments, out.path()).status.code(),
-            Some(2),
-            "{arguments:?}"
-        );
+        assert_eq!(splitting(arguments, out.path()).status.code(), Some(2), "{arguments:?}");
     }
 }
 
@@ -128,8 +78,5 @@ fn a_folder_that_cannot_be_made_ends_with_1() {
     let output = splitting(&["--valence", "3"], &file);
     assert_eq!(output.status.code(), Some(1));
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(
-        message.starts_with("error: ") && message.trim_end().lines().count() == 1,
-        "{message}"
-    );
+    assert!(message.starts_with("error: ") && message.trim_end().lines().count() == 1, "{message}");
 }

@@ -23,28 +23,21 @@ fn butterfly_keeps_its_vertices() {
 fn butterfly_masks_are_the_published_ones() {
     let near = |n: usize, expected: &[f64]| {
         let mask = butterfly::extraordinary_mask(n);
-        mask.len() == n
-            && mask
-                .iter()
-                .zip(expected)
-                .all(|(a, b)| (a - b).abs() < 1e-15)
+        mask.len() == n && mask.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15)
     };
     assert!(near(3, &[5.0 / 12.0, -1.0 / 12.0, -1.0 / 12.0]));
     assert!(near(4, &[3.0 / 8.0, 0.0, -1.0 / 8.0, 0.0]));
     for n in 5..30 {
         let angle = |j: usize| TAU * j as f64 / n as f64;
-        let published: Vec<f64> = (0..n)
-            .map(|j| (0.25 + angle(j).cos() + 0.5 * (2.0 * angle(j)).cos()) / n as f64)
-            .collect();
+        let published: Vec<f64> =
+            (0..n).map(|j| (0.25 + angle(j).cos() + 0.5 * (2.0 * angle(j)).cos()) / n as f64).collect();
         assert!(near(n, &published));
     }
     for n in 3..30 {
         let mask = butterfly::extraordinary_mask(n);
         let harmonic = |k: usize| {
             let terms = mask.iter().enumerate();
-            terms
-                .map(|(j, s)| s * (TAU * (j * k) as f64 / n as f64).cos())
-                .sum::<f64>()
+            terms.map(|(j, s)| s * (TAU * (j * k) as f64 / n as f64).cos()).sum::<f64>()
         };
         // The mask is affine, and the ring of edge points has the first harmonic of the ring, halved.
         assert!((butterfly::CENTER + harmonic(0) - 1.0).abs() < 1e-14);
@@ -90,9 +83,7 @@ fn butterfly_edge_points_equal_their_masks() {
             for (i, &e) in fine.faces.face(4 * f + 3).iter().enumerate() {
                 let (v, w) = (face[i], face[(i + 1) % 3]);
                 let expected = match (regular(v), regular(w)) {
-                    (false, false) => {
-                        0.5 * (extraordinary_point(&mesh, v, w) + extraordinary_point(&mesh, w, v))
-                    }
+                    (false, false) => 0.5 * (extraordinary_point(&mesh, v, w) + extraordinary_point(&mesh, w, v)),
                     (false, true) => extraordinary_point(&mesh, v, w),
                     (true, false) => extraordinary_point(&mesh, w, v),
                     // Next test.
@@ -134,10 +125,7 @@ fn butterfly_reproduces_cubics_on_the_regular_lattice() {
             let lattice = |v: u32| ((v / size) as f64, (v % size) as f64);
             let (v, w) = (lattice(face[i]), lattice(face[(i + 1) % 3]));
             // Away from the seam by more than the stencil's reach.
-            if [v.0, v.1, w.0, w.1]
-                .iter()
-                .any(|x| !(2.0..=6.0).contains(x))
-            {
+            if [v.0, v.1, w.0, w.1].iter().any(|x| !(2.0..=6.0).contains(x)) {
                 continue;
             }
             let expected = cubic(0.5 * (v.0 + w.0), 0.5 * (v.1 + w.1));
@@ -180,10 +168,7 @@ fn regular_tangents_are_the_derivatives_of_cubics() {
             let expected = along(1.0, 0.0).cross(along(0.0, 1.0));
             let cross = tangents[v].cosine.cross(tangents[v].sine);
             let ratio = *scale.get_or_insert(cross.length() / expected.length());
-            assert!(
-                (cross / ratio).distance(expected) < 1e-6 * expected.length(),
-                "{v}"
-            );
+            assert!((cross / ratio).distance(expected) < 1e-6 * expected.length(), "{v}");
         }
     }
 }
@@ -192,14 +177,12 @@ fn regular_tangents_are_the_derivatives_of_cubics() {
 fn unified_sqrt3_ends_at_the_approximating_and_the_interpolating_scheme() {
     for mesh in triangle_meshes() {
         let topology = topology(&mesh);
-        let (fine, alpha) =
-            unified_sqrt3::refine(&mesh, &topology, &vec![0.0; mesh.len()]).unwrap();
+        let (fine, alpha) = unified_sqrt3::refine(&mesh, &topology, &vec![0.0; mesh.len()]).unwrap();
         let kobbelt = sqrt3::refine(&mesh, &topology).unwrap();
         assert!(distance(&fine.positions, &kobbelt.positions) < ROUNDING);
         assert_eq!(fine.faces, kobbelt.faces);
         assert_eq!(alpha, vec![0.0; fine.len()]);
-        let (fine, alpha) =
-            unified_sqrt3::refine(&mesh, &topology, &vec![1.0; mesh.len()]).unwrap();
+        let (fine, alpha) = unified_sqrt3::refine(&mesh, &topology, &vec![1.0; mesh.len()]).unwrap();
         assert_eq!(fine.positions[..mesh.len()], mesh.positions);
         assert!(alpha.iter().all(|a| (a - 1.0).abs() < 1e-15));
     }
@@ -210,9 +193,7 @@ fn unified_sqrt3_ends_at_the_approximating_and_the_interpolating_scheme() {
 fn unified_sqrt3_equals_the_papers_formulas() {
     let mut rng = ChaCha8Rng::seed_from_u64(31);
     for mesh in triangle_meshes() {
-        let alpha: Vec<f64> = (0..mesh.len())
-            .map(|_| rng.random_range(0.0..2.0))
-            .collect();
+        let alpha: Vec<f64> = (0..mesh.len()).map(|_| rng.random_range(0.0..2.0)).collect();
         let (fine, refined) = unified_sqrt3::refine(&mesh, &topology(&mesh), &alpha).unwrap();
         let mut shares = Vec::new();
         for (v, &a) in alpha.iter().enumerate() {
@@ -220,10 +201,7 @@ fn unified_sqrt3_equals_the_papers_formulas() {
             let cosine = (TAU / star.valence as f64).cos();
             let mean = star.neighbors / star.valence as f64;
             let point = mesh.positions[v];
-            shares.push(
-                (9.0 + 4.0 * a - 2.0 * a * cosine) / 27.0 * point
-                    - (4.0 * a - 2.0 * a * cosine) / 27.0 * mean,
-            );
+            shares.push((9.0 + 4.0 * a - 2.0 * a * cosine) / 27.0 * point - (4.0 * a - 2.0 * a * cosine) / 27.0 * mean);
             let moved = (5.0 + 4.0 * a + 2.0 * (1.0 - a) * cosine) / 9.0 * point
                 + (1.0 - a) * (4.0 - 2.0 * cosine) / 9.0 * mean;
             assert!((fine.positions[v] - moved).length() < ROUNDING);

@@ -83,10 +83,7 @@ fn extraordinary_masks_follow_from_their_eigenvalues() {
             }
         }
         let system = DMatrix::from_fn(rows.len(), n + 1, |i, j| rows[i][j]);
-        let weights = system
-            .svd(true, true)
-            .solve(&DVector::from_vec(wanted), 1e-9)
-            .unwrap();
+        let weights = system.svd(true, true).solve(&DVector::from_vec(wanted), 1e-9).unwrap();
         let (center, ring) = labsik_greiner::extraordinary_mask(n);
         assert!((center - weights[0]).abs() < 1e-12, "{n}");
         for (j, w) in ring.iter().enumerate() {
@@ -105,41 +102,23 @@ fn masks_at_valence_3_and_4_as_listed_elsewhere() {
     let (center, ring) = labsik_greiner::extraordinary_mask(3);
     let expected = [4.0 / 27.0, 4.0 / 27.0, -5.0 / 27.0];
     assert!((center - 8.0 / 9.0).abs() < 1e-15);
-    assert!(
-        ring.iter()
-            .zip(expected)
-            .all(|(w, e)| (w - e).abs() < 1e-15)
-    );
+    assert!(ring.iter().zip(expected).all(|(w, e)| (w - e).abs() < 1e-15));
     let (center, ring) = labsik_greiner::extraordinary_mask(4);
     let expected = [2.0 / 9.0, 2.0 / 9.0, -1.0 / 9.0, -1.0 / 9.0];
     assert!((center - 7.0 / 9.0).abs() < 1e-15);
-    assert!(
-        ring.iter()
-            .zip(expected)
-            .all(|(w, e)| (w - e).abs() < 1e-15)
-    );
+    assert!(ring.iter().zip(expected).all(|(w, e)| (w - e).abs() < 1e-15));
 }
 
 /// At valence 6 the formula, which is not used there, reproduces quadratics on the lattice as the regular mask does.
 #[test]
 fn the_formula_continues_to_valence_6() {
     let (center, ring) = labsik_greiner::extraordinary_mask(6);
-    let steps: [(f64, f64); 6] = [
-        (1.0, 0.0),
-        (0.0, 1.0),
-        (-1.0, 1.0),
-        (-1.0, 0.0),
-        (0.0, -1.0),
-        (1.0, -1.0),
-    ];
+    let steps: [(f64, f64); 6] = [(1.0, 0.0), (0.0, 1.0), (-1.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, -1.0)];
     for (p, q) in [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)] {
         let at = |(x, y): (f64, f64)| x.powi(p) * y.powi(q);
         let terms = ring.iter().zip(steps).map(|(w, step)| w * at(step));
         let found = center * at((0.0, 0.0)) + terms.sum::<f64>();
-        assert!(
-            (found - at((1.0 / 3.0, 1.0 / 3.0))).abs() < 1e-15,
-            "{p} {q}"
-        );
+        assert!((found - at((1.0 / 3.0, 1.0 / 3.0))).abs() < 1e-15, "{p} {q}");
     }
 }
 
@@ -162,9 +141,10 @@ fn neighbors(mesh: &Mesh, v: u32, w: u32) -> Vec<u32> {
 
 /// The vertex across side (v, w) of a face: found by looking at every face.
 fn across(mesh: &Mesh, v: u32, w: u32) -> u32 {
-    let found = mesh.faces.iter().find_map(|face| {
-        (0..3).find_map(|i| (face[i] == w && face[(i + 1) % 3] == v).then(|| face[(i + 2) % 3]))
-    });
+    let found = mesh
+        .faces
+        .iter()
+        .find_map(|face| (0..3).find_map(|i| (face[i] == w && face[(i + 1) % 3] == v).then(|| face[(i + 2) % 3])));
     found.unwrap()
 }
 
@@ -232,14 +212,9 @@ fn cubics_stay_on_the_regular_lattice() {
     for steps in 1..=2 {
         let fine = Refinement::LabsikGreiner.refine_n(&mesh, steps).unwrap();
         // Linear functions are reproduced, so the parameters tell where a new point belongs: away from the seam.
-        let places = Refinement::LabsikGreiner
-            .refine_n(&parameters, steps)
-            .unwrap();
+        let places = Refinement::LabsikGreiner.refine_n(&parameters, steps).unwrap();
         for (point, place) in fine.positions.iter().zip(&places.positions) {
-            if place.min_element() < 0.0
-                || !(4.0..=7.0).contains(&place.x)
-                || !(4.0..=7.0).contains(&place.y)
-            {
+            if place.min_element() < 0.0 || !(4.0..=7.0).contains(&place.x) || !(4.0..=7.0).contains(&place.y) {
                 continue;
             }
             assert!((*point - cubic(place.x, place.y)).length() < ROUNDING);
@@ -262,9 +237,7 @@ fn the_local_matrix_has_the_eigenvalues_of_the_mask() {
         };
         assert!((own(0)[0] - 1.0).abs() < 1e-12);
         assert!((own(1)[0] - square).abs() < 1e-12, "{n}");
-        let others = [own(0)[1], own(1)[1]]
-            .into_iter()
-            .chain((2..=n / 2).map(|k| own(k)[0]));
+        let others = [own(0)[1], own(1)[1]].into_iter().chain((2..=n / 2).map(|k| own(k)[0]));
         for other in others {
             assert!(other < square - 1e-3, "{n} {other} {square}");
         }
@@ -278,9 +251,7 @@ fn the_local_matrix_has_the_eigenvalues_of_the_mask() {
     let regular = SplittingMatrix::new(LocalScheme::LabsikGreiner, 6).unwrap();
     let values = regular.eigenvalues().unwrap();
     for degree in 0..=3 {
-        let near = values
-            .iter()
-            .filter(|z| (*z - 3f64.powi(-degree)).norm() < 1e-9);
+        let near = values.iter().filter(|z| (*z - 3f64.powi(-degree)).norm() < 1e-9);
         assert!(near.count() > degree as usize, "{degree}");
     }
     assert!(values[3].norm() < 0.2);
@@ -293,27 +264,18 @@ fn the_regular_tangent_mask_is_the_matrix_s() {
     let mesh = tri_torus(14, 14);
     let at = topology(&mesh);
     let matrix = SplittingMatrix::new(LocalScheme::LabsikGreiner, 6).unwrap();
-    let space = matrix
-        .eigenspaces()
-        .unwrap()
-        .into_iter()
-        .find(|s| (s.value - 1.0 / 3.0).norm() < 1e-9)
-        .unwrap();
+    let space = matrix.eigenspaces().unwrap().into_iter().find(|s| (s.value - 1.0 / 3.0).norm() < 1e-9).unwrap();
     assert_eq!(space.multiplicity(), 2);
     let v = 14 * 7 + 7;
     let layout = LocalScheme::LabsikGreiner.layout();
-    let star = layout
-        .walk(&mesh.faces, &at, at.incidence.corners_at(v)[0], 6, 3)
-        .unwrap();
+    let star = layout.walk(&mesh.faces, &at, at.incidence.corners_at(v)[0], 6, 3).unwrap();
     // Random points: the plane of the tangents is that of the subspace's two sums.
     for seed in 0..5 {
         let mesh = scattered(mesh.clone(), seed);
         let normal = Refinement::LabsikGreiner.limit_normals(&mesh, &at).unwrap()[v];
         let sum = |k: usize| -> DVec3 {
             let terms = star.iter().enumerate();
-            terms
-                .map(|(i, &w)| space.left[(i, k)] * mesh.positions[w as usize])
-                .sum()
+            terms.map(|(i, &w)| space.left[(i, k)] * mesh.positions[w as usize]).sum()
         };
         let expected = sum(0).cross(sum(1)).normalize();
         assert!(normal.cross(expected).length() < 1e-10);
@@ -339,9 +301,7 @@ fn deep_rings_are_affine_images_of_the_characteristic_one() {
         let n = ring.len() as f64;
         let wave = |part: fn(f64) -> f64| -> DVec3 {
             let terms = ring.iter().enumerate();
-            terms
-                .map(|(j, p)| 2.0 / n * part(TAU * j as f64 / n) * *p)
-                .sum()
+            terms.map(|(j, p)| 2.0 / n * part(TAU * j as f64 / n) * *p).sum()
         };
         let (a, b) = (wave(f64::cos), wave(f64::sin));
         let size = (a.length_squared() + b.length_squared()).sqrt();
@@ -357,10 +317,7 @@ fn deep_rings_are_affine_images_of_the_characteristic_one() {
         // Apices have valence k.
         let [before, after] = levels.each_ref().map(|m| first_harmonic(m, k));
         let mu = labsik_greiner::subdominant(k as usize);
-        assert!(
-            after < 1.001 * mu * mu * before,
-            "{k}: {before:e} {after:e}"
-        );
+        assert!(after < 1.001 * mu * mu * before, "{k}: {before:e} {after:e}");
         assert!(before > 1e-3, "the test sees other modes");
     }
 }

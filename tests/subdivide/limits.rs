@@ -19,11 +19,7 @@ const PRIMAL: [(Refinement, Limits); 3] = [
 ];
 
 fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
-    if scheme == Refinement::CatmullClark {
-        polygon_meshes()
-    } else {
-        triangle_meshes()
-    }
+    if scheme == Refinement::CatmullClark { polygon_meshes() } else { triangle_meshes() }
 }
 
 #[test]
@@ -61,19 +57,14 @@ fn refined_vertices_converge_to_the_limit_at_the_known_rate() {
                 _ => scattered(bipyramid(k), 5),
             };
             let limits = limits(&mesh, &topology(&mesh)).unwrap();
-            let levels: Vec<Mesh> = (0..=5)
-                .map(|level| scheme.refine_n(&mesh, level).unwrap())
-                .collect();
+            let levels: Vec<Mesh> = (0..=5).map(|level| scheme.refine_n(&mesh, level).unwrap()).collect();
             let incidence = topology(&mesh).incidence;
             for (v, &limit) in limits.iter().enumerate() {
                 let (sum, product) = contraction(scheme, incidence.face_count(v));
                 let error = |level: usize| levels[level].positions[v] - limit;
                 for level in 0..=3 {
                     let expected = sum * error(level + 1) - product * error(level);
-                    assert!(
-                        (error(level + 2) - expected).length() < ROUNDING,
-                        "{scheme} {k}"
-                    );
+                    assert!((error(level + 2) - expected).length() < ROUNDING, "{scheme} {k}");
                 }
                 assert!(error(0).length() > 1e-3, "the test sees a motion");
             }
@@ -94,10 +85,7 @@ fn seven_levels_end_at_the_limit_points() {
             Refinement::Loop => 1.0 / 16.0,
             _ => 1.0 / 9.0,
         };
-        assert!(
-            error < 4.0 * rate.powi(7) && error > 0.0,
-            "{scheme} {error:e}"
-        );
+        assert!(error < 4.0 * rate.powi(7) && error > 0.0, "{scheme} {error:e}");
     }
 }
 
@@ -120,10 +108,9 @@ fn limits_equal_their_masks_evaluated_face_by_face() {
         let flipped = sqrt3::limit_positions(&mesh, &topology(&mesh)).unwrap();
         for v in 0..mesh.len() {
             let star = star(&mesh, v);
-            for (found, [a, b]) in [
-                (looped[v], loop_scheme::limit_mask(star.valence)),
-                (flipped[v], sqrt3::limit_mask(star.valence)),
-            ] {
+            for (found, [a, b]) in
+                [(looped[v], loop_scheme::limit_mask(star.valence)), (flipped[v], sqrt3::limit_mask(star.valence))]
+            {
                 let expected = a * mesh.positions[v] + b * star.neighbors;
                 assert!((found - expected).length() < ROUNDING);
             }
@@ -142,8 +129,7 @@ fn catmull_clark_limits_of_a_regular_grid_are_those_of_the_cubic_spline() {
             let mut expected = DVec3::ZERO;
             for (a, wa) in spline.iter().enumerate() {
                 for (b, wb) in spline.iter().enumerate() {
-                    let (row, column) =
-                        ((i + rows + a - 1) % rows, (j + columns + b - 1) % columns);
+                    let (row, column) = ((i + rows + a - 1) % rows, (j + columns + b - 1) % columns);
                     expected += wa * wb * mesh.positions[row * columns + column];
                 }
             }
@@ -154,10 +140,7 @@ fn catmull_clark_limits_of_a_regular_grid_are_those_of_the_cubic_spline() {
 
 fn face_centroid(mesh: &Mesh, f: usize) -> DVec3 {
     let face = mesh.faces.face(f);
-    face.iter()
-        .map(|&v| mesh.positions[v as usize])
-        .sum::<DVec3>()
-        / face.len() as f64
+    face.iter().map(|&v| mesh.positions[v as usize]).sum::<DVec3>() / face.len() as f64
 }
 
 /// The face of vertex v after the first step is face F + E + v, then face F + E + v of all type-F faces for
@@ -177,8 +160,7 @@ fn doo_sabin_limits_are_the_centroids_that_stay() {
                 assert!((face_centroid(&fine, face) - *limit).length() < ROUNDING);
                 let radius = |m: &Mesh| {
                     let corners = m.faces.face(face).iter();
-                    let squares =
-                        corners.map(|&c| (m.positions[c as usize] - *limit).length_squared());
+                    let squares = corners.map(|&c| (m.positions[c as usize] - *limit).length_squared());
                     squares.sum::<f64>().sqrt()
                 };
                 assert!(radius(&fine) <= radius(&once) / 8.0 + ROUNDING);
@@ -191,8 +173,8 @@ fn doo_sabin_limits_are_the_centroids_that_stay() {
 fn doo_sabin_limits_of_triangles_do_not_depend_on_the_first_rule() {
     for mesh in triangle_meshes() {
         let topology = topology(&mesh);
-        let [nasri, zheng_cai] = [Rule::DooSabin, Rule::ZhengCai]
-            .map(|rule| doo_sabin::limit_positions(rule, &mesh, &topology).unwrap());
+        let [nasri, zheng_cai] =
+            [Rule::DooSabin, Rule::ZhengCai].map(|rule| doo_sabin::limit_positions(rule, &mesh, &topology).unwrap());
         assert!(distance(&nasri, &zheng_cai) < ROUNDING);
     }
 }

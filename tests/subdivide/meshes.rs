@@ -60,9 +60,7 @@ fn torus_points(rows: u32, columns: u32) -> Vec<DVec3> {
         let (u, v) = (on_circle(rows, i, 0.0), on_circle(columns, j, 0.0));
         DVec3::new((2.0 + v.x) * u.x, (2.0 + v.x) * u.y, v.y)
     };
-    (0..rows)
-        .flat_map(|i| (0..columns).map(move |j| point(i, j)))
-        .collect()
+    (0..rows).flat_map(|i| (0..columns).map(move |j| point(i, j))).collect()
 }
 
 /// A regular grid of quads: vertex i·columns + j; face i·columns + j starts at that vertex and goes first to
@@ -70,9 +68,7 @@ fn torus_points(rows: u32, columns: u32) -> Vec<DVec3> {
 pub fn torus(rows: u32, columns: u32) -> Mesh {
     let at = |i, j| (i % rows) * columns + j % columns;
     let quad = |i, j| vec![at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-    let faces: Vec<_> = (0..rows)
-        .flat_map(|i| (0..columns).map(move |j| quad(i, j)))
-        .collect();
+    let faces: Vec<_> = (0..rows).flat_map(|i| (0..columns).map(move |j| quad(i, j))).collect();
     mesh(torus_points(rows, columns), &faces)
 }
 
@@ -125,9 +121,7 @@ pub fn polygons(seed: u64, vertices: u32) -> Mesh {
         left.rotate_left(turn);
         // left runs from w round to v; the face across runs from v on to w.
         let (w, v) = (left[0], left[left.len() - 1]);
-        let across = faces
-            .iter()
-            .position(|g| (0..g.len()).any(|i| g[i] == w && g[(i + 1) % g.len()] == v));
+        let across = faces.iter().position(|g| (0..g.len()).any(|i| g[i] == w && g[(i + 1) % g.len()] == v));
         let Some(g) = across else { continue };
         let mut right = faces[g].clone();
         let first = right.iter().position(|&x| x == v).unwrap();
@@ -160,11 +154,7 @@ pub fn triangle_meshes() -> Vec<Mesh> {
     meshes.push(tetrahedron());
     meshes.push(tri_torus(4, 5));
     meshes.extend((7..10).map(|seed| stacked(seed, 40)));
-    meshes
-        .into_iter()
-        .zip(11..)
-        .map(|(mesh, seed)| scattered(mesh, seed))
-        .collect()
+    meshes.into_iter().zip(11..).map(|(mesh, seed)| scattered(mesh, seed)).collect()
 }
 
 /// [`triangle_meshes`] and meshes with faces of 3 to 12 corners, at random points.
@@ -184,11 +174,7 @@ pub struct Star {
 }
 
 pub fn star(mesh: &Mesh, v: usize) -> Star {
-    let mut star = Star {
-        valence: 0,
-        neighbors: DVec3::ZERO,
-        centroids: DVec3::ZERO,
-    };
+    let mut star = Star { valence: 0, neighbors: DVec3::ZERO, centroids: DVec3::ZERO };
     for face in mesh.faces.iter() {
         if let Some(i) = face.iter().position(|&x| x as usize == v) {
             let points: Vec<DVec3> = face.iter().map(|&x| mesh.positions[x as usize]).collect();

@@ -59,13 +59,9 @@ fn a_step_scales_the_tangents_by_the_subdominant_eigenvalue() {
             let incidence = topology(&mesh).incidence;
             for v in 0..mesh.len() {
                 let scale = lambda(scheme, incidence.face_count(v)).powi(2);
-                let [expected, found] =
-                    [coarse_pairs[v], fine_pairs[v]].map(|t| t.cosine.cross(t.sine));
+                let [expected, found] = [coarse_pairs[v], fine_pairs[v]].map(|t| t.cosine.cross(t.sine));
                 let size = 1.0 + expected.length();
-                assert!(
-                    (scale * expected - found).length() < 10.0 * ROUNDING * size,
-                    "{scheme}"
-                );
+                assert!((scale * expected - found).length() < 10.0 * ROUNDING * size, "{scheme}");
             }
         }
     }
@@ -161,10 +157,7 @@ fn normals_are_those_of_a_finely_refined_mesh() {
             let fine = scheme.refine_n(&mesh, levels).unwrap();
             for (v, normal) in normals.iter().enumerate() {
                 let seen = discrete_normal(&fine, v);
-                assert!(
-                    (seen - *normal).length() < 0.01,
-                    "{scheme} {k} {v}: {seen} {normal}"
-                );
+                assert!((seen - *normal).length() < 0.01, "{scheme} {k} {v}: {seen} {normal}");
                 // Outward: the body is convex around the origin.
                 assert!(normal.dot(mesh.positions[v]) > 0.0);
             }
@@ -185,10 +178,7 @@ fn doo_sabin_normals_are_those_of_a_finely_refined_mesh() {
             let limits = doo_sabin::limit_positions(rule, &mesh, &topology).unwrap();
             for (v, normal) in normals.iter().enumerate() {
                 let face = fine.faces.face(first + v);
-                let ring: Vec<DVec3> = face
-                    .iter()
-                    .map(|&c| fine.positions[c as usize] - limits[v])
-                    .collect();
+                let ring: Vec<DVec3> = face.iter().map(|&c| fine.positions[c as usize] - limits[v]).collect();
                 let pairs = ring.iter().zip(ring.iter().cycle().skip(1));
                 let seen = pairs.map(|(a, b)| a.cross(*b)).sum::<DVec3>().normalize();
                 assert!((seen - *normal).length() < 0.01);
@@ -205,10 +195,7 @@ fn doo_sabin_normals_are_those_of_a_finely_refined_mesh() {
 fn doo_sabin_face_normals_stay() {
     for mesh in polygon_meshes() {
         let fine = Refinement::DooSabin.refine_n(&mesh, 2).unwrap();
-        let (coarse, fine) = (
-            doo_sabin::face_normals(&mesh),
-            doo_sabin::face_normals(&fine),
-        );
+        let (coarse, fine) = (doo_sabin::face_normals(&mesh), doo_sabin::face_normals(&fine));
         for (normal, refined) in coarse.iter().zip(&fine) {
             assert!((normal.length() - 1.0).abs() < ROUNDING);
             assert!((*normal - *refined).length() < 1e-9);
@@ -228,10 +215,7 @@ fn normals_turn_with_the_mesh_and_do_not_see_shifts_and_scales() {
         Refinement::LabsikGreiner,
     ] {
         for mesh in meshes_for(scheme) {
-            let points = mesh
-                .positions
-                .iter()
-                .map(|p| 1e-6 * (turn * *p) + DVec3::splat(2e-6));
+            let points = mesh.positions.iter().map(|p| 1e-6 * (turn * *p) + DVec3::splat(2e-6));
             let turned = Mesh::new(points.collect(), mesh.faces.clone());
             for (a, b) in normals(scheme, &mesh).iter().zip(normals(scheme, &turned)) {
                 assert!((turn * *a - b).length() < 1e-9, "{scheme}");
@@ -257,10 +241,7 @@ fn stars_without_a_plane_have_zero_normals() {
         let mut point = bipyramid(4);
         point.positions.fill(DVec3::new(0.1, 0.2, 0.3));
         for mesh in [line, point] {
-            assert!(
-                normals(scheme, &mesh).iter().all(|n| *n == DVec3::ZERO),
-                "{scheme}"
-            );
+            assert!(normals(scheme, &mesh).iter().all(|n| *n == DVec3::ZERO), "{scheme}");
         }
     }
 }

@@ -15,11 +15,7 @@ fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
     let any_polygons = matches!(scheme, Refinement::CatmullClark | Refinement::DooSabin);
     let mut meshes = if any_polygons {
         let sphere = builtin::irregular_poly(6000, 3);
-        vec![
-            union(&polygon_meshes()),
-            sphere,
-            builtin::irregular_quad(9000, 4),
-        ]
+        vec![union(&polygon_meshes()), sphere, builtin::irregular_quad(9000, 4)]
     } else {
         vec![union(&triangle_meshes()), builtin::irregular_tri(9000, 5)]
     };
@@ -55,11 +51,7 @@ fn the_refined_topology_is_the_one_found_anew() {
             let coarse = topology(&mesh);
             let fine = scheme.refine(&mesh, &coarse).unwrap();
             let found = scheme.refined_topology(&mesh, &coarse, &fine);
-            assert!(
-                found == topology(&fine),
-                "{scheme}, {} vertices",
-                mesh.len()
-            );
+            assert!(found == topology(&fine), "{scheme}, {} vertices", mesh.len());
             odd += usize::from(!found.is_closed());
             if found.is_closed() && mesh.len() < 1000 {
                 let finer = scheme.refine(&fine, &found).unwrap();

@@ -10,26 +10,19 @@ use crate::meshes::*;
 fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
     match scheme {
         Refinement::CatmullClark | Refinement::DooSabin => polygon_meshes(),
-        Refinement::Loop
-        | Refinement::Sqrt3
-        | Refinement::Butterfly
-        | Refinement::LabsikGreiner => triangle_meshes(),
+        Refinement::Loop | Refinement::Sqrt3 | Refinement::Butterfly | Refinement::LabsikGreiner => triangle_meshes(),
     }
 }
 
 #[test]
 fn test_meshes_are_as_irregular_as_claimed() {
-    let sizes: Vec<usize> = polygon_meshes()
-        .iter()
-        .flat_map(|m| m.faces.iter().map(<[u32]>::len).collect::<Vec<_>>())
-        .collect();
+    let sizes: Vec<usize> =
+        polygon_meshes().iter().flat_map(|m| m.faces.iter().map(<[u32]>::len).collect::<Vec<_>>()).collect();
     let valences: Vec<usize> = triangle_meshes()
         .iter()
         .flat_map(|m| {
             let incidence = topology(m).incidence;
-            (0..m.len())
-                .map(move |v| incidence.face_count(v))
-                .collect::<Vec<_>>()
+            (0..m.len()).map(move |v| incidence.face_count(v)).collect::<Vec<_>>()
         })
         .collect();
     for k in 3..=12 {
@@ -131,27 +124,14 @@ fn insert_knots(data: &[DVec3], even: [f64; 3], odd: [f64; 2]) -> Vec<DVec3> {
     (0..n)
         .flat_map(|i| {
             let (before, here, after) = (data[(i + n - 1) % n], data[i], data[(i + 1) % n]);
-            [
-                even[0] * before + even[1] * here + even[2] * after,
-                odd[0] * here + odd[1] * after,
-            ]
+            [even[0] * before + even[1] * here + even[2] * after, odd[0] * here + odd[1] * after]
         })
         .collect()
 }
 
 /// [`insert_knots`] along both directions of a torus grid.
-fn insert_knots_on_torus(
-    mesh: &Mesh,
-    rows: usize,
-    columns: usize,
-    even: [f64; 3],
-    odd: [f64; 2],
-) -> Vec<Vec<DVec3>> {
-    let wide: Vec<Vec<DVec3>> = mesh
-        .positions
-        .chunks(columns)
-        .map(|row| insert_knots(row, even, odd))
-        .collect();
+fn insert_knots_on_torus(mesh: &Mesh, rows: usize, columns: usize, even: [f64; 3], odd: [f64; 2]) -> Vec<Vec<DVec3>> {
+    let wide: Vec<Vec<DVec3>> = mesh.positions.chunks(columns).map(|row| insert_knots(row, even, odd)).collect();
     let mut fine = vec![vec![DVec3::ZERO; 2 * columns]; 2 * rows];
     for j in 0..2 * columns {
         let column: Vec<DVec3> = wide.iter().map(|row| row[j]).collect();
@@ -205,8 +185,7 @@ fn steps_equal_their_masks_evaluated_face_by_face() {
         for v in 0..mesh.len() {
             let star = star(&mesh, v);
             let n = star.valence as f64;
-            let expected =
-                (n - 2.0) / n * mesh.positions[v] + (star.neighbors + star.centroids) / (n * n);
+            let expected = (n - 2.0) / n * mesh.positions[v] + (star.neighbors + star.centroids) / (n * n);
             assert!((fine.positions[v] - expected).length() < ROUNDING);
         }
         for rule in [doo_sabin::Rule::DooSabin, doo_sabin::Rule::ZhengCai] {
@@ -216,9 +195,8 @@ fn steps_equal_their_masks_evaluated_face_by_face() {
                 let weights = rule.circulant(m);
                 for (i, c) in mesh.faces.range(f).enumerate() {
                     let terms = face.iter().enumerate();
-                    let expected: DVec3 = terms
-                        .map(|(j, &v)| weights[(m + j - i) % m] * mesh.positions[v as usize])
-                        .sum();
+                    let expected: DVec3 =
+                        terms.map(|(j, &v)| weights[(m + j - i) % m] * mesh.positions[v as usize]).sum();
                     assert!((points[c] - expected).length() < ROUNDING);
                 }
             }
@@ -229,10 +207,9 @@ fn steps_equal_their_masks_evaluated_face_by_face() {
         let flipped = sqrt3::refine(&mesh, &topology(&mesh)).unwrap();
         for v in 0..mesh.len() {
             let star = star(&mesh, v);
-            for (fine, [a, b]) in [
-                (&looped, loop_scheme::vertex_mask(star.valence)),
-                (&flipped, sqrt3::vertex_mask(star.valence)),
-            ] {
+            for (fine, [a, b]) in
+                [(&looped, loop_scheme::vertex_mask(star.valence)), (&flipped, sqrt3::vertex_mask(star.valence))]
+            {
                 let expected = a * mesh.positions[v] + b * star.neighbors;
                 assert!((fine.positions[v] - expected).length() < ROUNDING);
             }
@@ -246,8 +223,7 @@ fn steps_equal_their_masks_evaluated_face_by_face() {
         for (f, face) in mesh.faces.iter().enumerate() {
             for (i, &e) in looped.faces.face(4 * f + 3).iter().enumerate() {
                 let (v, w) = (face[i], face[(i + 1) % 3]);
-                let mut expected =
-                    0.375 * (mesh.positions[v as usize] + mesh.positions[w as usize]);
+                let mut expected = 0.375 * (mesh.positions[v as usize] + mesh.positions[w as usize]);
                 for other in mesh.faces.iter() {
                     let forward = (0..3).find(|&k| (other[k], other[(k + 1) % 3]) == (v, w));
                     let backward = (0..3).find(|&k| (other[k], other[(k + 1) % 3]) == (w, v));
@@ -263,14 +239,9 @@ fn steps_equal_their_masks_evaluated_face_by_face() {
 
 #[test]
 fn published_weights() {
-    let near = |a: &[f64], b: &[f64]| {
-        a.len() == b.len() && a.iter().zip(b).all(|(x, y)| (x - y).abs() < 1e-14)
-    };
+    let near = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(x, y)| (x - y).abs() < 1e-14);
     let doo_sabin = doo_sabin::Rule::DooSabin;
-    assert!(near(
-        &doo_sabin.circulant(4),
-        &[9. / 16., 3. / 16., 1. / 16., 3. / 16.]
-    ));
+    assert!(near(&doo_sabin.circulant(4), &[9. / 16., 3. / 16., 1. / 16., 3. / 16.]));
     assert!(near(&doo_sabin.circulant(3), &[2. / 3., 1. / 6., 1. / 6.]));
     assert!(near(&loop_scheme::vertex_mask(6), &[5. / 8., 1. / 16.]));
     assert!(near(&loop_scheme::vertex_mask(3), &[7. / 16., 3. / 16.]));
@@ -279,23 +250,14 @@ fn published_weights() {
     assert!(near(&sqrt3::vertex_mask(6), &[2. / 3., 1. / 18.]));
     assert!(near(&sqrt3::vertex_mask(3), &[4. / 9., 5. / 27.]));
     assert!(near(&sqrt3::limit_mask(6), &[0.5, 1. / 12.]));
-    assert!(near(
-        &catmull_clark::limit_mask(4),
-        &[4. / 9., 1. / 9., 1. / 36.]
-    ));
-    assert!(near(
-        &catmull_clark::limit_mask(3),
-        &[3. / 8., 1. / 6., 1. / 24.]
-    ));
+    assert!(near(&catmull_clark::limit_mask(4), &[4. / 9., 1. / 9., 1. / 36.]));
+    assert!(near(&catmull_clark::limit_mask(3), &[3. / 8., 1. / 6., 1. / 24.]));
     for n in 3..40 {
         let [a, b] = loop_scheme::limit_mask(n);
         let [c, d] = sqrt3::limit_mask(n);
         let [v, e, f] = catmull_clark::limit_mask(n);
         let size = n as f64;
-        assert!(near(
-            &[a + size * b, c + size * d, v + size * (e + f)],
-            &[1.0; 3]
-        ));
+        assert!(near(&[a + size * b, c + size * d, v + size * (e + f)], &[1.0; 3]));
         let sums = [doo_sabin, doo_sabin::Rule::ZhengCai].map(|r| r.circulant(n).iter().sum());
         assert!(near(&sums, &[1.0; 2]), "{sums:?}");
     }
@@ -304,10 +266,7 @@ fn published_weights() {
 #[test]
 fn meshes_that_cannot_be_refined_are_refused_with_their_place() {
     let message = |scheme: Refinement, mesh: &Mesh| {
-        let text = scheme
-            .refine(mesh, &topology(mesh))
-            .unwrap_err()
-            .to_string();
+        let text = scheme.refine(mesh, &topology(mesh)).unwrap_err().to_string();
         assert!(!text.contains('\n'));
         text
     };
@@ -322,12 +281,7 @@ fn meshes_that_cannot_be_refined_are_refused_with_their_place() {
         assert!(message(scheme, &lonely).contains("vertex 4 belongs to no face"));
         assert!(message(scheme, &turned).contains("in the same direction"));
     }
-    for scheme in [
-        Refinement::Loop,
-        Refinement::Sqrt3,
-        Refinement::Butterfly,
-        Refinement::LabsikGreiner,
-    ] {
+    for scheme in [Refinement::Loop, Refinement::Sqrt3, Refinement::Butterfly, Refinement::LabsikGreiner] {
         let text = message(scheme, &pyramid(5));
         assert!(text.contains("face 0 has 5 corners") && text.contains(scheme.name()));
     }
@@ -345,10 +299,7 @@ fn meshes_that_cannot_be_refined_are_refused_with_their_place() {
         assert!(message(scheme, &pinched).contains("vertex 3 form more than one umbrella"));
     }
 
-    let pillow = Mesh::new(
-        vec![DVec3::ZERO, DVec3::X, DVec3::Y],
-        Faces::from_lists([[0, 1, 2], [0, 2, 1]]),
-    );
+    let pillow = Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], Faces::from_lists([[0, 1, 2], [0, 2, 1]]));
     for scheme in [Refinement::Butterfly, Refinement::LabsikGreiner] {
         assert!(message(scheme, &pillow).contains("vertex 0 has valence 2"));
     }

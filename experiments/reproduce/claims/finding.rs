@@ -102,16 +102,8 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    fn new(
-        quantity: impl Into<String>,
-        value: impl Into<Value>,
-        test: Option<(Relation, f64)>,
-    ) -> Self {
-        Evidence {
-            quantity: quantity.into(),
-            value: value.into(),
-            test,
-        }
+    fn new(quantity: impl Into<String>, value: impl Into<Value>, test: Option<(Relation, f64)>) -> Self {
+        Evidence { quantity: quantity.into(), value: value.into(), test }
     }
 
     pub fn at_most(quantity: impl Into<String>, value: impl Into<Value>, threshold: f64) -> Self {
@@ -163,11 +155,7 @@ pub struct Finding {
 
 impl Finding {
     fn new(intended: Verdict, evidence: Vec<Evidence>) -> Self {
-        Finding {
-            intended,
-            evidence,
-            remark: String::new(),
-        }
+        Finding { intended, evidence, remark: String::new() }
     }
 
     /// Confirms what is printed.
@@ -220,11 +208,7 @@ impl Finding {
             return Verdict::NotReproducible;
         }
         let mut tests = self.evidence.iter().filter_map(Evidence::holds).peekable();
-        if tests.peek().is_some() && tests.all(|holds| holds) {
-            self.intended
-        } else {
-            Verdict::NotConfirmed
-        }
+        if tests.peek().is_some() && tests.all(|holds| holds) { self.intended } else { Verdict::NotConfirmed }
     }
 }
 

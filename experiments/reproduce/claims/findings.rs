@@ -44,11 +44,7 @@ fn look_up(name: &str, records: &[Record]) -> Result<String> {
             exact.or_else(start).map(|e| shown(e.value))
         }
     };
-    found.ok_or_else(|| {
-        Error::Computation(format!(
-            "the page of findings quotes {name}, which is not in the ledger"
-        ))
-    })
+    found.ok_or_else(|| Error::Computation(format!("the page of findings quotes {name}, which is not in the ledger")))
 }
 
 #[cfg(test)]
@@ -58,23 +54,13 @@ mod tests {
     use super::*;
 
     fn records() -> Vec<Record> {
-        let evidence = vec![
-            Evidence::at_most("deviation from 1", 0.5, 1.0),
-            Evidence::shown("meshes", 3_usize),
-        ];
-        vec![Record {
-            claim: find("Z12").unwrap(),
-            finding: Finding::settled(evidence),
-        }]
+        let evidence = vec![Evidence::at_most("deviation from 1", 0.5, 1.0), Evidence::shown("meshes", 3_usize)];
+        vec![Record { claim: find("Z12").unwrap(), finding: Finding::settled(evidence) }]
     }
 
     #[test]
     fn numbers_and_verdicts_are_filled_in() {
-        let page = fill(
-            "{{Z12}} by {{Z12|dev}} on {{Z12|meshes}}, Σ_{F}.",
-            &records(),
-        )
-        .unwrap();
+        let page = fill("{{Z12}} by {{Z12|dev}} on {{Z12|meshes}}, Σ_{F}.", &records()).unwrap();
         assert_eq!(page, "Z12: settled by 0.5 on 3, Σ_{F}.");
     }
 

@@ -34,25 +34,18 @@ pub struct Lab<'a> {
 
 impl<'a> Lab<'a> {
     pub fn new(context: &'a Context) -> Self {
-        Lab {
-            context,
-            polygons: OnceCell::new(),
-            triangles: OnceCell::new(),
-            subjects: OnceCell::new(),
-        }
+        Lab { context, polygons: OnceCell::new(), triangles: OnceCell::new(), subjects: OnceCell::new() }
     }
 
     /// Closed polygon meshes at random, all valences at least 3: spheres, tori, sums and unions of those, duals,
     /// quads, mixed polygons, triangles.
     pub fn polygons(&self) -> &[Subject] {
-        self.polygons
-            .get_or_init(|| small("random-polygons", generate::random_polygons))
+        self.polygons.get_or_init(|| small("random-polygons", generate::random_polygons))
     }
 
     /// Closed triangle meshes at random.
     pub fn triangles(&self) -> &[Subject] {
-        self.triangles
-            .get_or_init(|| small("random-triangles", generate::random_triangulation))
+        self.triangles.get_or_init(|| small("random-triangles", generate::random_triangulation))
     }
 
     /// The closed real models, or stand-ins of several kinds, of at most [`MODEL_VERTICES`] vertices.
@@ -90,11 +83,7 @@ fn small(name: &str, make: fn(u64) -> Mesh) -> Vec<Subject> {
 
 pub fn subject(name: impl Into<String>, mesh: Mesh) -> Subject {
     let topology = Topology::new(&mesh.faces, mesh.len());
-    Subject {
-        name: name.into(),
-        mesh,
-        topology,
-    }
+    Subject { name: name.into(), mesh, topology }
 }
 
 /// A built-in mesh without noise.
@@ -110,9 +99,7 @@ pub fn quad_star(n: usize) -> Mesh {
 /// Points without any structure, one a vertex.
 pub fn random_points(n: usize, seed: u64) -> Vec<DVec3> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    (0..n)
-        .map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0))))
-        .collect()
+    (0..n).map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))).collect()
 }
 
 /// max ‖a_i − b_i‖
@@ -123,13 +110,7 @@ pub fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
 
 /// The largest of some numbers; NaN if one is.
 pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
-    values.into_iter().fold(f64::NEG_INFINITY, |m, x| {
-        if m.is_nan() || x.is_nan() {
-            f64::NAN
-        } else {
-            m.max(x)
-        }
-    })
+    values.into_iter().fold(f64::NEG_INFINITY, |m, x| if m.is_nan() || x.is_nan() { f64::NAN } else { m.max(x) })
 }
 
 /// The smallest of some numbers; NaN if one is.
@@ -145,10 +126,7 @@ pub fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// All of `subjects` in parallel, in their order.
-pub fn each<T: Send>(
-    subjects: &[Subject],
-    work: impl Fn(&Subject) -> Result<T> + Sync + Send,
-) -> Result<Vec<T>> {
+pub fn each<T: Send>(subjects: &[Subject], work: impl Fn(&Subject) -> Result<T> + Sync + Send) -> Result<Vec<T>> {
     subjects.par_iter().map(work).collect()
 }
 
@@ -189,24 +167,13 @@ pub fn ends(system: &LimitSystem) -> Result<Ends> {
 /// Solves with structureless points, which excite every eigenvector, to `tolerance` times the largest coordinate 1.
 pub fn solve_random(system: &LimitSystem, setup: Setup, tolerance: f64, limit: usize) -> Solution {
     let points = random_points(system.len(), system.len() as u64);
-    let stop = Stop {
-        tolerance,
-        max_iterations: limit,
-    };
+    let stop = Stop { tolerance, max_iterations: limit };
     run(system, &points, setup, &stop)
 }
 
 /// The first `count` iterates after the start V = P.
-pub fn iterates(
-    system: &LimitSystem,
-    points: &[DVec3],
-    setup: Setup,
-    count: usize,
-) -> Vec<Vec<DVec3>> {
-    let stop = Stop {
-        tolerance: 0.0,
-        max_iterations: count,
-    };
+pub fn iterates(system: &LimitSystem, points: &[DVec3], setup: Setup, count: usize) -> Vec<Vec<DVec3>> {
+    let stop = Stop { tolerance: 0.0, max_iterations: count };
     let mut found = Vec::with_capacity(count);
     run_watched(system, points, setup, &stop, &mut |step| {
         if step.iteration > 0 {
@@ -218,26 +185,15 @@ pub fn iterates(
 }
 
 /// Iterations from V = P to `tolerance` of the bounding box's diagonal; `None` if it was not reached.
-pub fn iterations(
-    system: &LimitSystem,
-    subject: &Subject,
-    setup: Setup,
-    tolerance: f64,
-) -> Option<usize> {
-    let stop = Stop {
-        tolerance: tolerance * subject.mesh.diagonal(),
-        max_iterations: 20_000,
-    };
+pub fn iterations(system: &LimitSystem, subject: &Subject, setup: Setup, tolerance: f64) -> Option<usize> {
+    let stop = Stop { tolerance: tolerance * subject.mesh.diagonal(), max_iterations: 20_000 };
     let report = run(system, &subject.mesh.positions, setup, &stop).report;
     (report.outcome == Outcome::Converged).then_some(report.iterations)
 }
 
 /// max_i ‖p_i − (A v)_i‖ after each iteration, relative to the bounding box's diagonal; entry 0 is the start.
 pub fn history(system: &LimitSystem, subject: &Subject, setup: Setup, count: usize) -> Vec<f64> {
-    let stop = Stop {
-        tolerance: 0.0,
-        max_iterations: count,
-    };
+    let stop = Stop { tolerance: 0.0, max_iterations: count };
     let report = run(system, &subject.mesh.positions, setup, &stop).report;
     let size = subject.mesh.diagonal();
     report.history.iter().map(|e| e.max / size).collect()
@@ -250,11 +206,7 @@ pub fn entries_per_vertex(system: &LimitSystem) -> f64 {
 
 /// (diagonal − Σ |others|) of row `i` of A.
 pub fn excess(system: &LimitSystem, i: usize) -> f64 {
-    system
-        .a
-        .row(i)
-        .map(|(j, a)| if i == j { a } else { -a.abs() })
-        .sum()
+    system.a.row(i).map(|(j, a)| if i == j { a } else { -a.abs() }).sum()
 }
 
 #[cfg(test)]

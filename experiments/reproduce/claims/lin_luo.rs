@@ -146,13 +146,9 @@ fn four_points(_: &Lab) -> Result<Finding> {
     let n = p.len();
     let (moved, middle) = b_spline(&p);
     let delta: Vec<DVec3> = moved.iter().zip(&p).map(|(q, p)| *q - *p).collect();
-    let by_eq_3: Vec<DVec3> = (0..n)
-        .map(|i| middle[i] - 0.5 * (delta[i] + delta[(i + 1) % n]))
-        .collect();
+    let by_eq_3: Vec<DVec3> = (0..n).map(|i| middle[i] - 0.5 * (delta[i] + delta[(i + 1) % n])).collect();
     let at = |i: usize| p[i % n];
-    let direct: Vec<DVec3> = (0..n)
-        .map(|i| (9.0 * (at(i) + at(i + 1)) - at(i + n - 1) - at(i + 2)) / 16.0)
-        .collect();
+    let direct: Vec<DVec3> = (0..n).map(|i| (9.0 * (at(i) + at(i + 1)) - at(i + n - 1) - at(i + 2)) / 16.0).collect();
     Ok(Finding::reproduced(vec![Evidence::at_most(
         "largest distance of Eq. 3 from the weights (−1, 9, 9, −1)/16, a random polygon",
         distance(&by_eq_3, &direct),
@@ -167,9 +163,7 @@ fn curve_ends(_: &Lab) -> Result<Finding> {
     let (moved, middle) = b_spline(&p);
     let (even_1, odd_1) = split(&curve::refine(&p, &vec![1.0; n], Ends::Closed).0);
     let (even_0, odd_0) = split(&curve::refine(&p, &vec![0.0; n], Ends::Closed).0);
-    let four: Vec<DVec3> = (0..n)
-        .map(|i| (9.0 * (at(i) + at(i + 1)) - at(i + n - 1) - at(i + 2)) / 16.0)
-        .collect();
+    let four: Vec<DVec3> = (0..n).map(|i| (9.0 * (at(i) + at(i + 1)) - at(i + n - 1) - at(i + 2)) / 16.0).collect();
     // In between: points after six levels on the segment between those of the ends.
     let fine = |alpha: f64| curve::refine_n(&p, &vec![alpha; n], Ends::Closed, 6).0;
     let (low, high) = (fine(0.0), fine(1.0));
@@ -209,22 +203,15 @@ fn sqrt3_step(_: &Lab) -> Result<Finding> {
         let a = (4.0 - 2.0 * (TAU / n as f64).cos()) / 9.0;
         let beta = 1.0 / (1.0 + 3.0 * a);
         for (i, w) in mask.iter().enumerate() {
-            let wanted = if i == 0 {
-                beta
-            } else {
-                (1.0 - beta) / n as f64
-            };
+            let wanted = if i == 0 { beta } else { (1.0 - beta) / n as f64 };
             limit = largest([limit, (w - wanted).abs()]);
         }
     }
     let (mesh, topology) = star(9)?;
     let fine = sqrt3::refine(&mesh, &topology)?;
     let relaxed = displaced(&mesh, |_, p, d| p + d);
-    let centers: Vec<DVec3> = mesh
-        .faces
-        .iter()
-        .map(|f| f.iter().map(|&v| mesh.positions[v as usize]).sum::<DVec3>() / 3.0)
-        .collect();
+    let centers: Vec<DVec3> =
+        mesh.faces.iter().map(|f| f.iter().map(|&v| mesh.positions[v as usize]).sum::<DVec3>() / 3.0).collect();
     Ok(Finding::reproduced(vec![
         Evidence::at_most(
             "largest distance from Eq. 1 and 2, random points on star:9",
@@ -273,17 +260,11 @@ fn interpolatory(_: &Lab) -> Result<Finding> {
     let modes = SplittingMatrix::new(LocalScheme::Sqrt3 { alpha: 1.0 }, 3)?.modes()?;
     let modulus = |frequency: usize| {
         // λ_0 = 1 is of frequency 0.
-        let own = modes
-            .iter()
-            .filter(|m| m.frequency == frequency)
-            .map(|m| m.value.norm());
+        let own = modes.iter().filter(|m| m.frequency == frequency).map(|m| m.value.norm());
         own.filter(|&x| x < 1.0 - 1e-9).fold(f64::NAN, f64::max)
     };
     let others: Vec<usize> = (4..=50).collect();
-    let failing = condition_over_alpha(&others, &[1.0])?
-        .iter()
-        .filter(|c| !c.holds)
-        .count();
+    let failing = condition_over_alpha(&others, &[1.0])?.iter().filter(|c| !c.holds).count();
     // Eq. 5 with 6 written out.
     let mut mask = 0.0f64;
     let mut kept = 0.0f64;
@@ -291,16 +272,9 @@ fn interpolatory(_: &Lab) -> Result<Finding> {
         let (mesh, topology) = star(k)?;
         let (fine, _) = unified_sqrt3::refine(&mesh, &topology, &vec![1.0; mesh.len()])?;
         let parts = displaced(&mesh, |_, p, d| (p - d) / 3.0);
-        let wanted: Vec<DVec3> = mesh
-            .faces
-            .iter()
-            .map(|f| f.iter().map(|&v| parts[v as usize]).sum())
-            .collect();
+        let wanted: Vec<DVec3> = mesh.faces.iter().map(|f| f.iter().map(|&v| parts[v as usize]).sum()).collect();
         mask = largest([mask, distance(&fine.positions[mesh.len()..], &wanted)]);
-        kept = largest([
-            kept,
-            distance(&fine.positions[..mesh.len()], &mesh.positions),
-        ]);
+        kept = largest([kept, distance(&fine.positions[..mesh.len()], &mesh.positions)]);
     }
     let fold = |name: &str, levels: usize| -> Result<f64> {
         let mesh = exact(name)?.mesh;
@@ -315,7 +289,11 @@ fn interpolatory(_: &Lab) -> Result<Finding> {
         ),
         Evidence::shown("modulus of the leading pair of frequency 1 at valence 3", modulus(1)),
         Evidence::shown("modulus of the complex pair of frequency 0 at valence 3", modulus(0)),
-        Evidence::above("largest angle between neighbouring faces after 8 steps, tetrahedron (valence 3)", fold("tetrahedron", 8)?, 0.5),
+        Evidence::above(
+            "largest angle between neighbouring faces after 8 steps, tetrahedron (valence 3)",
+            fold("tetrahedron", 8)?,
+            0.5,
+        ),
         Evidence::shown("the same, octahedron (valence 4)", fold("octahedron", 8)?),
         Evidence::shown("the same, icosahedron (valence 5)", fold("icosahedron", 8)?),
         Evidence::equal("valences 4 to 50 at which λ_1 = λ_2 > λ_3 fails at α = 1", failing, 0.0),
@@ -336,19 +314,12 @@ fn blend(_: &Lab) -> Result<Finding> {
     // Eq. 10 and the form under Eq. 11, in which no Δ occurs: the sign of Δ inside decides.
     let formed = |sign: f64| {
         let parts = displaced(&mesh, |v, p, d| (p + sign * alpha[v] * d) / 3.0);
-        let new: Vec<DVec3> = mesh
-            .faces
-            .iter()
-            .map(|f| f.iter().map(|&v| parts[v as usize]).sum())
-            .collect();
+        let new: Vec<DVec3> = mesh.faces.iter().map(|f| f.iter().map(|&v| parts[v as usize]).sum()).collect();
         let old = displaced(&mesh, |v, p, d| p - sign * (1.0 - alpha[v]) * d);
         [old, new].concat()
     };
     let expanded = expanded(&mesh, &alpha);
-    let means = mesh
-        .faces
-        .iter()
-        .map(|f| f.iter().map(|&v| alpha[v as usize]).sum::<f64>() / 3.0);
+    let means = mesh.faces.iter().map(|f| f.iter().map(|&v| alpha[v as usize]).sum::<f64>() / 3.0);
     let ends = |value: f64| unified_sqrt3::refine(&mesh, &topology, &vec![value; mesh.len()]);
     let kobbelt = sqrt3::refine(&mesh, &topology)?;
     Ok(Finding::corrected(
@@ -358,16 +329,30 @@ fn blend(_: &Lab) -> Result<Finding> {
         ROUNDING,
     )
     .also([
-        Evidence::at_most("largest distance of the scheme here from the expanded forms", distance(&fine.positions, &expanded), ROUNDING),
-        Evidence::at_most("largest distance from the √3 scheme at α = 0", distance(&ends(0.0)?.0.positions, &kobbelt.positions), ROUNDING),
-        Evidence::equal("largest move of an old vertex at α = 1", distance(&ends(1.0)?.0.positions[..mesh.len()], &mesh.positions), 0.0),
+        Evidence::at_most(
+            "largest distance of the scheme here from the expanded forms",
+            distance(&fine.positions, &expanded),
+            ROUNDING,
+        ),
+        Evidence::at_most(
+            "largest distance from the √3 scheme at α = 0",
+            distance(&ends(0.0)?.0.positions, &kobbelt.positions),
+            ROUNDING,
+        ),
+        Evidence::equal(
+            "largest move of an old vertex at α = 1",
+            distance(&ends(1.0)?.0.positions[..mesh.len()], &mesh.positions),
+            0.0,
+        ),
         Evidence::at_most(
             "largest deviation of a new vertex's α from Eq. 7",
             largest(parameters[mesh.len()..].iter().zip(means).map(|(a, b)| (a - b).abs())),
             ROUNDING,
         ),
     ])
-    .remark("The expanded forms (6), (10) and below (11) are right; Δ in Eq. 4, 9 and 11 is old − new, in §3 new − old."))
+    .remark(
+        "The expanded forms (6), (10) and below (11) are right; Δ in Eq. 4, 9 and 11 is old − new, in §3 new − old.",
+    ))
 }
 
 /// Eq. 10 at all faces and the expanded form of Eq. 11 at all vertices, with the printed weights.
@@ -386,17 +371,13 @@ fn expanded(mesh: &Mesh, alpha: &[f64]) -> Vec<DVec3> {
     };
     let old = (0..mesh.len()).map(|v| {
         let (q, mean, cosine, a) = at(v);
-        (5.0 + 4.0 * a + 2.0 * (1.0 - a) * cosine) / 9.0 * q
-            + (1.0 - a) * (4.0 - 2.0 * cosine) / 9.0 * mean
+        (5.0 + 4.0 * a + 2.0 * (1.0 - a) * cosine) / 9.0 * q + (1.0 - a) * (4.0 - 2.0 * cosine) / 9.0 * mean
     });
     let part = |v: usize| {
         let (p, mean, cosine, a) = at(v);
         (9.0 + 4.0 * a - 2.0 * a * cosine) / 27.0 * p - (4.0 * a - 2.0 * a * cosine) / 27.0 * mean
     };
-    let new = mesh
-        .faces
-        .iter()
-        .map(|f| f.iter().map(|&v| part(v as usize)).sum());
+    let new = mesh.faces.iter().map(|f| f.iter().map(|&v| part(v as usize)).sum());
     old.chain(new).collect()
 }
 
@@ -423,7 +404,11 @@ fn less_popping(lab: &Lab) -> Result<Finding> {
         }
     }
     Ok(Finding::reproduced(vec![
-        Evidence::below("largest volume ratio at α = 0 less one at 0 < α < 1 (below 0: shrinks less), five meshes", shrink, 0.0),
+        Evidence::below(
+            "largest volume ratio at α = 0 less one at 0 < α < 1 (below 0: shrinks less), five meshes",
+            shrink,
+            0.0,
+        ),
         Evidence::below("largest volume ratio at 0 < α < 1 less that at α = 1 (below 0: bulges less)", bulge, 0.0),
         Evidence::shown("smallest volume ratio at α = 0", smallest(at_0)),
         Evidence::shown("largest volume ratio at α = 1", largest(at_1)),
@@ -438,8 +423,7 @@ fn chosen_vertices(_: &Lab) -> Result<Finding> {
     let (fine, _) = refine_n(&subject.mesh, &choose(&marks, 0.0), 4)?;
     let moved = |marked: bool| {
         let of = (0..n).filter(|&v| marks[v] == marked);
-        of.map(|v| fine.positions[v].distance(subject.mesh.positions[v]))
-            .collect::<Vec<_>>()
+        of.map(|v| fine.positions[v].distance(subject.mesh.positions[v])).collect::<Vec<_>>()
     };
     Ok(Finding::reproduced(vec![
         Evidence::equal(
@@ -447,11 +431,7 @@ fn chosen_vertices(_: &Lab) -> Result<Finding> {
             largest(moved(true)),
             0.0,
         ),
-        Evidence::above(
-            "smallest move of a vertex with α = 0",
-            smallest(moved(false)),
-            1e-3,
-        ),
+        Evidence::above("smallest move of a vertex with α = 0", smallest(moved(false)), 1e-3),
     ]))
 }
 
@@ -461,45 +441,26 @@ fn condition(_: &Lab) -> Result<Finding> {
     let grid: Vec<f64> = (0..=200).map(|k| k as f64 / 100.0).collect();
     let over = condition_over_alpha(&valences, &grid)?;
     let broken = |c: &&limitlab::analysis::splitting::Condition| !c.holds;
-    let below = over
-        .iter()
-        .filter(|c| c.valence > 3 && c.alpha <= 1.5)
-        .filter(broken)
-        .count();
+    let below = over.iter().filter(|c| c.valence > 3 && c.alpha <= 1.5).filter(broken).count();
     let mut finding = Finding::refuted(vec![
         Evidence::below(
             "largest |λ_1| − |λ_3| at α = 2 over valences 3 to 12",
             largest(at_2.iter().map(|c| c.margin)),
             0.0,
         ),
-        Evidence::equal(
-            "failures at valences 4 to 12 and α ≤ 1.5, steps of 0.01",
-            below,
-            0.0,
-        ),
-        Evidence::shown(
-            "points of 2010 at which the condition fails",
-            over.iter().filter(broken).count(),
-        ),
+        Evidence::equal("failures at valences 4 to 12 and α ≤ 1.5, steps of 0.01", below, 0.0),
+        Evidence::shown("points of 2010 at which the condition fails", over.iter().filter(broken).count()),
         Evidence::above(
             "points with n > 3 at which |λ_3| = |λ_4| fails",
-            over.iter()
-                .filter(|c| c.valence > 3 && !c.third_equals_fourth)
-                .count(),
+            over.iter().filter(|c| c.valence > 3 && !c.third_equals_fourth).count(),
             0.0,
         ),
     ]);
     for n in valences {
         // Where the condition ceases to hold; the last place if there are several.
-        let end = crossings(n)?
-            .into_iter()
-            .filter(|c| !c.holds_above)
-            .map(|c| c.alpha)
-            .next_back();
-        finding = finding.also([Evidence::shown(
-            format!("α at which it ceases to hold at valence {n}"),
-            end.unwrap_or(f64::NAN),
-        )]);
+        let end = crossings(n)?.into_iter().filter(|c| !c.holds_above).map(|c| c.alpha).next_back();
+        finding = finding
+            .also([Evidence::shown(format!("α at which it ceases to hold at valence {n}"), end.unwrap_or(f64::NAN))]);
     }
     Ok(finding.remark(
         "What overtakes λ_1 is rotation-invariant: a simple eigenvalue from valence 4 on, a complex pair at valence 3. The blend needs three rings, 1 + 6n vertices.",
@@ -533,10 +494,7 @@ fn maps(_: &Lab) -> Result<Finding> {
         ));
     }
     for alpha in [1.0, 1.5] {
-        evidence.push(Evidence::shown(
-            format!("the same at α = {alpha}"),
-            failing(alpha)?,
-        ));
+        evidence.push(Evidence::shown(format!("the same at α = {alpha}"), failing(alpha)?));
     }
     Ok(Finding::reproduced(evidence).remark(
         "Checked by the signs of all corner angles of the refined nets and the winding of their outer ring. \
@@ -562,10 +520,7 @@ fn explicit_mask(_: &Lab) -> Result<Finding> {
     let mut listed = 0.0f64;
     let lists: [(usize, &[f64]); 2] = [
         (3, &[8.0 / 9.0, 4.0 / 27.0, 4.0 / 27.0, -5.0 / 27.0]),
-        (
-            4,
-            &[7.0 / 9.0, 2.0 / 9.0, 2.0 / 9.0, -1.0 / 9.0, -1.0 / 9.0],
-        ),
+        (4, &[7.0 / 9.0, 2.0 / 9.0, 2.0 / 9.0, -1.0 / 9.0, -1.0 / 9.0]),
     ];
     for (n, list) in lists {
         let (center, ring) = labsik_greiner::extraordinary_mask(n);
@@ -579,16 +534,8 @@ fn explicit_mask(_: &Lab) -> Result<Finding> {
             listed,
             ROUNDING,
         ),
-        Evidence::at_most(
-            "largest deviation of λ_1 = λ_2 of R·S·S from μ², valences 3 to 50",
-            pair,
-            1e-9,
-        ),
-        Evidence::above(
-            "λ_1 less the largest other modulus, least over these valences",
-            margin,
-            0.0,
-        ),
+        Evidence::at_most("largest deviation of λ_1 = λ_2 of R·S·S from μ², valences 3 to 50", pair, 1e-9),
+        Evidence::above("λ_1 less the largest other modulus, least over these valences", margin, 0.0),
     ]);
     for name in ["tetrahedron", "octahedron", "icosahedron", "star:8"] {
         let mesh = exact(name)?.mesh;
@@ -602,9 +549,7 @@ fn explicit_mask(_: &Lab) -> Result<Finding> {
             finding = finding.also([
                 Evidence::shown(format!("volume over the mesh's, {name}, {scheme}"), volume),
                 Evidence::shown(
-                    format!(
-                        "largest angle between neighbouring faces after 8 steps, {name}, {scheme}"
-                    ),
+                    format!("largest angle between neighbouring faces after 8 steps, {name}, {scheme}"),
                     fold,
                 ),
             ]);
@@ -621,10 +566,7 @@ fn explicit_mask(_: &Lab) -> Result<Finding> {
 fn smooth_curves(_: &Lab) -> Result<Finding> {
     let uniform = largest((0..=20).map(|k| jump_norm(k as f64 / 20.0, 10)));
     let points = random_points(10, 3);
-    let alpha: Vec<f64> = random_points(10, 4)
-        .iter()
-        .map(|p| (p.x + 1.0) / 2.0)
-        .collect();
+    let alpha: Vec<f64> = random_points(10, 4).iter().map(|p| (p.x + 1.0) / 2.0).collect();
     let measured = jumps(&points, &alpha, 14, 1);
     Ok(Finding::reproduced(vec![
         Evidence::below("largest ‖S^10‖ of the rule of the jumps of first differences, α = 0, 0.05, … 1", uniform, 1.0),
@@ -652,7 +594,11 @@ fn range(_: &Lab) -> Result<Finding> {
     )
     .also([
         Evidence::at_most("deviation of the radius from 1 at α = −2 and 6", ends, ROUNDING),
-        Evidence::above("jump of a random polygon at level 12 over that at level 4, α = 6.2", measured[12] / measured[4], 1.0),
+        Evidence::above(
+            "jump of a random polygon at level 12 over that at level 4, α = 6.2",
+            measured[12] / measured[4],
+            1.0,
+        ),
     ])
     .remark("C¹ exactly for −2 < α < 6, as far as tried."))
 }

@@ -34,17 +34,10 @@ use crate::context::{Context, Item};
 use finding::{Evidence, Finding, Value, Verdict};
 use lab::Lab;
 
-pub const LEDGER: Item = Item {
-    id: "claims",
-    title: "The papers' claims one by one, with verdicts",
-    run: run_ledger,
-};
+pub const LEDGER: Item = Item { id: "claims", title: "The papers' claims one by one, with verdicts", run: run_ledger };
 
-pub const FINDINGS: Item = Item {
-    id: "findings",
-    title: "Findings: what the papers left open or state wrongly",
-    run: run_findings,
-};
+pub const FINDINGS: Item =
+    Item { id: "findings", title: "Findings: what the papers left open or state wrongly", run: run_findings };
 
 /// A statement of a paper.
 pub struct Claim {
@@ -68,32 +61,15 @@ pub struct Record {
 
 /// The papers by the letter of their claims.
 const PAPERS: [(char, &str); 4] = [
-    (
-        'T',
-        "Thall 2003, Fast C² Interpolating Subdivision Surfaces",
-    ),
-    (
-        'Z',
-        "Zheng & Cai 2005, Making Doo-Sabin surface interpolation always work",
-    ),
-    (
-        'P',
-        "Progressive Iterative Interpolation for Subdivision Surfaces",
-    ),
+    ('T', "Thall 2003, Fast C² Interpolating Subdivision Surfaces"),
+    ('Z', "Zheng & Cai 2005, Making Doo-Sabin surface interpolation always work"),
+    ('P', "Progressive Iterative Interpolation for Subdivision Surfaces"),
     ('L', "Lin & Luo, A Unified √3 Subdivision Scheme"),
 ];
 
 /// All claims in the order of the ledger.
 pub fn all() -> impl Iterator<Item = &'static Claim> {
-    [
-        thall::CLAIMS,
-        thall_masks::CLAIMS,
-        zheng_cai::CLAIMS,
-        pia::CLAIMS,
-        lin_luo::CLAIMS,
-    ]
-    .into_iter()
-    .flatten()
+    [thall::CLAIMS, thall_masks::CLAIMS, zheng_cai::CLAIMS, pia::CLAIMS, lin_luo::CLAIMS].into_iter().flatten()
 }
 
 pub fn find(id: &str) -> Option<&'static Claim> {
@@ -116,9 +92,7 @@ fn run_ledger(context: &mut Context) -> Result<()> {
     let records = compute(context, all().filter(|c| !(quick && c.slow)))?;
     let table = table(&records);
     let folder = context.folder();
-    let write = |name: &str, text: &str| {
-        write_file(&folder.join(name), |out| out.write_all(text.as_bytes()))
-    };
+    let write = |name: &str, text: &str| write_file(&folder.join(name), |out| out.write_all(text.as_bytes()));
     let page = page(context, &records);
     write("claims.md", &page)?;
     write("claims.csv", &table.to_csv())?;
@@ -138,9 +112,7 @@ fn run_findings(context: &mut Context) -> Result<()> {
         context.ledger = compute(context, all())?;
     }
     let page = findings::page(&context.note_on_meshes(), &context.ledger)?;
-    write_file(&context.folder().join("findings.md"), |out| {
-        out.write_all(page.as_bytes())
-    })?;
+    write_file(&context.folder().join("findings.md"), |out| out.write_all(page.as_bytes()))?;
     cli::print(&page)
 }
 
@@ -148,8 +120,7 @@ fn compute(context: &Context, claims: impl Iterator<Item = &'static Claim>) -> R
     let lab = Lab::new(context);
     claims
         .map(|claim| {
-            let finding = (claim.check)(&lab)
-                .map_err(|e| Error::Computation(format!("claim {}: {e}", claim.id)))?;
+            let finding = (claim.check)(&lab).map_err(|e| Error::Computation(format!("claim {}: {e}", claim.id)))?;
             Ok(Record { claim, finding })
         })
         .collect()
@@ -251,9 +222,7 @@ fn counts(records: &[Record]) -> String {
     for record in records {
         *counts.entry(record.finding.verdict().name()).or_default() += 1;
     }
-    let parts = Verdict::ALL
-        .iter()
-        .filter_map(|v| counts.get(v.name()).map(|n| format!("{n} {}", v.name())));
+    let parts = Verdict::ALL.iter().filter_map(|v| counts.get(v.name()).map(|n| format!("{n} {}", v.name())));
     parts.collect::<Vec<_>>().join(", ")
 }
 
@@ -280,10 +249,7 @@ fn page(context: &Context, records: &[Record]) -> String {
     }
     for (_, name) in PAPERS {
         let own = || records.iter().filter(move |r| paper(r.claim) == name);
-        let _ = write!(
-            page,
-            "\n## {name}\n\n| ID | claim | verdict |\n| --- | --- | --- |\n"
-        );
+        let _ = write!(page, "\n## {name}\n\n| ID | claim | verdict |\n| --- | --- | --- |\n");
         for Record { claim, finding } in own() {
             let verdict = finding.verdict().name();
             let _ = writeln!(page, "| {} | {} | {verdict} |", claim.id, claim.title);
@@ -308,26 +274,13 @@ fn section(Record { claim, finding }: &Record) -> String {
     for e in &finding.evidence {
         let _ = write!(text, "- {}: {}", e.quantity, shown(e.value));
         if let Some((relation, threshold)) = e.test {
-            let missed = if e.holds() == Some(false) {
-                "; it is not"
-            } else {
-                ""
-            };
-            let _ = write!(
-                text,
-                " (to be {} {}{missed})",
-                relation.sign(),
-                shown(threshold.into())
-            );
+            let missed = if e.holds() == Some(false) { "; it is not" } else { "" };
+            let _ = write!(text, " (to be {} {}{missed})", relation.sign(), shown(threshold.into()));
         }
         text.push('\n');
     }
     if !finding.remark.is_empty() {
-        let gap = if finding.evidence.is_empty() {
-            ""
-        } else {
-            "\n"
-        };
+        let gap = if finding.evidence.is_empty() { "" } else { "\n" };
         let _ = writeln!(text, "{gap}{}", finding.remark);
     }
     text

@@ -15,8 +15,7 @@ use limitlab::subdivide::Refinement;
 
 use super::finding::{Evidence, Finding};
 use super::lab::{
-    Lab, each, ends, entries_per_vertex, exact, largest, limit_by_powers, random_points, smallest,
-    solve_random,
+    Lab, each, ends, entries_per_vertex, exact, largest, limit_by_powers, random_points, smallest, solve_random,
 };
 use super::{Claim, pia_catmull_clark};
 
@@ -129,10 +128,7 @@ const AGREEMENT: f64 = 2e-5;
 
 /// |measured/printed − 1|, the larger of both errors.
 fn departure(errors: limitlab::solvers::Errors, printed: (f64, f64)) -> f64 {
-    largest([
-        (errors.max / printed.0 - 1.0).abs(),
-        (errors.mean / printed.1 - 1.0).abs(),
-    ])
+    largest([(errors.max / printed.0 - 1.0).abs(), (errors.mean / printed.1 - 1.0).abs()])
 }
 
 fn table_1(lab: &Lab) -> Result<Finding> {
@@ -142,45 +138,16 @@ fn table_1(lab: &Lab) -> Result<Finding> {
         ));
     }
     let lines = [
-        (
-            "Horse",
-            "closed/psb_m104_horse_233v.off",
-            12,
-            (0.000912016, 0.00022811),
-        ),
-        (
-            "Bird",
-            "closed/psb_m32_bird_1129v.off",
-            9,
-            (0.000766811, 8.8345e-5),
-        ),
-        (
-            "Hand",
-            "closed/psb_m329_hand_6191v.off",
-            3,
-            (0.000914111, 0.000164207),
-        ),
-        (
-            "Boy",
-            "open/psb_m149_boy_17342v_raw.off",
-            6,
-            (0.000913795, 9.5615e-5),
-        ),
+        ("Horse", "closed/psb_m104_horse_233v.off", 12, (0.000912016, 0.00022811)),
+        ("Bird", "closed/psb_m32_bird_1129v.off", 9, (0.000766811, 8.8345e-5)),
+        ("Hand", "closed/psb_m329_hand_6191v.off", 3, (0.000914111, 0.000164207)),
+        ("Boy", "open/psb_m149_boy_17342v_raw.off", 6, (0.000913795, 9.5615e-5)),
     ];
     let mut evidence = Vec::new();
     for (name, file, printed, errors) in lines {
         let subject = lab.context.model(file, Boundary::AsInterior)?;
-        let run = passes(
-            &subject.system(Scheme::Loop)?,
-            &subject.mesh.positions,
-            TOLERANCE,
-            1000,
-        );
-        evidence.push(Evidence::equal(
-            format!("{name}: passes of the loop"),
-            run.passes,
-            printed as f64,
-        ));
+        let run = passes(&subject.system(Scheme::Loop)?, &subject.mesh.positions, TOLERANCE, 1000);
+        evidence.push(Evidence::equal(format!("{name}: passes of the loop"), run.passes, printed as f64));
         evidence.push(Evidence::at_most(
             format!("{name}: relative departure of the printed errors"),
             departure(run.errors, errors),
@@ -200,9 +167,7 @@ fn mushroom(lab: &Lab) -> Result<Finding> {
         ));
     }
     let printed = (0.000813821, 0.000235506);
-    let subject = lab
-        .context
-        .model("closed/geomview_mushroom_226v.off", Boundary::Refuse)?;
+    let subject = lab.context.model("closed/geomview_mushroom_226v.off", Boundary::Refuse)?;
     let system = subject.system(Scheme::CatmullClark)?;
     let points = &subject.mesh.positions;
     let surface = passes(&system, points, TOLERANCE, 1000);
@@ -235,11 +200,7 @@ fn loop_limit(_: &Lab) -> Result<Finding> {
         let c = 0.375 + 0.25 * (std::f64::consts::TAU / n as f64).cos();
         let beta = 3.0 / (11.0 - 8.0 * (0.375 + c * c));
         for (i, w) in mask.iter().enumerate() {
-            let printed = if i == 0 {
-                beta
-            } else {
-                (1.0 - beta) / n as f64
-            };
+            let printed = if i == 0 { beta } else { (1.0 - beta) / n as f64 };
             worst = largest([worst, (w - printed).abs()]);
         }
     }
@@ -260,23 +221,12 @@ fn properties(lab: &Lab) -> Result<Finding> {
     }
     let rows = each(lab.triangles(), |subject| {
         let system = subject.system(Scheme::Loop)?;
-        let mut row = Row {
-            sum: 0.0,
-            least: f64::INFINITY,
-            misses: 0,
-            spread: 0.0,
-            asymmetry: 0.0,
-        };
+        let mut row = Row { sum: 0.0, least: f64::INFINITY, misses: 0, spread: 0.0, asymmetry: 0.0 };
         for i in 0..system.len() {
             let entries: Vec<(usize, f64)> = system.a.row(i).collect();
-            row.sum = largest([
-                row.sum,
-                (entries.iter().map(|e| e.1).sum::<f64>() - 1.0).abs(),
-            ]);
+            row.sum = largest([row.sum, (entries.iter().map(|e| e.1).sum::<f64>() - 1.0).abs()]);
             row.least = smallest([row.least, smallest(entries.iter().map(|e| e.1))]);
-            row.misses += entries
-                .len()
-                .abs_diff(subject.topology.incidence.face_count(i) + 1);
+            row.misses += entries.len().abs_diff(subject.topology.incidence.face_count(i) + 1);
             let others = || entries.iter().filter(|e| e.0 != i).map(|e| e.1);
             row.spread = largest([row.spread, largest(others()) - smallest(others())]);
             for (j, m) in system.m.row(i) {
@@ -295,36 +245,16 @@ fn properties(lab: &Lab) -> Result<Finding> {
             largest(rows.iter().map(|r| r.sum)),
             ROUNDING,
         ),
-        Evidence::above(
-            "smallest stored entry",
-            smallest(rows.iter().map(|r| r.least)),
-            0.0,
-        ),
-        Evidence::equal(
-            "entries more or fewer than n_i + 1",
-            rows.iter().map(|r| r.misses).sum::<usize>(),
-            0.0,
-        ),
+        Evidence::above("smallest stored entry", smallest(rows.iter().map(|r| r.least)), 0.0),
+        Evidence::equal("entries more or fewer than n_i + 1", rows.iter().map(|r| r.misses).sum::<usize>(), 0.0),
         Evidence::at_most(
             "largest difference of two entries of a row beside the diagonal",
             largest(rows.iter().map(|r| r.spread)),
             ROUNDING,
         ),
-        Evidence::equal(
-            "largest |s_ij − s_ji|",
-            largest(rows.iter().map(|r| r.asymmetry)),
-            0.0,
-        ),
-        Evidence::above(
-            "smallest nβ_n/(1−β_n) − 2n/3, n = 4…1000",
-            smallest((4..=1000).map(part)),
-            0.0,
-        ),
-        Evidence::at_most(
-            "its size at n = 3, where equality holds",
-            part(3).abs(),
-            ROUNDING,
-        ),
+        Evidence::equal("largest |s_ij − s_ji|", largest(rows.iter().map(|r| r.asymmetry)), 0.0),
+        Evidence::above("smallest nβ_n/(1−β_n) − 2n/3, n = 4…1000", smallest((4..=1000).map(part)), 0.0),
+        Evidence::at_most("its size at n = 3, where equality holds", part(3).abs(), ROUNDING),
     ]))
 }
 
@@ -332,27 +262,12 @@ fn loop_convergence(lab: &Lab) -> Result<Finding> {
     let rows = each(lab.triangles(), |subject| {
         let system = subject.system(Scheme::Loop)?;
         let ends = ends(&system)?;
-        let outcome = solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-9, 10_000)
-            .report
-            .outcome;
-        Ok((
-            ends.min,
-            ends.max,
-            ends.min - system.bounds.lambda_min,
-            outcome,
-        ))
+        let outcome = solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-9, 10_000).report.outcome;
+        Ok((ends.min, ends.max, ends.min - system.bounds.lambda_min, outcome))
     })?;
     Ok(Finding::reproduced(vec![
-        Evidence::above(
-            "smallest eigenvalue of B, random triangle meshes",
-            smallest(rows.iter().map(|r| r.0)),
-            0.0,
-        ),
-        Evidence::at_most(
-            "largest eigenvalue of B",
-            largest(rows.iter().map(|r| r.1)),
-            1.0 + ROUNDING,
-        ),
+        Evidence::above("smallest eigenvalue of B, random triangle meshes", smallest(rows.iter().map(|r| r.0)), 0.0),
+        Evidence::at_most("largest eigenvalue of B", largest(rows.iter().map(|r| r.1)), 1.0 + ROUNDING),
         Evidence::equal(
             "runs from random points that did not converge to 10⁻⁹",
             rows.iter().filter(|r| r.3 != Outcome::Converged).count(),
@@ -395,12 +310,7 @@ fn algorithm(_: &Lab) -> Result<Finding> {
         }
     }
     let error = |points: Vec<DVec3>| -> Result<f64> {
-        Ok(largest(
-            given
-                .iter()
-                .zip(limits(points)?)
-                .map(|(p, q)| p.distance(q)),
-        ))
+        Ok(largest(given.iter().zip(limits(points)?).map(|(p, q)| p.distance(q))))
     };
     Ok(Finding::corrected(
         "maximum error after 100 passes with e = V − V^k (print), e = V − V_∞^k (right), irregular-tri:233",
@@ -409,7 +319,11 @@ fn algorithm(_: &Lab) -> Result<Finding> {
         TOLERANCE,
     )
     .also([
-        Evidence::equal("passes of 100 in which the loop goes on without a reset of CurrentMaxError", passes_never, PASSES as f64),
+        Evidence::equal(
+            "passes of 100 in which the loop goes on without a reset of CurrentMaxError",
+            passes_never,
+            PASSES as f64,
+        ),
         Evidence::below("the same with a reset in every pass", passes_reset, PASSES as f64),
     ])
     .remark("The algorithm box has the right e; CurrentMaxError has to start from 0 in every pass."))
@@ -433,9 +347,7 @@ fn points_of_growing_error(system: &LimitSystem, valence_3: usize) -> Vec<DVec3>
         }
     }
     let even = -near / far;
-    let mut term: Vec<DVec3> = (error.iter())
-        .map(|&e| DVec3::X * if e.is_nan() { even } else { e })
-        .collect();
+    let mut term: Vec<DVec3> = (error.iter()).map(|&e| DVec3::X * if e.is_nan() { even } else { e }).collect();
     let mut points = vec![DVec3::ZERO; n];
     for _ in 0..2000 {
         points.iter_mut().zip(&term).for_each(|(p, t)| *p += *t);
@@ -448,29 +360,18 @@ fn points_of_growing_error(system: &LimitSystem, valence_3: usize) -> Vec<DVec3>
 fn growth(system: &LimitSystem, points: &[DVec3]) -> [f64; 2] {
     let mut last: Option<[f64; 2]> = None;
     let mut worst = [0.0f64; 2];
-    let stop = Stop {
-        tolerance: 1e-8,
-        max_iterations: 60,
-    };
-    run_watched(
-        system,
-        points,
-        Setup::Pia { omega: 1.0 },
-        &stop,
-        &mut |step| {
-            let energy: f64 = (0..system.len())
-                .map(|i| {
-                    (points[i] - system.a.row_times(i, step.points)).length_squared() / system.h[i]
-                })
-                .sum();
-            let now = [step.errors.max, energy.sqrt()];
-            if let Some(before) = last {
-                worst = [0, 1].map(|k| worst[k].max(now[k] / before[k]));
-            }
-            last = Some(now);
-            ControlFlow::Continue(())
-        },
-    );
+    let stop = Stop { tolerance: 1e-8, max_iterations: 60 };
+    run_watched(system, points, Setup::Pia { omega: 1.0 }, &stop, &mut |step| {
+        let energy: f64 = (0..system.len())
+            .map(|i| (points[i] - system.a.row_times(i, step.points)).length_squared() / system.h[i])
+            .sum();
+        let now = [step.errors.max, energy.sqrt()];
+        if let Some(before) = last {
+            worst = [0, 1].map(|k| worst[k].max(now[k] / before[k]));
+        }
+        last = Some(now);
+        ControlFlow::Continue(())
+    });
     worst
 }
 
@@ -486,20 +387,12 @@ fn monotone(lab: &Lab) -> Result<Finding> {
     })?;
     let energy = rows.iter().map(|r| r[1]).chain([constructed[1]]);
     Ok(Finding::refuted(vec![
-        Evidence::above(
-            "largest max e^{k+1} over max e^k under Loop, star:3, points made for it",
-            constructed[0],
-            1.0,
-        ),
+        Evidence::above("largest max e^{k+1} over max e^k under Loop, star:3, points made for it", constructed[0], 1.0),
         Evidence::shown(
             "the same on 100 random triangle meshes with random points",
             largest(rows.iter().map(|r| r[0])),
         ),
-        Evidence::below(
-            "largest ratio of ‖H^-½ e‖₂ at successive steps on all of them",
-            largest(energy),
-            1.0,
-        ),
+        Evidence::below("largest ratio of ‖H^-½ e‖₂ at successive steps on all of them", largest(energy), 1.0),
     ])
     .remark(
         "I − B is symmetric in the norm ‖H^-½·‖₂ with eigenvalues in [0, 1), so there every error shrinks. In the \
@@ -514,17 +407,12 @@ fn linear_time(_: &Lab) -> Result<Finding> {
     for level in LEVELS {
         let system = exact(&format!("icosphere:{level}"))?.system(Scheme::Loop)?;
         entries.push(entries_per_vertex(&system));
-        counts.push(
-            solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-6, 1000)
-                .report
-                .iterations,
-        );
+        counts.push(solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-6, 1000).report.iterations);
     }
     let spread = |v: &[f64]| largest(v.iter().copied()) / smallest(v.iter().copied());
     let iterations: Vec<f64> = counts.iter().map(|&n| n as f64).collect();
-    let levels = LEVELS
-        .zip(&counts)
-        .map(|(level, &count)| Evidence::shown(format!("iterations, icosphere:{level}"), count));
+    let levels =
+        LEVELS.zip(&counts).map(|(level, &count)| Evidence::shown(format!("iterations, icosphere:{level}"), count));
     Ok(Finding::reproduced(vec![
         Evidence::at_most(
             "entries of B a vertex, largest over smallest, icosphere:2 … 6 (162 to 40 962 vertices)",

@@ -46,11 +46,7 @@ pub fn catmull_clark_matrix(_: &Lab) -> Result<Finding> {
         }
     }
     Ok(Finding::reproduced(vec![
-        Evidence::at_most(
-            "largest deviation of an entry of M, three quad meshes",
-            weights,
-            ROUNDING,
-        ),
+        Evidence::at_most("largest deviation of an entry of M, three quad meshes", weights, ROUNDING),
         Evidence::equal("largest |m_ij − m_ji|", asymmetry, 0.0),
         Evidence::at_most("largest deviation of ‖C‖_∞ from 1", norm, ROUNDING),
     ]))
@@ -82,8 +78,7 @@ pub fn when_singular(lab: &Lab) -> Result<Finding> {
         let kernel = all.iter().filter(|l| l.abs() < ZERO).count();
         Ok((
             kernel,
-            Singularity::detect(&subject.mesh, &subject.topology, Scheme::CatmullClark)
-                .kernel_dimension(),
+            Singularity::detect(&subject.mesh, &subject.topology, Scheme::CatmullClark).kernel_dimension(),
             all[0],
         ))
     };
@@ -92,12 +87,7 @@ pub fn when_singular(lab: &Lab) -> Result<Finding> {
         rows.push(judge(&exact(name)?)?);
     }
     let cube = exact("cube")?;
-    let run = solve_random(
-        &cube.system(Scheme::CatmullClark)?,
-        Setup::Pia { omega: 1.0 },
-        1e-6,
-        10_000,
-    );
+    let run = solve_random(&cube.system(Scheme::CatmullClark)?, Setup::Pia { omega: 1.0 }, 1e-6, 10_000);
     Ok(Finding::settled(vec![
         Evidence::equal(
             "meshes whose kernel is not of the dimension that theory says",
@@ -106,7 +96,11 @@ pub fn when_singular(lab: &Lab) -> Result<Finding> {
         ),
         Evidence::above("singular meshes among them", rows.iter().filter(|r| r.0 > 0).count(), 0.0),
         Evidence::at_least("smallest eigenvalue of C", smallest(rows.iter().map(|r| r.2)), -ZERO),
-        Evidence::above("maximum error of PIA on the cube after 10 000 steps or stagnation, random points", run.report.last().max, 1e-6),
+        Evidence::above(
+            "maximum error of PIA on the cube after 10 000 steps or stagnation, random points",
+            run.report.last().max,
+            1e-6,
+        ),
         Evidence::shown("meshes", rows.len()),
     ])
     .remark(
@@ -118,21 +112,11 @@ pub fn when_singular(lab: &Lab) -> Result<Finding> {
 
 pub fn quadratic_form(_: &Lab) -> Result<Finding> {
     let (mut printed, mut right) = (0.0f64, 0.0f64);
-    for (name, seed) in [
-        ("cube", 1),
-        ("torus:5x7", 2),
-        ("quad-sphere:2", 3),
-        ("irregular-quad:200", 4),
-    ] {
+    for (name, seed) in [("cube", 1), ("torus:5x7", 2), ("quad-sphere:2", 3), ("irregular-quad:200", 4)] {
         let subject = exact(name)?;
         let system = subject.system(Scheme::CatmullClark)?;
-        let x: Vec<f64> = random_points(system.len(), seed)
-            .iter()
-            .map(|p| p.x)
-            .collect();
-        let form: f64 = (0..system.len())
-            .map(|i| x[i] * system.m.row_times_scalar(i, &x))
-            .sum();
+        let x: Vec<f64> = random_points(system.len(), seed).iter().map(|p| p.x).collect();
+        let form: f64 = (0..system.len()).map(|i| x[i] * system.m.row_times_scalar(i, &x)).sum();
         let (mut sums, mut squares, mut own) = (0.0, 0.0, 0.0);
         for face in subject.mesh.faces.iter() {
             let sum: f64 = face.iter().map(|&v| x[v as usize]).sum();
@@ -166,16 +150,10 @@ pub fn arbitrary_meshes(lab: &Lab) -> Result<Finding> {
         let system = subject.system(Scheme::CatmullClark)?;
         let ends = ends(&system)?;
         let fast = ends.min > 1e-3;
-        let outcome = fast.then(|| {
-            solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-6, 60_000)
-                .report
-                .outcome
-        });
+        let outcome = fast.then(|| solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-6, 60_000).report.outcome);
         // The form of P8 for faces of any size, on a random vector.
         let x: Vec<f64> = random_points(system.len(), 5).iter().map(|p| p.x).collect();
-        let form: f64 = (0..system.len())
-            .map(|i| x[i] * system.m.row_times_scalar(i, &x))
-            .sum();
+        let form: f64 = (0..system.len()).map(|i| x[i] * system.m.row_times_scalar(i, &x)).sum();
         let mut squares = 0.0;
         for face in subject.mesh.faces.iter() {
             let sum: f64 = face.iter().map(|&v| x[v as usize]).sum();
@@ -216,7 +194,5 @@ pub fn arbitrary_meshes(lab: &Lab) -> Result<Finding> {
         ),
         Evidence::shown("runs", ran.count()),
     ])
-    .remark(
-        "The same sum of squares with weight 4/|F| covers faces of any size: convergence as in P7.",
-    ))
+    .remark("The same sum of squares with weight 4/|F| covers faces of any size: convergence as in P7."))
 }

@@ -5,10 +5,8 @@ const IDS: [(char, usize); 4] = [('T', 31), ('Z', 25), ('P', 12), ('L', 13)];
 
 #[test]
 fn every_statement_is_in_the_ledger_once_and_in_order() {
-    let wanted: Vec<String> = IDS
-        .iter()
-        .flat_map(|&(letter, count)| (1..=count).map(move |k| format!("{letter}{k}")))
-        .collect();
+    let wanted: Vec<String> =
+        IDS.iter().flat_map(|&(letter, count)| (1..=count).map(move |k| format!("{letter}{k}"))).collect();
     let found: Vec<&str> = all().map(|c| c.id).collect();
     assert_eq!(found, wanted);
     assert!(all().all(|c| !c.title.is_empty() && !c.place.is_empty() && c.printed.ends_with('.')));
@@ -18,10 +16,7 @@ fn every_statement_is_in_the_ledger_once_and_in_order() {
 }
 
 fn record(finding: Finding) -> Record {
-    Record {
-        claim: find("T1").unwrap(),
-        finding,
-    }
+    Record { claim: find("T1").unwrap(), finding }
 }
 
 #[test]
@@ -29,10 +24,7 @@ fn a_claim_without_numbers_still_has_its_row() {
     let records = [record(Finding::not_reproducible("no model"))];
     let csv = table(&records).to_csv();
     let row = csv.lines().nth(1).unwrap();
-    assert!(
-        row.starts_with("T1,,") && row.ends_with("not reproducible,no model"),
-        "{row}"
-    );
+    assert!(row.starts_with("T1,,") && row.ends_with("not reproducible,no model"), "{row}");
     assert!(section(&records[0]).contains("not reproducible"));
     assert_eq!(json(&records)[0]["verdict"], "not reproducible");
     assert_eq!(counts(&records), "1 not reproducible");
@@ -50,15 +42,7 @@ fn a_number_on_the_wrong_side_is_told_everywhere() {
     assert_eq!(json(&records)[0]["evidence"][0]["holds"], false);
     let csv = table(&records).to_csv();
     let rows: Vec<&str> = csv.lines().skip(1).collect();
-    assert!(
-        rows[0].contains(",0.25,,,≤,1e-12,no,not confirmed,"),
-        "{}",
-        rows[0]
-    );
-    assert!(
-        rows[1].contains(",,0,,=,0,yes,not confirmed,"),
-        "{}",
-        rows[1]
-    );
+    assert!(rows[0].contains(",0.25,,,≤,1e-12,no,not confirmed,"), "{}", rows[0]);
+    assert!(rows[1].contains(",,0,,=,0,yes,not confirmed,"), "{}", rows[1]);
     assert!(rows[2].contains(",,,0.5,,,,not confirmed,"), "{}", rows[2]);
 }

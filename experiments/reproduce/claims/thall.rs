@@ -16,8 +16,8 @@ use limitlab::subdivide::{Refinement, catmull_clark};
 
 use super::finding::{Evidence, Finding};
 use super::lab::{
-    Lab, distance, each, ends, entries_per_vertex, exact, excess, history, iterates, iterations,
-    largest, limit_by_powers, median, quad_star, random_points, smallest, solve_random, subject,
+    Lab, distance, each, ends, entries_per_vertex, exact, excess, history, iterates, iterations, largest,
+    limit_by_powers, median, quad_star, random_points, smallest, solve_random, subject,
 };
 use super::{Claim, thall_surfaces};
 use crate::context::Subject;
@@ -198,19 +198,13 @@ fn limit_mask(_: &Lab) -> Result<Finding> {
     for n in 3..=20 {
         let mut star = quad_star(n);
         star.positions = random_points(star.len(), n as u64);
-        let limits = |mesh: &Mesh| {
-            catmull_clark::limit_positions(mesh, &Topology::new(&mesh.faces, mesh.len()))
-        };
+        let limits = |mesh: &Mesh| catmull_clark::limit_positions(mesh, &Topology::new(&mesh.faces, mesh.len()));
         let before = limits(&star)?;
         let after = limits(&Refinement::CatmullClark.refine_n(&star, 3)?)?;
         kept = largest([kept, distance(&before, &after[..before.len()])]);
     }
     Ok(Finding::reproduced(vec![
-        Evidence::at_most(
-            "largest deviation from the first row of S^64, n = 3…50",
-            powers,
-            ROUNDING,
-        ),
+        Evidence::at_most("largest deviation from the first row of S^64, n = 3…50", powers, ROUNDING),
         Evidence::at_most(
             "largest move of a limit point under three subdivisions, random stars n = 3…20",
             kept,
@@ -251,10 +245,7 @@ fn inverse_mask(_: &Lab) -> Result<Finding> {
 /// The first `count` iterates by local masks.
 fn local_iterates(subject: &Subject, inverse: Inverse, count: usize) -> Vec<Vec<DVec3>> {
     let mut method = LocalIteration::new(&subject.mesh, &subject.topology, inverse);
-    let stop = Stop {
-        tolerance: 0.0,
-        max_iterations: count,
-    };
+    let stop = Stop { tolerance: 0.0, max_iterations: count };
     let mut found = Vec::new();
     solve(&mut method, &stop, &mut |step| {
         if step.iteration > 0 {
@@ -336,7 +327,11 @@ fn best_omega(lab: &Lab) -> Result<Finding> {
     let omegas = || rows.iter().map(|r| r.0);
     let costs = || rows.iter().map(|r| r.1);
     Ok(Finding::settled(vec![
-        Evidence::at_most("median of iterations at ω = ½ over those at the best ω, to 10⁻⁶ L", median(costs().collect()), 2.0),
+        Evidence::at_most(
+            "median of iterations at ω = ½ over those at the best ω, to 10⁻⁶ L",
+            median(costs().collect()),
+            2.0,
+        ),
         Evidence::shown("the largest such ratio", largest(costs())),
         Evidence::at_least("smallest best ω = 2/(λ_min + λ_max) of D⁻¹A", smallest(omegas()), 0.5),
         Evidence::shown("median best ω", median(omegas().collect())),
@@ -360,11 +355,8 @@ fn convergence(lab: &Lab) -> Result<Finding> {
         let system = subject.system(CC)?;
         let ends = ends(&system)?;
         // Slower ones need more iterations than are of use here.
-        let outcome = (ends.jacobi_min > 1e-3).then(|| {
-            solve_random(&system, Setup::THALL, 1e-6, 60_000)
-                .report
-                .outcome
-        });
+        let outcome =
+            (ends.jacobi_min > 1e-3).then(|| solve_random(&system, Setup::THALL, 1e-6, 60_000).report.outcome);
         Ok(Row {
             inverse: largest(system.diagonal.iter().map(|a| 1.0 / a)),
             jacobi_max: ends.jacobi_max,
@@ -407,34 +399,18 @@ fn dominance(lab: &Lab) -> Result<Finding> {
         right,
         ROUNDING,
     );
-    let classes = [
-        ("3", 3..=3),
-        ("4", 4..=4),
-        ("5", 5..=5),
-        ("6 and more", 6..=usize::MAX),
-    ];
+    let classes = [("3", 3..=3), ("4", 4..=4), ("5", 5..=5), ("6 and more", 6..=usize::MAX)];
     for (name, class) in classes {
         let counts = each(lab.subjects()?, |subject| {
             let system = subject.system(CC)?;
             let of_class = |i: &usize| class.contains(&subject.topology.incidence.face_count(*i));
             let rows: Vec<usize> = (0..system.len()).filter(of_class).collect();
-            let dominant = rows
-                .iter()
-                .filter(|&&i| excess(&system, i) > ROUNDING)
-                .count();
+            let dominant = rows.iter().filter(|&&i| excess(&system, i) > ROUNDING).count();
             Ok((dominant, rows.len()))
         })?;
-        let [dominant, rows] = [0, 1].map(|k| {
-            counts
-                .iter()
-                .map(|c| if k == 0 { c.0 } else { c.1 })
-                .sum::<usize>()
-        });
+        let [dominant, rows] = [0, 1].map(|k| counts.iter().map(|c| if k == 0 { c.0 } else { c.1 }).sum::<usize>());
         finding = finding.also([
-            Evidence::shown(
-                format!("strictly dominant rows of valence {name} on the meshes"),
-                dominant,
-            ),
+            Evidence::shown(format!("strictly dominant rows of valence {name} on the meshes"), dominant),
             Evidence::shown(format!("rows of valence {name}"), rows),
         ]);
     }
@@ -473,9 +449,7 @@ fn masks_in_numbers(_: &Lab) -> Result<Finding> {
     let deviation = |n: usize, vertex: f64, edge: f64, face: f64| -> Result<f64> {
         let mask = limit_by_powers(LocalScheme::CatmullClark, n)?;
         let printed = |i: usize| [vertex, edge, face][if i == 0 { 0 } else { 1 + (i - 1) / n }];
-        Ok(largest(
-            mask.iter().enumerate().map(|(i, w)| (w - printed(i)).abs()),
-        ))
+        Ok(largest(mask.iter().enumerate().map(|(i, w)| (w - printed(i)).abs())))
     };
     // An inverse c [limit − a Σe − b Σf] is right if the limit of what it returns is the one asked for.
     let inverse = |n: usize, c: f64, a: f64, b: f64| -> Result<f64> {
@@ -491,53 +465,27 @@ fn masks_in_numbers(_: &Lab) -> Result<Finding> {
         ROUNDING,
     )
     .also([
-        Evidence::at_most(
-            "Eq. 6, largest deviation",
-            deviation(4, 4.0 / 9.0, 1.0 / 9.0, 1.0 / 36.0)?,
-            ROUNDING,
-        ),
-        Evidence::at_most(
-            "Eq. 7, the same as Eq. 9",
-            inverse(4, 9.0 / 4.0, 1.0 / 9.0, 1.0 / 36.0)?,
-            ROUNDING,
-        ),
-        Evidence::at_most(
-            "Eq. 8, largest deviation",
-            deviation(3, 3.0 / 8.0, 1.0 / 6.0, 1.0 / 24.0)?,
-            ROUNDING,
-        ),
+        Evidence::at_most("Eq. 6, largest deviation", deviation(4, 4.0 / 9.0, 1.0 / 9.0, 1.0 / 36.0)?, ROUNDING),
+        Evidence::at_most("Eq. 7, the same as Eq. 9", inverse(4, 9.0 / 4.0, 1.0 / 9.0, 1.0 / 36.0)?, ROUNDING),
+        Evidence::at_most("Eq. 8, largest deviation", deviation(3, 3.0 / 8.0, 1.0 / 6.0, 1.0 / 24.0)?, ROUNDING),
     ])
     .remark("In Eq. 9 the neighbours weigh 1/6 and 1/24, as in Eq. 11."))
 }
 
 fn first_iterations(lab: &Lab) -> Result<Finding> {
-    let runs = each(lab.subjects()?, |subject| {
-        Ok(history(&subject.system(CC)?, subject, Setup::THALL, 3))
-    })?;
-    let after = |k: usize| {
-        runs.iter()
-            .map(move |r| r.get(k).copied().unwrap_or(f64::NAN))
-    };
+    let runs = each(lab.subjects()?, |subject| Ok(history(&subject.system(CC)?, subject, Setup::THALL, 3)))?;
+    let after = |k: usize| runs.iter().map(move |r| r.get(k).copied().unwrap_or(f64::NAN));
     // How much of the error an iteration leaves, at worst.
     let left = |k: usize| largest(after(k).zip(after(k - 1)).map(|(now, before)| now / before));
     let mut evidence: Vec<Evidence> = (1..=3)
         .map(|k| {
-            Evidence::below(
-                format!("largest error after iteration {k} over the one before, worst mesh"),
-                left(k),
-                1.0,
-            )
+            Evidence::below(format!("largest error after iteration {k} over the one before, worst mesh"), left(k), 1.0)
         })
         .collect();
     for k in 0..=3 {
-        evidence.push(Evidence::shown(
-            format!("largest error over L after {k}, median mesh"),
-            median(after(k).collect()),
-        ));
-        evidence.push(Evidence::shown(
-            format!("largest error over L after {k}, worst mesh"),
-            largest(after(k)),
-        ));
+        evidence
+            .push(Evidence::shown(format!("largest error over L after {k}, median mesh"), median(after(k).collect())));
+        evidence.push(Evidence::shown(format!("largest error over L after {k}, worst mesh"), largest(after(k))));
     }
     evidence.push(Evidence::shown("meshes", runs.len()));
     Ok(Finding::settled(evidence).remark(
@@ -562,15 +510,11 @@ fn linear_time(_: &Lab) -> Result<Finding> {
     }
     let spread = |v: &[f64]| largest(v.iter().copied()) / smallest(v.iter().copied());
     let iterations: Vec<f64> = counts.iter().map(|&n| n as f64).collect();
-    let levels = LEVELS
-        .zip(&counts)
-        .map(|(level, &count)| Evidence::shown(format!("iterations, quad-sphere:{level}"), count));
+    let levels =
+        LEVELS.zip(&counts).map(|(level, &count)| Evidence::shown(format!("iterations, quad-sphere:{level}"), count));
     let mut prisms = Vec::new();
     for name in ["prism:9", "prism:17"] {
-        prisms.push(Evidence::shown(
-            format!("iterations, {name}"),
-            solved(name)?.1,
-        ));
+        prisms.push(Evidence::shown(format!("iterations, {name}"), solved(name)?.1));
     }
     Ok(Finding::reproduced(vec![
         Evidence::at_most(
@@ -596,19 +540,11 @@ fn singular_meshes(_: &Lab) -> Result<Finding> {
     let mut evidence = Vec::new();
     for name in ["cube", "prism:6", "truncated-octahedron"] {
         let ends = ends(&exact(name)?.system(CC)?)?;
-        evidence.push(Evidence::at_most(
-            format!("smallest |eigenvalue| of A, {name}"),
-            ends.min.abs(),
-            1e-13,
-        ));
+        evidence.push(Evidence::at_most(format!("smallest |eigenvalue| of A, {name}"), ends.min.abs(), 1e-13));
     }
     for name in ["prism:7", "dodecahedron", "torus:4x4"] {
         let ends = ends(&exact(name)?.system(CC)?)?;
-        evidence.push(Evidence::above(
-            format!("smallest eigenvalue of A, {name}"),
-            ends.min,
-            1e-3,
-        ));
+        evidence.push(Evidence::above(format!("smallest eigenvalue of A, {name}"), ends.min, 1e-3));
     }
     Ok(Finding::refuted(evidence).remark(
         "The cube is closed and two-sided. A is singular exactly when a component has all valences 3 and a bipartite \

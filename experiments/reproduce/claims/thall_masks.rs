@@ -15,8 +15,7 @@ use limitlab::subdivide::catmull_clark::{refine, refine_in_place};
 use super::Claim;
 use super::finding::{Evidence, Finding};
 use super::lab::{
-    Lab, distance, each, ends, exact, iterates, largest, limit_by_powers, random_points, smallest,
-    solve_random,
+    Lab, distance, each, ends, exact, iterates, largest, limit_by_powers, random_points, smallest, solve_random,
 };
 
 const ROUNDING: f64 = 1e-12;
@@ -130,12 +129,8 @@ pub const CLAIMS: &[Claim] = &[
 
 /// The largest |printed − computed| of the entries chosen; NaN if there is none.
 fn deviation(tables: &ThallTables, choose: impl Fn(&Entry) -> bool) -> f64 {
-    let chosen: Vec<f64> = tables
-        .entries
-        .iter()
-        .filter(|e| choose(e))
-        .map(|e| (e.printed - e.computed).abs())
-        .collect();
+    let chosen: Vec<f64> =
+        tables.entries.iter().filter(|e| choose(e)).map(|e| (e.printed - e.computed).abs()).collect();
     if chosen.is_empty() {
         return f64::NAN;
     }
@@ -144,20 +139,11 @@ fn deviation(tables: &ThallTables, choose: impl Fn(&Entry) -> bool) -> f64 {
 
 /// The largest distance of the masks chosen from the left eigenspace of λ_2 = λ_3; NaN if there is none.
 fn membership(tables: &ThallTables, valence: usize, choose: impl Fn(&str) -> bool) -> Vec<f64> {
-    tables
-        .memberships
-        .iter()
-        .filter(|m| m.valence == valence && choose(&m.mask))
-        .map(|m| m.distance)
-        .collect()
+    tables.memberships.iter().filter(|m| m.valence == valence && choose(&m.mask)).map(|m| m.distance).collect()
 }
 
 fn or_nan(values: Vec<f64>, fold: fn(Vec<f64>) -> f64) -> f64 {
-    if values.is_empty() {
-        f64::NAN
-    } else {
-        fold(values)
-    }
+    if values.is_empty() { f64::NAN } else { fold(values) }
 }
 
 fn is_matrix(e: &Entry) -> bool {
@@ -209,11 +195,7 @@ fn matrix_of_valence_3(_: &Lab) -> Result<Finding> {
     let tables = thall_tables()?;
     let computed = SplittingMatrix::new(LocalScheme::CatmullClark, 3)?.leading_pair()?;
     let closed = (9.0 + 17f64.sqrt()) / 32.0;
-    let inward = tables
-        .orientations
-        .iter()
-        .filter(|o| o.valence == 3 && o.masks == "printed")
-        .map(|o| o.sine);
+    let inward = tables.orientations.iter().filter(|o| o.valence == 3 && o.masks == "printed").map(|o| o.sine);
     Ok(Finding::corrected(
         "deviation of λ_2 from the computed one",
         deviation(&tables, |e| e.valence == 3 && e.item.starts_with('λ')),
@@ -231,16 +213,10 @@ fn matrix_of_valence_3(_: &Lab) -> Result<Finding> {
             or_nan(membership(&tables, 3, |_| true), largest),
             ROUNDING,
         ),
-        Evidence::below(
-            "sine of m_2 × m_3 as printed, positive outward",
-            largest(inward),
-            0.0,
-        ),
+        Evidence::below("sine of m_2 × m_3 as printed, positive outward", largest(inward), 0.0),
         Evidence::shown("λ_2 computed", computed),
     ])
-    .remark(
-        "The printed decimals lack a 0: (9+√17)/32 = 0.41009705…, and the closed form is right.",
-    ))
+    .remark("The printed decimals lack a 0: (9+√17)/32 = 0.41009705…, and the closed form is right."))
 }
 
 fn subdominant(_: &Lab) -> Result<Finding> {
@@ -249,11 +225,7 @@ fn subdominant(_: &Lab) -> Result<Finding> {
         let all = SplittingMatrix::new(LocalScheme::CatmullClark, n)?.eigenvalues()?;
         let angle = std::f64::consts::TAU / n as f64;
         let a = 1.0 + angle.cos() + (angle / 2.0).cos() * (2.0 * (9.0 + angle.cos())).sqrt();
-        worst = largest([
-            worst,
-            (all[1] - (4.0 + a) / 16.0).norm(),
-            (all[2] - (4.0 + a) / 16.0).norm(),
-        ]);
+        worst = largest([worst, (all[1] - (4.0 + a) / 16.0).norm(), (all[2] - (4.0 + a) / 16.0).norm()]);
     }
     Ok(Finding::reproduced(vec![Evidence::at_most(
         "largest deviation of λ_2 and λ_3 from the formula, n = 3…50",
@@ -280,12 +252,7 @@ fn tables_2_and_3(_: &Lab) -> Result<Finding> {
     let slip = |e: &Entry| e.place == "Table II" && e.item.starts_with("c_3");
     // Column c_3 of Table II is the formula's shift the other way round: two sectors on is one back.
     let other_way = formula_mask(3, 2);
-    let printed: Vec<f64> = tables
-        .entries
-        .iter()
-        .filter(|e| slip(e))
-        .map(|e| e.printed)
-        .collect();
+    let printed: Vec<f64> = tables.entries.iter().filter(|e| slip(e)).map(|e| e.printed).collect();
     let pairs = printed.iter().zip(other_way.iter().skip(1));
     Ok(Finding::corrected(
         "largest deviation of column c_3 of Table II from 4 c_3 by the formula (print), shifted the other way (right)",
@@ -301,10 +268,7 @@ fn tables_2_and_3(_: &Lab) -> Result<Finding> {
         ),
         Evidence::at_most(
             "largest relative distance of the printed masks from the left eigenspaces",
-            or_nan(
-                [3, 4].into_iter().flat_map(|n| membership(&tables, n, |m| m.starts_with("m_"))).collect(),
-                largest,
-            ),
+            or_nan([3, 4].into_iter().flat_map(|n| membership(&tables, n, |m| m.starts_with("m_"))).collect(), largest),
             ROUNDING,
         ),
     ])
@@ -323,9 +287,7 @@ fn in_place(lab: &Lab) -> Result<Finding> {
         let x = n as f64;
         let points = random_points(2 * n + 1, n as u64);
         let (v, e, f) = (points[0], &points[1..=n], &points[n + 1..]);
-        let usual = (x - 2.0) / x * v
-            + e.iter().sum::<DVec3>() / (x * x)
-            + f.iter().sum::<DVec3>() / (x * x);
+        let usual = (x - 2.0) / x * v + e.iter().sum::<DVec3>() / (x * x) + f.iter().sum::<DVec3>() / (x * x);
         let new_edge = |j: usize| (v + e[j] + f[(j + n - 1) % n] + f[j]) / 4.0;
         let sum: DVec3 = (0..n).map(|j| 4.0 * new_edge(j) - f[(j + n - 1) % n]).sum();
         let line = |own: f64| (x - 2.0) / x * v - own * v + sum / (x * x);
@@ -354,9 +316,7 @@ fn full_step(lab: &Lab) -> Result<Finding> {
     let triangles = lab.context.stand_in("icosphere:2")?;
     let triangles_system = triangles.system(Scheme::CatmullClark)?;
     let on_triangles = ends(&triangles_system)?;
-    let ended = |system, wanted| {
-        usize::from(solve_random(system, step, 1e-9, 5000).report.outcome == wanted)
-    };
+    let ended = |system, wanted| usize::from(solve_random(system, step, 1e-9, 5000).report.outcome == wanted);
     Ok(Finding::reproduced(vec![
         Evidence::above("λ_max(D⁻¹A) − 1 on torus:12x12: part of an error by which a full step overshoots", on_quads.jacobi_max - 1.0, 0.0),
         Evidence::at_most("deviation of the critical ω on torus:12x12 from 8/9", (2.0 / on_quads.jacobi_max - 8.0 / 9.0).abs(), ROUNDING),
@@ -372,36 +332,21 @@ fn other_schemes(lab: &Lab) -> Result<Finding> {
     let mut evidence = Vec::new();
     let bounds = [4.0, 2.5, 8.0 / 3.0, 4.0, 2.0];
     for (scheme, bound) in Scheme::ALL.into_iter().zip(bounds) {
-        let subjects = if scheme.needs_triangles() {
-            lab.triangles()
-        } else {
-            lab.polygons()
-        };
+        let subjects = if scheme.needs_triangles() { lab.triangles() } else { lab.polygons() };
         let rows = each(subjects, |subject| {
             let system = subject.system(scheme)?;
             let inverse = largest(system.diagonal.iter().map(|a| 1.0 / a));
             let slow = scheme == Scheme::CatmullClark && ends(&system)?.jacobi_min < 1e-3;
-            let outcome = (!slow).then(|| {
-                solve_random(&system, Setup::THALL, 1e-6, 60_000)
-                    .report
-                    .outcome
-            });
+            let outcome = (!slow).then(|| solve_random(&system, Setup::THALL, 1e-6, 60_000).report.outcome);
             Ok((inverse, outcome))
         })?;
-        let stuck = rows
-            .iter()
-            .filter(|r| r.1.is_some_and(|o| o != Outcome::Converged))
-            .count();
+        let stuck = rows.iter().filter(|r| r.1.is_some_and(|o| o != Outcome::Converged)).count();
         evidence.push(Evidence::at_most(
             format!("largest 1/a_ii under {scheme} on random meshes"),
             largest(rows.iter().map(|r| r.0)),
             bound + ROUNDING,
         ));
-        evidence.push(Evidence::equal(
-            format!("runs at ω = ½ under {scheme} that did not converge"),
-            stuck,
-            0.0,
-        ));
+        evidence.push(Evidence::equal(format!("runs at ω = ½ under {scheme} that did not converge"), stuck, 0.0));
     }
     Ok(Finding::settled(evidence).remark(
         "λ_max(D⁻¹A) ≤ max 1/a_ii ≤ 4 for all five schemes and the matrices are non-singular (T6, P5, P7, Z4, Z12): ω = ½ \
@@ -449,10 +394,7 @@ fn not_sor(lab: &Lab) -> Result<Finding> {
     let subject = lab.context.stand_in("irregular-quad:200")?;
     let system = subject.system(Scheme::CatmullClark)?;
     let points = &subject.mesh.positions;
-    let sor = Setup::Sor {
-        omega: 0.5,
-        order: None,
-    };
+    let sor = Setup::Sor { omega: 0.5, order: None };
     let by_sor = &iterates(&system, points, sor, 1)[0];
     let jacobi = &iterates(&system, points, Setup::THALL, 1)[0];
     // Eq. 3 at every vertex by the limit mask alone, all neighbours old.
@@ -477,11 +419,9 @@ fn not_sor(lab: &Lab) -> Result<Finding> {
 }
 
 fn order_of_valences(_: &Lab) -> Result<Finding> {
-    let inverse =
-        |n: usize| -> Result<f64> { Ok(1.0 / limit_by_powers(LocalScheme::CatmullClark, n)?[0]) };
+    let inverse = |n: usize| -> Result<f64> { Ok(1.0 / limit_by_powers(LocalScheme::CatmullClark, n)?[0]) };
     let (three, four) = (inverse(3)?, inverse(4)?);
-    let deviation =
-        |first: f64, second: f64| largest([(9.0 / 4.0 - first).abs(), (8.0 / 3.0 - second).abs()]);
+    let deviation = |first: f64, second: f64| largest([(9.0 / 4.0 - first).abs(), (8.0 / 3.0 - second).abs()]);
     Ok(Finding::corrected(
         "deviation of the factors 9/4 and 8/3 from the inverse weights of the valences named",
         deviation(three, four),

@@ -6,8 +6,7 @@ use limitlab::Result;
 use limitlab::assemble::{LimitSystem, Scheme};
 use limitlab::interpolate::normals::{Rotation, rotate_rings};
 use limitlab::interpolate::thall::{
-    AttributeRule, MedialAtom, medial_shifts, normal_deviations, refine_attributes,
-    scaled_distances,
+    AttributeRule, MedialAtom, medial_shifts, normal_deviations, refine_attributes, scaled_distances,
 };
 use limitlab::mesh::{Mesh, Topology};
 use limitlab::solvers::{Setup, Stop, run};
@@ -42,31 +41,17 @@ pub fn regularisation(lab: &Lab) -> Result<Finding> {
         let normals = catmull_clark::limit_normals(mesh, topology)?;
         let normals_from_quads = catmull_clark::limit_normals(&fine, &at)?;
         let angles = normal_deviations(&normals_from_quads[..mesh.len()], &normals);
-        let defined = angles
-            .iter()
-            .zip(&normals)
-            .filter(|(_, n)| **n != DVec3::ZERO);
-        Ok((
-            distance(&limits, &from_quads[..mesh.len()]) / mesh.diagonal(),
-            largest(defined.map(|(a, _)| *a)),
-        ))
+        let defined = angles.iter().zip(&normals).filter(|(_, n)| **n != DVec3::ZERO);
+        Ok((distance(&limits, &from_quads[..mesh.len()]) / mesh.diagonal(), largest(defined.map(|(a, _)| *a))))
     })?;
     Ok(Finding::reproduced(vec![
-        Evidence::at_most(
-            "largest distance of centroids by Eq. 14, faces of 3…12 corners",
-            centroids,
-            ROUNDING,
-        ),
+        Evidence::at_most("largest distance of centroids by Eq. 14, faces of 3…12 corners", centroids, ROUNDING),
         Evidence::at_most(
             "largest distance of limit points over L, by R and by splitting first, 60 random meshes",
             largest(rows.iter().map(|r| r.0)),
             ROUNDING,
         ),
-        Evidence::at_most(
-            "largest angle of their normals",
-            largest(rows.iter().map(|r| r.1)),
-            1e-9,
-        ),
+        Evidence::at_most("largest angle of their normals", largest(rows.iter().map(|r| r.1)), 1e-9),
     ]))
 }
 
@@ -74,9 +59,7 @@ pub fn quads_after_one_split(lab: &Lab) -> Result<Finding> {
     let rows = each(&lab.polygons()[..60], |subject| {
         let extraordinary = |mesh: &Mesh| {
             let topology = Topology::new(&mesh.faces, mesh.len());
-            (0..mesh.len())
-                .filter(|&v| topology.incidence.face_count(v) != 4)
-                .count()
+            (0..mesh.len()).filter(|&v| topology.incidence.face_count(v) != 4).count()
         };
         let others = |mesh: &Mesh| mesh.faces.iter().filter(|f| f.len() != 4).count();
         let once = Refinement::CatmullClark.refine_n(&subject.mesh, 1)?;
@@ -90,11 +73,7 @@ pub fn quads_after_one_split(lab: &Lab) -> Result<Finding> {
     })?;
     let total = |k: usize| rows.iter().map(|r| r[k]).sum::<usize>();
     Ok(Finding::reproduced(vec![
-        Evidence::equal(
-            "faces that are no quads after one and two splits, 60 random meshes",
-            total(0),
-            0.0,
-        ),
+        Evidence::equal("faces that are no quads after one and two splits, 60 random meshes", total(0), 0.0),
         Evidence::equal(
             "extraordinary vertices after one split, less those before and the faces that were no quads",
             total(1),
@@ -110,10 +89,7 @@ pub fn metrics(_: &Lab) -> Result<Finding> {
     let (mesh, topology) = (&subject.mesh, &subject.topology);
     let given: Vec<DVec3> = mesh.positions.iter().map(|p| p.normalize()).collect();
     let system = subject.system(CC)?;
-    let stop = Stop {
-        tolerance: 0.0,
-        max_iterations: 100,
-    };
+    let stop = Stop { tolerance: 0.0, max_iterations: 100 };
     let control = run(&system, &mesh.positions, Setup::THALL, &stop).points;
     let control = Mesh::new(control, mesh.faces.clone());
     let limits = catmull_clark::limit_positions(&control, topology)?;
@@ -169,11 +145,7 @@ pub fn disjoint_rings(lab: &Lab) -> Result<Finding> {
     })?;
     let total = |k: usize| rows.iter().map(|r| r[k]).sum::<usize>();
     Ok(Finding::reproduced(vec![
-        Evidence::equal(
-            "vertices in several original 1-rings after two subdivisions, 60 random meshes",
-            total(1),
-            0.0,
-        ),
+        Evidence::equal("vertices in several original 1-rings after two subdivisions, 60 random meshes", total(1), 0.0),
         Evidence::above("the same after one subdivision", total(0), 0.0),
     ]))
 }
@@ -222,10 +194,7 @@ pub fn attributes(_: &Lab) -> Result<Finding> {
         Ok(distance(&now[..n], &values))
     };
     let system = LimitSystem::new(&subject.mesh, &subject.topology, CC)?;
-    let stop = Stop {
-        tolerance: 1e-10,
-        max_iterations: 1,
-    };
+    let stop = Stop { tolerance: 1e-10, max_iterations: 1 };
     let control = run(&system, &values, Setup::Cholesky, &stop).points;
     let control = Mesh::new(control, subject.mesh.faces.clone());
     let limits = catmull_clark::limit_positions(&control, &subject.topology)?;

@@ -25,10 +25,7 @@ use crate::context::Subject;
 
 const ROUNDING: f64 = 1e-12;
 
-const GAUSS_SEIDEL: Setup = Setup::Sor {
-    omega: 1.0,
-    order: None,
-};
+const GAUSS_SEIDEL: Setup = Setup::Sor { omega: 1.0, order: None };
 
 pub const CLAIMS: &[Claim] = &[
     Claim {
@@ -266,10 +263,7 @@ fn after_one_step(lab: &Lab) -> Result<Finding> {
         let (mesh, topology) = (&subject.mesh, &subject.topology);
         let others = |mesh: &Mesh| mesh.faces.iter().filter(|f| f.len() != 4).count();
         let valence = |topology: &Topology, v: usize| topology.incidence.face_count(v);
-        let expected = others(mesh)
-            + (0..mesh.len())
-                .filter(|&v| valence(topology, v) != 4)
-                .count();
+        let expected = others(mesh) + (0..mesh.len()).filter(|&v| valence(topology, v) != 4).count();
         let (mut not_four, mut changed, mut moved) = (0, 0, 0.0f64);
         let mut now = mesh.clone();
         for _ in 0..3 {
@@ -278,8 +272,7 @@ fn after_one_step(lab: &Lab) -> Result<Finding> {
             not_four += (0..fine.len()).filter(|&v| valence(&at, v) != 4).count();
             changed += others(&fine).abs_diff(expected);
             // Type-F faces come first, in the order of the old faces.
-            let step = (0..now.faces.len())
-                .map(|f| faces::centroid(&now, f).distance(faces::centroid(&fine, f)));
+            let step = (0..now.faces.len()).map(|f| faces::centroid(&now, f).distance(faces::centroid(&fine, f)));
             moved = largest([moved, largest(step) / mesh.diagonal()]);
             now = fine;
         }
@@ -310,19 +303,10 @@ fn row_sums(lab: &Lab) -> Result<Finding> {
         let incidence = &subject.topology.incidence;
         let (mut worst, mut gap) = (0.0f64, f64::INFINITY);
         for v in 0..system.len() {
-            let sizes = || {
-                incidence
-                    .corners_at(v)
-                    .iter()
-                    .map(|&c| subject.mesh.faces.range(incidence.face_of(c)).len() as f64)
-            };
+            let sizes =
+                || incidence.corners_at(v).iter().map(|&c| subject.mesh.faces.range(incidence.face_of(c)).len() as f64);
             let m = incidence.face_count(v) as f64;
-            let others: f64 = system
-                .m
-                .row(v)
-                .filter(|(j, _)| *j != v)
-                .map(|(_, z)| z)
-                .sum();
+            let others: f64 = system.m.row(v).filter(|(j, _)| *j != v).map(|(_, z)| z).sum();
             let diagonal = system.m.get(v, v);
             let printed: f64 = sizes().map(|s| 1.0 - 1.0 / s).sum();
             worst = largest([
@@ -340,11 +324,7 @@ fn row_sums(lab: &Lab) -> Result<Finding> {
             largest(rows.iter().map(|r| r.0)),
             ROUNDING,
         ),
-        Evidence::above(
-            "smallest 1 − Σ(1 − 1/m_i)/m",
-            smallest(rows.iter().map(|r| r.1)),
-            0.0,
-        ),
+        Evidence::above("smallest 1 − Σ(1 − 1/m_i)/m", smallest(rows.iter().map(|r| r.1)), 0.0),
     ]))
 }
 
@@ -355,16 +335,8 @@ fn never_singular(lab: &Lab) -> Result<Finding> {
         Ok((least, ends(&system)?.min))
     })?;
     Ok(Finding::reproduced(vec![
-        Evidence::above(
-            "smallest excess of a row of A, random meshes",
-            smallest(rows.iter().map(|r| r.0)),
-            0.0,
-        ),
-        Evidence::at_least(
-            "smallest eigenvalue of A",
-            smallest(rows.iter().map(|r| r.1)),
-            0.5 - ROUNDING,
-        ),
+        Evidence::above("smallest excess of a row of A, random meshes", smallest(rows.iter().map(|r| r.0)), 0.0),
+        Evidence::at_least("smallest eigenvalue of A", smallest(rows.iter().map(|r| r.1)), 0.5 - ROUNDING),
         Evidence::shown("meshes", rows.len()),
     ]))
 }
@@ -378,11 +350,7 @@ fn both_converge(lab: &Lab) -> Result<Finding> {
         let failed = [GAUSS_SEIDEL, Setup::Jacobi { omega: 1.0 }]
             .into_iter()
             .filter(|&s| solve_random(&system, s, 1e-9, 2000).report.outcome != Outcome::Converged);
-        Ok((
-            radius,
-            (1.0 - ends.jacobi_min).max(ends.jacobi_max - 1.0),
-            failed.count(),
-        ))
+        Ok((radius, (1.0 - ends.jacobi_min).max(ends.jacobi_max - 1.0), failed.count()))
     })?;
     let radii = |k: usize| rows.iter().map(move |r| if k == 0 { r.0 } else { r.1 });
     Ok(Finding::reproduced(vec![
@@ -391,11 +359,7 @@ fn both_converge(lab: &Lab) -> Result<Finding> {
             rows.iter().map(|r| r.2).sum::<usize>(),
             0.0,
         ),
-        Evidence::below(
-            "largest spectral radius of Gauss-Seidel in file order, random meshes",
-            largest(radii(0)),
-            1.0,
-        ),
+        Evidence::below("largest spectral radius of Gauss-Seidel in file order, random meshes", largest(radii(0)), 1.0),
         Evidence::below("largest spectral radius of Jacobi", largest(radii(1)), 1.0),
         Evidence::shown("median radius of Gauss-Seidel", median(radii(0).collect())),
         Evidence::shown("median radius of Jacobi", median(radii(1).collect())),
@@ -416,10 +380,7 @@ fn order(lab: &Lab) -> Result<Finding> {
         let subject = lab.context.stand_in(name)?;
         for scheme in Scheme::ALL.into_iter().filter(|&s| subject.suits(s)) {
             let system = subject.system(scheme)?;
-            let stop = Stop {
-                tolerance: 1e-10 * subject.mesh.diagonal(),
-                max_iterations: 10_000,
-            };
+            let stop = Stop { tolerance: 1e-10 * subject.mesh.diagonal(), max_iterations: 10_000 };
             let rows = order_study(&subject.mesh, &subject.topology, &system, &[1.0], 5, &stop)?;
             // The greedy method has no radius, and its updates are no sweeps.
             let swept = || rows.iter().filter(|r| r.rho.is_some());
@@ -432,16 +393,8 @@ fn order(lab: &Lab) -> Result<Finding> {
         }
     }
     Ok(Finding::settled(vec![
-        Evidence::above(
-            "largest ratio of sweeps between two orders of twelve",
-            largest(costs.iter().copied()),
-            1.1,
-        ),
-        Evidence::at_most(
-            "largest ratio of multicolour to the fastest order",
-            largest(coloured),
-            1.25,
-        ),
+        Evidence::above("largest ratio of sweeps between two orders of twelve", largest(costs.iter().copied()), 1.1),
+        Evidence::at_most("largest ratio of multicolour to the fastest order", largest(coloured), 1.25),
         Evidence::shown("median ratio of the slowest to the fastest", median(costs)),
         Evidence::shown("largest difference of the spectral radius", largest(spreads)),
         Evidence::shown("meshes, under all schemes that suit", MESHES.len()),
@@ -471,7 +424,11 @@ fn nasri_non_singular(lab: &Lab) -> Result<Finding> {
         Evidence::at_most("largest", largest(all(1)), 1.0 + ROUNDING),
         Evidence::at_least("smallest with every third vertex interpolated", smallest(all(2)), 0.25 - ROUNDING),
         Evidence::at_most("largest with every third vertex interpolated", largest(all(3)), 1.0 + ROUNDING),
-        Evidence::at_least("smallest on random triangle meshes", smallest(triangles.iter().map(|r| r[0])), 0.5 - ROUNDING),
+        Evidence::at_least(
+            "smallest on random triangle meshes",
+            smallest(triangles.iter().map(|r| r[0])),
+            0.5 - ROUNDING,
+        ),
         Evidence::shown("meshes", rows.len() + triangles.len()),
     ])
     .remark("Always: the eigenvalues lie in [¼, 1] on every closed mesh, in [½, 1] on triangles, for subsets too."))
@@ -480,25 +437,16 @@ fn nasri_non_singular(lab: &Lab) -> Result<Finding> {
 fn subset(lab: &Lab) -> Result<Finding> {
     let rows = each(lab.polygons(), |subject| {
         let marks: Vec<bool> = (0..subject.mesh.len()).map(|v| v % 3 == 0).collect();
-        let constraints = Constraints {
-            interpolated: Some(&marks),
-            ..Constraints::default()
-        };
-        let phase = PhaseOne {
-            max_iterations: 500,
-            eps: 1e-12,
-            ..PhaseOne::default()
-        };
+        let constraints = Constraints { interpolated: Some(&marks), ..Constraints::default() };
+        let phase = PhaseOne { max_iterations: 500, eps: 1e-12, ..PhaseOne::default() };
         let done = interpolate(&subject.mesh, &subject.topology, &constraints, &phase)?;
         let system = subject.system(Scheme::ZhengCai)?;
         let part = ends(&Restriction::new(&system, &marks)?.system)?;
         let free = (0..marks.len()).filter(|&v| !marks[v]);
-        let moved =
-            free.map(|v| done.auxiliary.mesh.positions[v].distance(subject.mesh.positions[v]));
+        let moved = free.map(|v| done.auxiliary.mesh.positions[v].distance(subject.mesh.positions[v]));
         let held = (0..marks.len()).filter(|&v| marks[v]);
         let off = held.map(|v| {
-            faces::centroid(&done.first.mesh, done.first.first_vertex_face + v)
-                .distance(subject.mesh.positions[v])
+            faces::centroid(&done.first.mesh, done.first.first_vertex_face + v).distance(subject.mesh.positions[v])
         });
         Ok((
             largest(moved.chain([0.0])),
@@ -513,11 +461,7 @@ fn subset(lab: &Lab) -> Result<Finding> {
             largest(rows.iter().map(|r| r.0)),
             0.0,
         ),
-        Evidence::at_most(
-            "largest distance of a centroid from I over L",
-            largest(rows.iter().map(|r| r.1)),
-            ROUNDING,
-        ),
+        Evidence::at_most("largest distance of a centroid from I over L", largest(rows.iter().map(|r| r.1)), ROUNDING),
         Evidence::at_least(
             "smallest eigenvalue of the remaining system",
             smallest(rows.iter().map(|r| r.2)),
@@ -556,7 +500,11 @@ fn same_on_triangles(lab: &Lab) -> Result<Finding> {
     let triangles = each(lab.triangles(), difference)?;
     let quads = difference(&exact("torus:8x8")?)?;
     Ok(Finding::settled(vec![
-        Evidence::at_most("largest difference of an entry of the two matrices, random triangle meshes", largest(triangles), ROUNDING),
+        Evidence::at_most(
+            "largest difference of an entry of the two matrices, random triangle meshes",
+            largest(triangles),
+            ROUNDING,
+        ),
         Evidence::above("the same on quads, torus:8x8", quads, 0.01),
     ])
     .remark(

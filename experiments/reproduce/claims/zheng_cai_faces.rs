@@ -4,9 +4,7 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::interpolate::thall::normal_deviations;
-use limitlab::interpolate::zheng_cai::{
-    Auxiliary, Constraints, FirstRefinement, PhaseOne, auxiliary,
-};
+use limitlab::interpolate::zheng_cai::{Auxiliary, Constraints, FirstRefinement, PhaseOne, auxiliary};
 use limitlab::mesh::{Mesh, Topology};
 use limitlab::subdivide::doo_sabin::{Rule, face_normals, refine_by};
 
@@ -18,10 +16,7 @@ const ROUNDING: f64 = 1e-12;
 
 pub(super) fn centroid(mesh: &Mesh, f: usize) -> DVec3 {
     let face = mesh.faces.face(f);
-    face.iter()
-        .map(|&v| mesh.positions[v as usize])
-        .sum::<DVec3>()
-        / face.len() as f64
+    face.iter().map(|&v| mesh.positions[v as usize]).sum::<DVec3>() / face.len() as f64
 }
 
 /// Two-phase interpolation after `sweeps` sweeps, with what the correction did: the rings before it.
@@ -32,26 +27,12 @@ struct Corrected {
 }
 
 fn corrected(subject: &Subject, sweeps: usize, constraints: &Constraints) -> Result<Corrected> {
-    let phase = PhaseOne {
-        max_iterations: sweeps,
-        eps: 0.0,
-        ..PhaseOne::default()
-    };
+    let phase = PhaseOne { max_iterations: sweeps, eps: 0.0, ..PhaseOne::default() };
     let (mesh, topology) = (&subject.mesh, &subject.topology);
     let auxiliary = auxiliary(mesh, topology, constraints.interpolated, &phase)?;
     let before = refine_by(Rule::ZhengCai, &auxiliary.mesh, topology)?;
-    let after = FirstRefinement::new(
-        &auxiliary.mesh,
-        topology,
-        Rule::ZhengCai,
-        &mesh.positions,
-        constraints,
-    )?;
-    Ok(Corrected {
-        auxiliary,
-        before,
-        after,
-    })
+    let after = FirstRefinement::new(&auxiliary.mesh, topology, Rule::ZhengCai, &mesh.positions, constraints)?;
+    Ok(Corrected { auxiliary, before, after })
 }
 
 /// Corner positions of the type-V face of `v`.
@@ -68,11 +49,7 @@ fn mean(points: &[DVec3]) -> DVec3 {
 fn average_normal(ring: &[DVec3]) -> DVec3 {
     let center = mean(ring);
     let next = ring.iter().cycle().skip(1);
-    let area: DVec3 = ring
-        .iter()
-        .zip(next)
-        .map(|(a, b)| (a - center).cross(b - center))
-        .sum();
+    let area: DVec3 = ring.iter().zip(next).map(|(a, b)| (a - center).cross(b - center)).sum();
     area.normalize()
 }
 
@@ -85,16 +62,10 @@ pub(super) fn perturbation(lab: &Lab) -> Result<Finding> {
     let size = subject.mesh.diagonal();
     let (mut off, mut flat, mut across) = (0.0f64, 0.0f64, 0.0f64);
     for v in 0..subject.mesh.len() {
-        let (old, new) = (
-            ring(&done.before, first, v),
-            ring(&done.after.mesh, first, v),
-        );
+        let (old, new) = (ring(&done.before, first, v), ring(&done.after.mesh, first, v));
         let (n, point) = (average_normal(&old), subject.mesh.positions[v]);
         off = largest([off, mean(&new).distance(point) / size]);
-        flat = largest([
-            flat,
-            largest(new.iter().map(|w| (w - point).dot(n).abs() / size)),
-        ]);
+        flat = largest([flat, largest(new.iter().map(|w| (w - point).dot(n).abs() / size))]);
         // Smallest change: orthogonal to all changes that keep centroid and plane.
         let mut free = random_points(new.len(), v as u64);
         free.iter_mut().for_each(|d| *d -= d.dot(n) * n);
@@ -109,11 +80,7 @@ pub(super) fn perturbation(lab: &Lab) -> Result<Finding> {
             off,
             ROUNDING,
         ),
-        Evidence::at_most(
-            "largest distance of a corner from the plane over L",
-            flat,
-            ROUNDING,
-        ),
+        Evidence::at_most("largest distance of a corner from the plane over L", flat, ROUNDING),
         Evidence::at_most(
             "largest product of the change with an admissible other one over L (0: no smaller change)",
             across,
@@ -133,10 +100,7 @@ pub(super) fn pseudo_code(lab: &Lab) -> Result<Finding> {
         let (n, center) = (average_normal(&old), mean(&old));
         let target = subject.mesh.positions[v];
         let moved = |to: DVec3| {
-            let new: Vec<DVec3> = old
-                .iter()
-                .map(|w| *w + (center - *w).dot(n) * n + (to - center))
-                .collect();
+            let new: Vec<DVec3> = old.iter().map(|w| *w + (center - *w).dot(n) * n + (to - center)).collect();
             mean(&new).distance(target) / size
         };
         printed = largest([printed, moved(done.auxiliary.mesh.positions[v])]);
@@ -157,29 +121,16 @@ pub(super) fn exact_interpolation(lab: &Lab) -> Result<Finding> {
     let done = corrected(&subject, 1, &Constraints::default())?;
     let off = |mesh: &Mesh| {
         let points = subject.mesh.positions.iter().enumerate();
-        largest(
-            points
-                .map(|(v, p)| centroid(mesh, done.after.first_vertex_face + v).distance(*p) / size),
-        )
+        largest(points.map(|(v, p)| centroid(mesh, done.after.first_vertex_face + v).distance(*p) / size))
     };
     Ok(Finding::reproduced(vec![
         Evidence::above(
-            format!(
-                "largest distance of a centroid from I over L after one sweep, {POLYGONS}, not corrected"
-            ),
+            format!("largest distance of a centroid from I over L after one sweep, {POLYGONS}, not corrected"),
             off(&done.before),
             1e-3,
         ),
-        Evidence::at_most(
-            "the same corrected, at level 1",
-            off(&done.after.mesh),
-            ROUNDING,
-        ),
-        Evidence::at_most(
-            "the same at level 4",
-            off(&done.after.surface(4)?),
-            ROUNDING,
-        ),
+        Evidence::at_most("the same corrected, at level 1", off(&done.after.mesh), ROUNDING),
+        Evidence::at_most("the same at level 4", off(&done.after.surface(4)?), ROUNDING),
     ]))
 }
 
@@ -197,10 +148,7 @@ pub(super) fn given_normals(lab: &Lab) -> Result<Finding> {
     let subject = lab.context.stand_in(POLYGONS)?;
     let refined = |sign: f64| -> Result<(FirstRefinement, Vec<DVec3>)> {
         let normals = tilted_normals(&subject, sign)?;
-        let constraints = Constraints {
-            normals: Some(&normals),
-            ..Constraints::default()
-        };
+        let constraints = Constraints { normals: Some(&normals), ..Constraints::default() };
         let unit = normals.iter().flatten().map(|n| n.normalize()).collect();
         Ok((corrected(&subject, 5, &constraints)?.after, unit))
     };
@@ -223,8 +171,7 @@ pub(super) fn given_normals(lab: &Lab) -> Result<Finding> {
         ),
         Evidence::at_most(
             "largest difference over L of the meshes for n and −n",
-            super::lab::distance(&plus.mesh.positions, &minus.mesh.positions)
-                / subject.mesh.diagonal(),
+            super::lab::distance(&plus.mesh.positions, &minus.mesh.positions) / subject.mesh.diagonal(),
             1e-15,
         ),
     ]))
@@ -235,10 +182,7 @@ pub(super) fn shape_handles(lab: &Lab) -> Result<Finding> {
     let n = subject.mesh.len();
     let handles: Vec<f64> = (0..n).map(|v| [0.4, 1.0, 2.5][v % 3]).collect();
     let plain = corrected(&subject, 5, &Constraints::default())?.after;
-    let constraints = Constraints {
-        handles: Some(&handles),
-        ..Constraints::default()
-    };
+    let constraints = Constraints { handles: Some(&handles), ..Constraints::default() };
     let scaled = corrected(&subject, 5, &constraints)?.after;
     let size = subject.mesh.diagonal();
     let first = plain.first_vertex_face;
@@ -247,10 +191,7 @@ pub(super) fn shape_handles(lab: &Lab) -> Result<Finding> {
     for (v, &handle) in handles.iter().enumerate() {
         let (a, b) = (ring(&plain.mesh, first, v), ring(&scaled.mesh, first, v));
         let d = mean(&a);
-        let wrong = a
-            .iter()
-            .zip(&b)
-            .map(|(a, b)| (*b - (d + handle * (*a - d))).length() / size);
+        let wrong = a.iter().zip(&b).map(|(a, b)| (*b - (d + handle * (*a - d))).length() / size);
         form = largest([form, largest(wrong)]);
         off = largest([off, mean(&b).distance(subject.mesh.positions[v]) / size]);
         before.push(average_normal(&a));
@@ -262,11 +203,7 @@ pub(super) fn shape_handles(lab: &Lab) -> Result<Finding> {
             form,
             ROUNDING,
         ),
-        Evidence::at_most(
-            "largest distance of a centroid from I over L",
-            off,
-            ROUNDING,
-        ),
+        Evidence::at_most("largest distance of a centroid from I over L", off, ROUNDING),
         Evidence::at_most(
             "largest angle between the normals with and without handles",
             largest(normal_deviations(&after, &before)),
@@ -290,9 +227,7 @@ pub(super) fn tangent_plane(lab: &Lab) -> Result<Finding> {
             let range = mesh.faces.range(first + v);
             let across = range.filter_map(|c| topology.twin(c as u32));
             let pairs = across.map(|t| normals[topology.incidence.face_of(t)]);
-            let angles: Vec<f64> = pairs
-                .map(|m| normal_deviations(&[m], &[normals[first + v]])[0])
-                .collect();
+            let angles: Vec<f64> = pairs.map(|m| normal_deviations(&[m], &[normals[first + v]])[0]).collect();
             worst.push(largest(angles));
         }
         median(worst)
@@ -302,10 +237,7 @@ pub(super) fn tangent_plane(lab: &Lab) -> Result<Finding> {
     Ok(Finding::reproduced(vec![
         Evidence::at_most(
             "largest angle between the planes of a type-V face at levels 1 and 6, irregular-poly:60",
-            largest(normal_deviations(
-                &kept[first..first + n],
-                &at_start[first..first + n],
-            )),
+            largest(normal_deviations(&kept[first..first + n], &at_start[first..first + n])),
             1e-9,
         ),
         Evidence::at_most(
@@ -345,20 +277,12 @@ pub(super) fn normal_in_plane(lab: &Lab) -> Result<Finding> {
     let area = |ring: &[DVec3], n: DVec3| {
         let center = mean(ring);
         let next = ring.iter().cycle().skip(1);
-        ring.iter()
-            .zip(next)
-            .map(|(a, b)| (a - center).cross(b - center))
-            .sum::<DVec3>()
-            .dot(n)
-            .abs()
+        ring.iter().zip(next).map(|(a, b)| (a - center).cross(b - center)).sum::<DVec3>().dot(n).abs()
     };
     let refined = |given: DVec3| {
         let mut normals = vec![None; subject.mesh.len()];
         normals[0] = Some(given);
-        let constraints = Constraints {
-            normals: Some(&normals),
-            ..Constraints::default()
-        };
+        let constraints = Constraints { normals: Some(&normals), ..Constraints::default() };
         corrected(&subject, 5, &constraints)
     };
     const TILT: f64 = 1e-3;

@@ -16,10 +16,7 @@ use super::finding::{Evidence, Finding, Value};
 use super::lab::{Lab, each, entries_per_vertex, exact, history, largest, median, smallest};
 use crate::context::Subject;
 
-const GAUSS_SEIDEL: Setup = Setup::Sor {
-    omega: 1.0,
-    order: None,
-};
+const GAUSS_SEIDEL: Setup = Setup::Sor { omega: 1.0, order: None };
 
 pub fn sweeps(lab: &Lab) -> Result<Finding> {
     if !lab.context.real() {
@@ -27,13 +24,8 @@ pub fn sweeps(lab: &Lab) -> Result<Finding> {
             "Needs a model of 562 vertices of the Princeton Shape Benchmark: run with --meshes DIR.",
         ));
     }
-    let subject = lab
-        .context
-        .model("closed/psb_m1630_hat_562v.off", Boundary::Refuse)?;
-    let phase = PhaseOne {
-        max_iterations: 100,
-        ..PhaseOne::default()
-    };
+    let subject = lab.context.model("closed/psb_m1630_hat_562v.off", Boundary::Refuse)?;
+    let phase = PhaseOne { max_iterations: 100, ..PhaseOne::default() };
     let found = auxiliary(&subject.mesh, &subject.topology, None, &phase)?;
     let size = subject.mesh.diagonal();
     let updates = (1..)
@@ -54,8 +46,7 @@ pub fn sweeps(lab: &Lab) -> Result<Finding> {
 /// The paper's own model where it is at hand, else a stand-in of its size.
 pub fn model_562(lab: &Lab) -> Result<Subject> {
     if lab.context.real() {
-        lab.context
-            .model("closed/psb_m1630_hat_562v.off", Boundary::Refuse)
+        lab.context.model("closed/psb_m1630_hat_562v.off", Boundary::Refuse)
     } else {
         lab.context.stand_in("irregular-tri:562")
     }
@@ -63,8 +54,7 @@ pub fn model_562(lab: &Lab) -> Result<Subject> {
 
 pub fn model_11540(lab: &Lab) -> Result<Subject> {
     if lab.context.real() {
-        lab.context
-            .model("closed/spot_11533v.off", Boundary::Refuse)
+        lab.context.model("closed/spot_11533v.off", Boundary::Refuse)
     } else {
         lab.context.stand_in("irregular-tri:11540")
     }
@@ -84,9 +74,7 @@ pub fn speed(lab: &Lab) -> Result<Finding> {
     let points = &subject.mesh.positions;
     let nasri = subject.system(Scheme::Nasri)?;
     let phase = PhaseOne::default();
-    let own = seconds(5, || {
-        auxiliary(&subject.mesh, &subject.topology, None, &phase).map(|a| a.updates.len())
-    });
+    let own = seconds(5, || auxiliary(&subject.mesh, &subject.topology, None, &phase).map(|a| a.updates.len()));
     let n = nasri.len();
     let dense = seconds(3, || {
         let mut a = Mat::<f64>::zeros(n, n);
@@ -99,10 +87,7 @@ pub fn speed(lab: &Lab) -> Result<Finding> {
         a.partial_piv_lu().solve_in_place(b.as_mut());
         b
     });
-    let stop = Stop {
-        tolerance: 1e-10 * subject.mesh.diagonal(),
-        max_iterations: 1,
-    };
+    let stop = Stop { tolerance: 1e-10 * subject.mesh.diagonal(), max_iterations: 1 };
     let direct = |setup| seconds(3, || run(&nasri, points, setup, &stop));
     let ratio = |seconds: f64| Value::Time(seconds / own);
     Ok(Finding::reproduced(vec![
@@ -119,10 +104,7 @@ pub fn size(lab: &Lab) -> Result<Finding> {
     let subject = model_11540(lab)?;
     let nasri = subject.system(Scheme::Nasri)?;
     let size = subject.mesh.diagonal();
-    let stop = Stop {
-        tolerance: 1e-10 * size,
-        max_iterations: 1,
-    };
+    let stop = Stop { tolerance: 1e-10 * size, max_iterations: 1 };
     let solution = run(&nasri, &subject.mesh.positions, Setup::Cholesky, &stop);
     // A double and a 32-bit row number for every entry of the factor.
     let sparse = solution.fill.map_or(f64::NAN, |fill| 12.0 * fill as f64);
@@ -134,15 +116,8 @@ pub fn size(lab: &Lab) -> Result<Finding> {
         1.0,
     )
     .also([
-        Evidence::at_most(
-            "error of the sparse solution over L",
-            solution.report.last().max / size,
-            1e-10,
-        ),
-        Evidence::shown(
-            "seconds of the sparse solution",
-            Value::Time(solution.setup_seconds + solution.solve_seconds),
-        ),
+        Evidence::at_most("error of the sparse solution over L", solution.report.last().max / size, 1e-10),
+        Evidence::shown("seconds of the sparse solution", Value::Time(solution.setup_seconds + solution.solve_seconds)),
         Evidence::shown("vertices", nasri.len()),
     ])
     .remark("The size defeats dense elimination, not Nasri's method."))
@@ -153,14 +128,8 @@ pub fn linear_time(_: &Lab) -> Result<Finding> {
     for n in [1000, 8000, 64_000] {
         let subject = exact(&format!("irregular-poly:{n}"))?;
         entries.push(entries_per_vertex(&subject.system(Scheme::ZhengCai)?));
-        let phase = PhaseOne {
-            max_iterations: 5,
-            eps: 0.0,
-            sweep: Sweep::GaussSeidel(None),
-        };
-        let took = seconds(2, || {
-            auxiliary(&subject.mesh, &subject.topology, None, &phase).map(|a| a.updates.len())
-        });
+        let phase = PhaseOne { max_iterations: 5, eps: 0.0, sweep: Sweep::GaussSeidel(None) };
+        let took = seconds(2, || auxiliary(&subject.mesh, &subject.topology, None, &phase).map(|a| a.updates.len()));
         times.push(took / n as f64);
     }
     Ok(Finding::reproduced(vec![
@@ -177,16 +146,11 @@ pub fn linear_time(_: &Lab) -> Result<Finding> {
 }
 
 pub fn five_iterations(lab: &Lab) -> Result<Finding> {
-    let errors = each(lab.subjects()?, |subject| {
-        Ok(history(&subject.system(Scheme::ZhengCai)?, subject, GAUSS_SEIDEL, 5)[5])
-    })?;
+    let errors =
+        each(lab.subjects()?, |subject| Ok(history(&subject.system(Scheme::ZhengCai)?, subject, GAUSS_SEIDEL, 5)[5]))?;
     let good = errors.iter().filter(|&&e| e <= 0.003).count() as f64 / errors.len() as f64;
     Ok(Finding::reproduced(vec![
-        Evidence::at_least(
-            "share of meshes with largest error at most 0.3 % of L after five sweeps",
-            good,
-            0.9,
-        ),
+        Evidence::at_least("share of meshes with largest error at most 0.3 % of L after five sweeps", good, 0.9),
         Evidence::shown("median error over L", median(errors.clone())),
         Evidence::shown("largest error over L", largest(errors.iter().copied())),
         Evidence::shown("meshes", errors.len()),
@@ -199,19 +163,10 @@ pub fn phases(lab: &Lab) -> Result<Finding> {
         let (mesh, topology) = (&subject.mesh, &subject.topology);
         let phase = PhaseOne::default();
         let made = auxiliary(mesh, topology, None, &phase)?;
-        let first = seconds(5, || {
-            auxiliary(mesh, topology, None, &phase).map(|a| a.updates.len())
-        });
+        let first = seconds(5, || auxiliary(mesh, topology, None, &phase).map(|a| a.updates.len()));
         let plain = Constraints::default();
         let second = seconds(5, || {
-            FirstRefinement::new(
-                &made.mesh,
-                topology,
-                Rule::ZhengCai,
-                &mesh.positions,
-                &plain,
-            )
-            .map(|f| f.mesh.len())
+            FirstRefinement::new(&made.mesh, topology, Rule::ZhengCai, &mesh.positions, &plain).map(|f| f.mesh.len())
         });
         Ok(Value::Time(second / first))
     };
@@ -221,10 +176,7 @@ pub fn phases(lab: &Lab) -> Result<Finding> {
             ratio(&model_11540(lab)?)?,
             1.0,
         ),
-        Evidence::shown(
-            "the same, 562 vertices (printed 7.6), too short to be sure of",
-            ratio(&model_562(lab)?)?,
-        ),
+        Evidence::shown("the same, 562 vertices (printed 7.6), too short to be sure of", ratio(&model_562(lab)?)?),
     ])
     .remark(
         "Reproduced is read as: the adjusting phase takes the longer time. The ratio is one of programs and machines.",

@@ -31,20 +31,11 @@ fn flat(points: &[DVec3]) -> impl Iterator<Item = (f64, f64)> {
 /// Segments, each on its own.
 fn segments(pairs: impl IntoIterator<Item = (DVec3, DVec3)>) -> Vec<(f64, f64)> {
     let gap = (f64::NAN, f64::NAN);
-    pairs
-        .into_iter()
-        .flat_map(|(a, b)| [(a.x, a.y), (b.x, b.y), gap])
-        .collect()
+    pairs.into_iter().flat_map(|(a, b)| [(a.x, a.y), (b.x, b.y), gap]).collect()
 }
 
 fn line<'a>(name: &'a str, shows: &'a str, subject: &'a Subject) -> Line<'a> {
-    Line {
-        name,
-        shows,
-        subject,
-        iterations: None,
-        error: None,
-    }
+    Line { name, shows, subject, iterations: None, error: None }
 }
 
 /// Fig. 2: a step of the cubic B-spline and one of the four-point scheme.
@@ -52,70 +43,43 @@ pub fn relation(album: &mut Album) -> Result<()> {
     let corners = [(0.0, 0.0), (1.2, 2.0), (3.2, 2.6), (4.6, 0.9), (6.4, 0.4)];
     let subject = polygon("polygon of 5 points", &corners);
     let p = &subject.mesh.positions;
-    let every_second = |points: &[DVec3], from: usize| -> Vec<DVec3> {
-        points.iter().skip(from).step_by(2).copied().collect()
-    };
+    let every_second =
+        |points: &[DVec3], from: usize| -> Vec<DVec3> { points.iter().skip(from).step_by(2).copied().collect() };
     let spline = refine(p, &[1.0; 5], Ends::Open).0;
     let four_point = refine(p, &[0.0; 5], Ends::Open).0;
     let (moved, middle) = (every_second(&spline, 0), every_second(&spline, 1));
     let new = every_second(&four_point, 1);
-    let pairs = |a: &[DVec3], b: &[DVec3]| {
-        segments(a.iter().copied().zip(b.iter().copied()).collect::<Vec<_>>())
-    };
+    let pairs = |a: &[DVec3], b: &[DVec3]| segments(a.iter().copied().zip(b.iter().copied()).collect::<Vec<_>>());
     let curve = |alpha: f64| refine_n(p, &[alpha; 5], Ends::Open, LEVELS).0;
     let plot = LinePlot {
         equal_units: true,
         series: vec![
-            Series::line("control points P_{i}^{0}", flat(p))
-                .colour(POLYGON)
-                .marker(Marker::Circle),
-            Series::scatter("midpoints P_{i}^{1}", flat(&middle))
-                .marker(Marker::Square)
-                .colour(palette(0)),
-            Series::scatter("B-spline's P_{i}^{2}", flat(&moved))
-                .marker(Marker::Triangle)
-                .colour(palette(0)),
-            Series::scatter("four-point's P_{i}^{3}", flat(&new))
-                .marker(Marker::Diamond)
-                .colour(palette(1)),
+            Series::line("control points P_{i}^{0}", flat(p)).colour(POLYGON).marker(Marker::Circle),
+            Series::scatter("midpoints P_{i}^{1}", flat(&middle)).marker(Marker::Square).colour(palette(0)),
+            Series::scatter("B-spline's P_{i}^{2}", flat(&moved)).marker(Marker::Triangle).colour(palette(0)),
+            Series::scatter("four-point's P_{i}^{3}", flat(&new)).marker(Marker::Diamond).colour(palette(1)),
             Series::line("Δ(P_{i})", pairs(p, &moved)).colour(palette(0)),
             Series::line("−(Δ(P_{i}) + Δ(P_{i+1}))/2", pairs(&middle, &new)).colour(palette(1)),
-            Series::line("B-spline curve", flat(&curve(1.0)))
-                .colour(palette(0))
-                .dash(Dash::Dotted),
-            Series::line("four-point curve", flat(&curve(0.0)))
-                .colour(palette(1))
-                .dash(Dash::Dotted),
+            Series::line("B-spline curve", flat(&curve(1.0))).colour(palette(0)).dash(Dash::Dotted),
+            Series::line("four-point curve", flat(&curve(0.0))).colour(palette(1)).dash(Dash::Dotted),
         ],
         ..LinePlot::default()
     };
-    let shows = "Lin-Luo Fig. 2: new points of the four-point scheme from the displacements of the cubic B-spline's step";
-    let figure = Figure {
-        width: 480,
-        height: 165,
-        ..Figure::new(plot)
-    };
+    let shows =
+        "Lin-Luo Fig. 2: new points of the four-point scheme from the displacements of the cubic B-spline's step";
+    let figure = Figure { width: 480, height: 165, ..Figure::new(plot) };
     album.add(&line("lin-luo-2", shows, &subject), &figure)
 }
 
 /// Fig. 3: curves for several α; ends and α a point of its own beside.
 pub fn samples(album: &mut Album) -> Result<()> {
-    let corners = [
-        (0.0, 0.0),
-        (0.4, 2.2),
-        (1.9, 1.2),
-        (3.3, 2.4),
-        (4.2, 0.6),
-        (2.4, -0.8),
-    ];
+    let corners = [(0.0, 0.0), (0.4, 2.2), (1.9, 1.2), (3.3, 2.4), (4.2, 0.6), (2.4, -0.8)];
     let subject = polygon("polygon of 6 points", &corners);
     let p = &subject.mesh.positions;
     let all = |alpha: f64| vec![alpha; p.len()];
     let drawn = |ends: Ends| {
         let closing = if ends == Ends::Closed { &p[..1] } else { &[] };
-        Series::line("", flat(&[p, closing].concat()))
-            .colour(POLYGON)
-            .marker(Marker::Circle)
+        Series::line("", flat(&[p, closing].concat())).colour(POLYGON).marker(Marker::Circle)
     };
     let curve = |alpha: &[f64], ends: Ends| {
         let mut points = refine_n(p, alpha, ends, LEVELS).0;
@@ -143,24 +107,14 @@ pub fn samples(album: &mut Album) -> Result<()> {
     }
     let held: Vec<DVec3> = chosen.map(|i| p[i]).to_vec();
     let panels = [
-        LinePlot {
-            title: "closed".into(),
-            series: samples(Ends::Closed),
-            ..LinePlot::default()
-        },
-        LinePlot {
-            title: "open".into(),
-            series: samples(Ends::Open),
-            ..LinePlot::default()
-        },
+        LinePlot { title: "closed".into(), series: samples(Ends::Closed), ..LinePlot::default() },
+        LinePlot { title: "open".into(), series: samples(Ends::Open), ..LinePlot::default() },
         LinePlot {
             title: "α = 0 or 1".into(),
             series: vec![
                 drawn(Ends::Closed),
                 Series::line("curve", flat(&curve(&alpha, Ends::Closed))).colour(palette(0)),
-                Series::scatter("α = 0", flat(&held))
-                    .marker(Marker::Square)
-                    .colour(palette(1)),
+                Series::scatter("α = 0", flat(&held)).marker(Marker::Square).colour(palette(1)),
             ],
             ..LinePlot::default()
         },
@@ -171,11 +125,7 @@ pub fn samples(album: &mut Album) -> Result<()> {
         y_range: Some((-1.3, 2.9)),
         ..panel
     });
-    let figure = Figure {
-        width: 690,
-        height: 180,
-        ..Figure::row(panels)
-    };
+    let figure = Figure { width: 690, height: 180, ..Figure::row(panels) };
     let shows = "Lin-Luo Fig. 3: the unified curve scheme for α from 0 (four-point) to 1 (B-spline), closed and open, and \
                  with α = 0 at some points";
     album.add(&line("lin-luo-3", shows, &subject), &figure)
@@ -203,10 +153,7 @@ fn star(n: usize) -> Result<Subject> {
     if points.iter().any(|p| !p.is_finite()) {
         return Err(Error::Computation(format!("no star of valence {n}")));
     }
-    Ok(plain(
-        &format!("star of valence {n}"),
-        Mesh::new(points, faces),
-    ))
+    Ok(plain(&format!("star of valence {n}"), Mesh::new(points, faces)))
 }
 
 /// The weights of the new vertex in face 0, read off from the refinement of unit vectors.
@@ -252,25 +199,12 @@ pub fn stencils(album: &mut Album) -> Result<()> {
         }
         let face = mesh.faces.face(0);
         let center = face.iter().map(|&v| at(v)).sum::<DVec3>() / 3.0;
-        series.push(
-            Series::scatter("the new vertex", flat(&[center]))
-                .marker(Marker::Plus)
-                .colour(Colour(0, 0, 0)),
-        );
-        panels.push(LinePlot {
-            title: title.into(),
-            equal_units: true,
-            series,
-            ..LinePlot::default()
-        });
+        series.push(Series::scatter("the new vertex", flat(&[center])).marker(Marker::Plus).colour(Colour(0, 0, 0)));
+        panels.push(LinePlot { title: title.into(), equal_units: true, series, ..LinePlot::default() });
         last = Some(subject);
     }
     let Some(subject) = last else { return Ok(()) };
-    let figure = Figure {
-        width: 640,
-        height: 240,
-        ..Figure::row(panels)
-    };
+    let figure = Figure { width: 640, height: 240, ..Figure::row(panels) };
     let shows = "Lin-Luo Fig. 4: the weights of a new vertex of the interpolatory √3 scheme, with how many vertices have \
                  each";
     album.add(&line("lin-luo-4", shows, &subject), &figure)

@@ -21,9 +21,7 @@ fn surface(first: &Mesh) -> Result<Surface> {
     while levels < 5 && (first.faces.corners().len() << (2 * levels)) < FACES {
         levels += 1;
     }
-    Ok(Surface::smooth(
-        Refinement::DooSabin.refine_n(first, levels)?,
-    ))
+    Ok(Surface::smooth(Refinement::DooSabin.refine_n(first, levels)?))
 }
 
 /// The two-phase method with the paper's settings.
@@ -33,29 +31,19 @@ fn two_phase(subject: &Subject, constraints: &Constraints) -> Result<TwoPhase> {
 }
 
 /// The largest distance of the centroid of a type-V face from its point, over all that are interpolated.
-fn largest_error(
-    subject: &Subject,
-    found: &TwoPhase,
-    is_interpolated: impl Fn(usize) -> bool,
-) -> f64 {
+fn largest_error(subject: &Subject, found: &TwoPhase, is_interpolated: impl Fn(usize) -> bool) -> f64 {
     let mesh = &found.first.mesh;
     let distance = |v: usize| {
         let face = mesh.faces.face(found.first.first_vertex_face + v);
         let sum: DVec3 = face.iter().map(|&c| mesh.positions[c as usize]).sum();
         (sum / face.len() as f64).distance(subject.mesh.positions[v])
     };
-    (0..subject.mesh.len())
-        .filter(|&v| is_interpolated(v))
-        .map(distance)
-        .fold(0.0, f64::max)
+    (0..subject.mesh.len()).filter(|&v| is_interpolated(v)).map(distance).fold(0.0, f64::max)
 }
 
 /// Panels that show the same part of space.
 fn panels(view: View, framed: &[DVec3], shown: Vec<(&str, Surface)>) -> Vec<Picture> {
-    shown
-        .into_iter()
-        .map(|(caption, surface)| Picture::new(caption, view).surface(surface).frame(framed))
-        .collect()
+    shown.into_iter().map(|(caption, surface)| Picture::new(caption, view).surface(surface).frame(framed)).collect()
 }
 
 /// Fig. 3: the Doo-Sabin surface of a mesh, and the one through its vertices.
@@ -75,11 +63,7 @@ pub fn approximation(album: &mut Album) -> Result<()> {
     let view = view(DVec3::Y, 25.0, 20.0);
     let mut panels = panels(view, &auxiliary.positions, shown);
     for at in [2, 5] {
-        panels[at].points.push(Points {
-            positions: subject.mesh.positions.clone(),
-            radius: 1.0,
-            colour: POINT,
-        });
+        panels[at].points.push(Points { positions: subject.mesh.positions.clone(), radius: 1.0, colour: POINT });
     }
     let line = Line {
         name: "zheng-cai-3",
@@ -95,10 +79,7 @@ pub fn approximation(album: &mut Album) -> Result<()> {
 pub fn against_nasri(album: &mut Album) -> Result<()> {
     let subject = album.subject("closed/psb_m1630_hat_562v.off", "irregular-tri:562")?;
     let found = two_phase(&subject, &Constraints::default())?;
-    let stop = Stop {
-        tolerance: 1e-10 * subject.mesh.diagonal(),
-        max_iterations: 10,
-    };
+    let stop = Stop { tolerance: 1e-10 * subject.mesh.diagonal(), max_iterations: 10 };
     let solution = nasri::control_points(&subject.mesh, &subject.topology, None, Setup::Lu, &stop)?;
     let nasri = Mesh::new(solution.points, subject.mesh.faces.clone());
     let shown = vec![
@@ -106,10 +87,7 @@ pub fn against_nasri(album: &mut Album) -> Result<()> {
         ("(b) auxiliary mesh", cage(&found.auxiliary.mesh, CONTROL)),
         ("(c) its surface", surface(&found.first.mesh)?),
         ("(d) Nasri's mesh", cage(&nasri, CONTROL)),
-        (
-            "(e) its surface",
-            surface(&refine_by(Rule::DooSabin, &nasri, &subject.topology)?)?,
-        ),
+        ("(e) its surface", surface(&refine_by(Rule::DooSabin, &nasri, &subject.topology)?)?),
     ];
     let view = view(DVec3::Y, 25.0, 20.0);
     let line = Line {
@@ -176,18 +154,11 @@ impl Tagged {
             marks[v] = true;
             normals[v] = Some(DVec3::new(x, sin, 0.0));
         }
-        Ok(Tagged {
-            subject: plain(name, mesh),
-            tips: [left, right],
-            marks,
-            normals,
-        })
+        Ok(Tagged { subject: plain(name, mesh), tips: [left, right], marks, normals })
     }
 
     fn solve(&self, with_normals: bool, handle: f64) -> Result<TwoPhase> {
-        let handles: Vec<f64> = (self.marks.iter())
-            .map(|&is_tip| if is_tip { handle } else { 1.0 })
-            .collect();
+        let handles: Vec<f64> = (self.marks.iter()).map(|&is_tip| if is_tip { handle } else { 1.0 }).collect();
         two_phase(
             &self.subject,
             &Constraints {
@@ -199,20 +170,13 @@ impl Tagged {
     }
 
     fn points(&self) -> Points {
-        Points {
-            positions: self.tips.map(|v| self.subject.mesh.positions[v]).to_vec(),
-            radius: 2.0,
-            colour: POINT,
-        }
+        Points { positions: self.tips.map(|v| self.subject.mesh.positions[v]).to_vec(), radius: 2.0, colour: POINT }
     }
 
     fn arrows(&self) -> Vectors {
         Vectors {
             tails: self.tips.map(|v| self.subject.mesh.positions[v]).to_vec(),
-            vectors: (self.tips.iter())
-                .filter_map(|&v| self.normals[v])
-                .map(|n| 0.6 * n)
-                .collect(),
+            vectors: (self.tips.iter()).filter_map(|&v| self.normals[v]).map(|n| 0.6 * n).collect(),
             width: 1.4,
             colour: NORMAL,
         }
@@ -221,18 +185,8 @@ impl Tagged {
     /// What all pictures show: the mesh and the arrows.
     fn framed(&self) -> Vec<DVec3> {
         let arrows = self.arrows();
-        let heads = arrows
-            .tails
-            .iter()
-            .zip(&arrows.vectors)
-            .map(|(&t, &v)| t + v);
-        self.subject
-            .mesh
-            .positions
-            .iter()
-            .copied()
-            .chain(heads)
-            .collect()
+        let heads = arrows.tails.iter().zip(&arrows.vectors).map(|(&t, &v)| t + v);
+        self.subject.mesh.positions.iter().copied().chain(heads).collect()
     }
 
     /// The first refinement with the type-V faces of the tips in another colour.
@@ -242,10 +196,7 @@ impl Tagged {
         for v in self.tips {
             colours[found.first.first_vertex_face + v] = POINT;
         }
-        Surface {
-            paint: Some(Paint::Faces(colours)),
-            ..cage(mesh, CONTROL)
-        }
+        Surface { paint: Some(Paint::Faces(colours)), ..cage(mesh, CONTROL) }
     }
 
     fn line<'a>(&'a self, name: &'a str, shows: &'a str, found: &TwoPhase) -> Line<'a> {
@@ -299,17 +250,14 @@ pub fn scaled_faces(album: &mut Album) -> Result<()> {
         last = tagged.solve(false, handle)?;
         let face = last.first.first_vertex_face + tagged.tips[1];
         let corners = last.first.mesh.faces.face(face);
-        let corners: Vec<DVec3> = (corners.iter())
-            .map(|&c| last.first.mesh.positions[c as usize])
-            .collect();
+        let corners: Vec<DVec3> = (corners.iter()).map(|&c| last.first.mesh.positions[c as usize]).collect();
         let rays = Vectors {
             tails: vec![tip; corners.len()],
             vectors: corners.iter().map(|c| *c - tip).collect(),
             width: 0.9,
             colour: NORMAL,
         };
-        let mut picture =
-            Picture::new(caption, view(DVec3::Y, 75.0, 20.0)).surface(tagged.first(&last));
+        let mut picture = Picture::new(caption, view(DVec3::Y, 75.0, 20.0)).surface(tagged.first(&last));
         picture.points.push(tagged.points());
         picture.vectors.push(rays);
         pictures.push(picture);

@@ -29,15 +29,10 @@ pub fn maps(album: &mut Album) -> Result<()> {
         let (iterate, error) = control(&subject, &system, Setup::Pia { omega: 1.0 }, k);
         last = error;
         let errors = (0..system.len())
-            .map(|v| {
-                (subject.mesh.positions[v] - system.row(v, &iterate.positions)).length() / size
-            })
+            .map(|v| (subject.mesh.positions[v] - system.row(v, &iterate.positions)).length() / size)
             .collect();
-        let surface = Surface::smooth(subject.mesh.clone())
-            .scalars(errors, scale.clone())
-            .edges(FINE_EDGE);
-        let mut picture =
-            Picture::new(format!("k = {k}: {}", power(error / size)), view).surface(surface);
+        let surface = Surface::smooth(subject.mesh.clone()).scalars(errors, scale.clone()).edges(FINE_EDGE);
+        let mut picture = Picture::new(format!("k = {k}: {}", power(error / size)), view).surface(surface);
         if i % 3 == 2 {
             picture = picture.colour_bar(scale.clone());
         }
@@ -57,11 +52,7 @@ pub fn maps(album: &mut Album) -> Result<()> {
 /// The eigenvectors of Catmull-Clark's matrix that PIA is slowest to remove.
 pub fn slow_modes(album: &mut Album) -> Result<()> {
     let plain = |name: &str| Ok::<Subject, Error>(plain(name, builtin::builtin(name)?));
-    let mut subjects = vec![
-        plain("truncated-octahedron")?,
-        plain("prism:17")?,
-        plain("torus:24x12")?,
-    ];
+    let mut subjects = vec![plain("truncated-octahedron")?, plain("prism:17")?, plain("torus:24x12")?];
     subjects.push(album.subject("closed/spot_188v_poly.off", "irregular-quad:226")?);
     let scale = ColourScale::signed("eigenvector / largest", 1.0);
     let mut panels = Vec::new();
@@ -70,16 +61,11 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
         let (lambda, mode) = slowest(&system, &subject.name)?;
         let view = view(DVec3::Y, 30.0, 25.0);
         // Where the mode is; elsewhere there is nothing to see.
-        let framed: Vec<DVec3> = (subject.mesh.positions.iter().zip(&mode))
-            .filter(|(_, x)| x.abs() > 0.01)
-            .map(|(&p, _)| p)
-            .collect();
+        let framed: Vec<DVec3> =
+            (subject.mesh.positions.iter().zip(&mode)).filter(|(_, x)| x.abs() > 0.01).map(|(&p, _)| p).collect();
         let caption = format!("λ = {}", significant(lambda));
-        let mut picture = Picture::new(caption, view).surface(
-            Surface::flat(subject.mesh.clone())
-                .scalars(mode, scale.clone())
-                .edges(FINE_EDGE),
-        );
+        let mut picture = Picture::new(caption, view)
+            .surface(Surface::flat(subject.mesh.clone()).scalars(mode, scale.clone()).edges(FINE_EDGE));
         picture.framed = Some(framed);
         if i % 2 == 1 {
             picture = picture.colour_bar(scale.clone());
@@ -108,31 +94,19 @@ const STEPS: usize = 200_000;
 fn slowest(system: &LimitSystem, name: &str) -> Result<(f64, Vec<f64>)> {
     let n = system.len();
     // Multiples of the golden ratio: no symmetry of the mesh is one of the start.
-    let mut x: Vec<f64> = (1..=n)
-        .map(|i| (i as f64 * 0.618_033_988_749_895).fract() - 0.5)
-        .collect();
+    let mut x: Vec<f64> = (1..=n).map(|i| (i as f64 * 0.618_033_988_749_895).fract() - 0.5).collect();
     let mut residual = f64::INFINITY;
     for _ in 0..STEPS {
-        let mut next: Vec<f64> = (0..n)
-            .map(|i| x[i] - system.a.row_times_scalar(i, &x))
-            .collect();
-        let largest = next
-            .iter()
-            .copied()
-            .fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
+        let mut next: Vec<f64> = (0..n).map(|i| x[i] - system.a.row_times_scalar(i, &x)).collect();
+        let largest = next.iter().copied().fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
         next.iter_mut().for_each(|v| *v /= largest);
-        residual = (x.iter().zip(&next))
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max);
+        residual = (x.iter().zip(&next)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         x = next;
         if residual < 1e-9 {
             break;
         }
     }
-    let at = (0..n).fold(
-        0,
-        |best, i| if x[i].abs() > x[best].abs() { i } else { best },
-    );
+    let at = (0..n).fold(0, |best, i| if x[i].abs() > x[best].abs() { i } else { best });
     let lambda = system.a.row_times_scalar(at, &x) / x[at];
     let known = spectrum(system)?.a.min;
     if (lambda - known).abs() > 1e-6 {
@@ -146,9 +120,5 @@ fn slowest(system: &LimitSystem, name: &str) -> Result<(f64, Vec<f64>)> {
 
 /// Three digits; rounding is 0.
 fn significant(x: f64) -> String {
-    if x.abs() < 1e-9 {
-        "0".into()
-    } else {
-        format!("{x:.4}")
-    }
+    if x.abs() < 1e-9 { "0".into() } else { format!("{x:.4}") }
 }

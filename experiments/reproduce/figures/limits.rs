@@ -110,38 +110,24 @@ pub fn pia(album: &mut Album) -> Result<()> {
     for printed in &PRINTED {
         let subject = album.subject(printed.file, printed.otherwise)?;
         let system = subject.system(printed.scheme)?;
-        let (cage_mesh, error) = control(
-            &subject,
-            &system,
-            Setup::Pia { omega: 1.0 },
-            printed.updates,
-        );
+        let (cage_mesh, error) = control(&subject, &system, Setup::Pia { omega: 1.0 }, printed.updates);
         let surface = limit_surface(refinement(printed.scheme), &cage_mesh)?;
         let view = view(printed.up, printed.azimuth, printed.elevation);
         let height = |p: &DVec3| p.dot(printed.up);
         let heights = || subject.mesh.positions.iter().map(height);
-        let (low, high) = (
-            heights().fold(f64::INFINITY, f64::min),
-            heights().fold(f64::NEG_INFINITY, f64::max),
-        );
+        let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
         let framed: Vec<DVec3> = (surface.mesh.positions.iter())
             .chain(&subject.mesh.positions)
             .filter(|p| height(p) >= high - printed.shown * (high - low))
             .copied()
             .collect();
         let panels = vec![
-            Picture::new(
-                format!("(a) the mesh, {} vertices", subject.mesh.len()),
-                view,
-            )
-            .surface(cage(&subject.mesh, GIVEN))
-            .frame(&framed),
-            Picture::new(
-                format!("(b) the surface after {} updates", printed.updates),
-                view,
-            )
-            .surface(surface)
-            .frame(&framed),
+            Picture::new(format!("(a) the mesh, {} vertices", subject.mesh.len()), view)
+                .surface(cage(&subject.mesh, GIVEN))
+                .frame(&framed),
+            Picture::new(format!("(b) the surface after {} updates", printed.updates), view)
+                .surface(surface)
+                .frame(&framed),
         ];
         let line = Line {
             name: printed.name,
@@ -171,11 +157,7 @@ fn thall_pictures(subject: &Subject, iterates: &[usize]) -> Result<(Vec<Picture>
         let caption = format!("k = {k}: error {:.2} %", 100.0 * error / size);
         let picture = Picture::new(caption, view)
             .surface(limit_surface(Refinement::CatmullClark, &cage_mesh)?)
-            .points(Points {
-                positions: subject.mesh.positions.clone(),
-                radius: 0.9,
-                colour: POINT,
-            })
+            .points(Points { positions: subject.mesh.positions.clone(), radius: 0.9, colour: POINT })
             .frame(&subject.mesh.positions);
         panels.push(picture);
     }
@@ -203,9 +185,7 @@ pub fn thall_animation(album: &mut Album) -> Result<()> {
     let subject = album.subject(THALL_MODEL.0, THALL_MODEL.1)?;
     let iterates: Vec<usize> = (0..=6).collect();
     let (panels, last) = thall_pictures(&subject, &iterates)?;
-    let frames: Vec<Figure> = (panels.into_iter())
-        .map(|panel| sheet(1, (94, 104), vec![panel]))
-        .collect();
+    let frames: Vec<Figure> = (panels.into_iter()).map(|panel| sheet(1, (94, 104), vec![panel])).collect();
     let line = Line {
         name: "thall-animation",
         shows: "Thall's iteration, ω = ½, as an animated PNG: iterates 0 to 6 and the given points",

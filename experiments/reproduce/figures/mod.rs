@@ -20,11 +20,8 @@ use limitlab::subdivide::{Refinement, catmull_clark, loop_scheme};
 
 use crate::context::{Context, Item, Subject};
 
-pub const ALL: Item = Item {
-    id: "figures",
-    title: "Pictures of the papers' surfaces, of errors and of slow modes",
-    run,
-};
+pub const ALL: Item =
+    Item { id: "figures", title: "Pictures of the papers' surfaces, of errors and of slow modes", run };
 
 /// Colours of meshes as they were given, of control meshes, of surfaces.
 const GIVEN: Colour = Colour(236, 224, 200);
@@ -117,24 +114,18 @@ impl<'a> Album<'a> {
 
     /// The real model `file`, or the built-in mesh `otherwise`.
     fn subject(&self, file: &str, otherwise: &str) -> Result<Subject> {
-        if self.context.real() {
-            self.context.model(file, Boundary::Refuse)
-        } else {
-            self.context.stand_in(otherwise)
-        }
+        if self.context.real() { self.context.model(file, Boundary::Refuse) } else { self.context.stand_in(otherwise) }
     }
 
     fn add(&mut self, line: &Line, figure: &Figure) -> Result<()> {
         self.list(line);
-        self.context
-            .figure(&format!("{}--{}", ALL.id, line.name), figure)
+        self.context.figure(&format!("{}--{}", ALL.id, line.name), figure)
     }
 
     /// As [`add`](Self::add), figures one after the other.
     fn animate(&mut self, line: &Line, figures: &[Figure]) -> Result<()> {
         self.list(line);
-        self.context
-            .animation(&format!("{}--{}", ALL.id, line.name), figures)
+        self.context.animation(&format!("{}--{}", ALL.id, line.name), figures)
     }
 
     fn list(&mut self, line: &Line) {
@@ -153,11 +144,7 @@ impl<'a> Album<'a> {
 /// A mesh of our own.
 fn plain(name: &str, mesh: Mesh) -> Subject {
     let topology = Topology::new(&mesh.faces, mesh.len());
-    Subject {
-        name: name.to_owned(),
-        mesh,
-        topology,
-    }
+    Subject { name: name.to_owned(), mesh, topology }
 }
 
 /// `3.8×10⁻²`, as the report's texts are marked up.
@@ -170,22 +157,11 @@ fn power(x: f64) -> String {
 }
 
 /// The control points after so many steps from V = P, and the largest error that they leave.
-fn control(
-    subject: &Subject,
-    system: &LimitSystem,
-    setup: Setup,
-    iterations: usize,
-) -> (Mesh, f64) {
-    let stop = Stop {
-        tolerance: 0.0,
-        max_iterations: iterations,
-    };
+fn control(subject: &Subject, system: &LimitSystem, setup: Setup, iterations: usize) -> (Mesh, f64) {
+    let stop = Stop { tolerance: 0.0, max_iterations: iterations };
     let solution = solve(system, &subject.mesh.positions, setup, &stop);
     let error = solution.report.last().max;
-    (
-        Mesh::new(solution.points, subject.mesh.faces.clone()),
-        error,
-    )
+    (Mesh::new(solution.points, subject.mesh.faces.clone()), error)
 }
 
 /// The scheme's limit surface of a control mesh: as many refinements as [`FACES`] allows, then limit points and
@@ -198,19 +174,12 @@ fn limit_surface(scheme: Refinement, control: &Mesh) -> Result<Surface> {
     let refined = scheme.refine_n(control, levels)?;
     let topology = Topology::new(&refined.faces, refined.len());
     let (points, normals) = match scheme {
-        Refinement::Loop => (
-            loop_scheme::limit_positions(&refined, &topology)?,
-            loop_scheme::limit_normals(&refined, &topology)?,
-        ),
-        _ => (
-            catmull_clark::limit_positions(&refined, &topology)?,
-            catmull_clark::limit_normals(&refined, &topology)?,
-        ),
+        Refinement::Loop => {
+            (loop_scheme::limit_positions(&refined, &topology)?, loop_scheme::limit_normals(&refined, &topology)?)
+        }
+        _ => (catmull_clark::limit_positions(&refined, &topology)?, catmull_clark::limit_normals(&refined, &topology)?),
     };
-    Ok(Surface::with_normals(
-        Mesh::new(points, refined.faces),
-        normals,
-    ))
+    Ok(Surface::with_normals(Mesh::new(points, refined.faces), normals))
 }
 
 /// A mesh with flat faces and its edges.
@@ -226,12 +195,7 @@ fn cage(mesh: &Mesh, colour: Colour) -> Surface {
 /// Panels in rows of `columns`, each `width`×`height` points.
 fn sheet(columns: usize, (width, height): (u32, u32), panels: Vec<Picture>) -> Figure {
     let rows = panels.len().div_ceil(columns);
-    Figure {
-        width: width * columns as u32,
-        height: height * rows as u32,
-        columns,
-        ..Figure::row(panels)
-    }
+    Figure { width: width * columns as u32, height: height * rows as u32, columns, ..Figure::row(panels) }
 }
 
 /// The view of a model, whose axes differ.

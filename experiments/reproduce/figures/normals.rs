@@ -52,14 +52,9 @@ pub fn bones(album: &mut Album) -> Result<()> {
     let (cage, error) = control(&subject, &system, Setup::Cg, STEPS);
     let given: Vec<Option<DVec3>> = normals.iter().copied().map(Some).collect();
     let turned = rotate_rings(&cage, Refinement::CatmullClark, &given, Rotation::default())?;
-    let deviations = [
-        largest_deviation(&cage, &normals)?,
-        largest_deviation(&turned.mesh, &normals)?,
-    ];
-    let surfaces = [
-        limit_surface(Refinement::CatmullClark, &cage)?,
-        limit_surface(Refinement::CatmullClark, &turned.mesh)?,
-    ];
+    let deviations = [largest_deviation(&cage, &normals)?, largest_deviation(&turned.mesh, &normals)?];
+    let surfaces =
+        [limit_surface(Refinement::CatmullClark, &cage)?, limit_surface(Refinement::CatmullClark, &turned.mesh)?];
     let view = view(DVec3::Y, 15.0, 20.0);
     let framed = &subject.mesh.positions;
     let arrows = Vectors {
@@ -69,27 +64,14 @@ pub fn bones(album: &mut Album) -> Result<()> {
         colour: NORMAL,
     };
     let mut panels = Vec::new();
-    for (surface, (caption, deviation)) in surfaces.iter().zip([
-        ("(a) points", deviations[0]),
-        ("(b) points and normals", deviations[1]),
-    ]) {
-        let caption = format!("{caption}: off by {deviation:.1}°");
-        panels.push(
-            Picture::new(caption, view)
-                .surface(surface.clone())
-                .vectors(arrows.clone())
-                .frame(framed),
-        );
-    }
-    for (surface, caption) in surfaces
-        .into_iter()
-        .zip(["(c) reflections of (a)", "(d) of (b)"])
+    for (surface, (caption, deviation)) in
+        surfaces.iter().zip([("(a) points", deviations[0]), ("(b) points and normals", deviations[1])])
     {
-        panels.push(
-            Picture::new(caption, view)
-                .surface(surface.finish(Finish::ReflectionLines))
-                .frame(framed),
-        );
+        let caption = format!("{caption}: off by {deviation:.1}°");
+        panels.push(Picture::new(caption, view).surface(surface.clone()).vectors(arrows.clone()).frame(framed));
+    }
+    for (surface, caption) in surfaces.into_iter().zip(["(c) reflections of (a)", "(d) of (b)"]) {
+        panels.push(Picture::new(caption, view).surface(surface.finish(Finish::ReflectionLines)).frame(framed));
     }
     let line = Line {
         name: "thall-7-normals",
@@ -126,11 +108,7 @@ fn slab(eta: f64, border_radius: f64) -> Mesh {
         )
     };
     let radius = |i: usize, k: usize| {
-        if side(i, nx) == 0.0 && side(k, nz) == 0.0 {
-            RADIUS
-        } else {
-            border_radius
-        }
+        if side(i, nx) == 0.0 && side(k, nz) == 0.0 { RADIUS } else { border_radius }
     };
     let count = nx * nz;
     let mut positions = Vec::new();
@@ -154,18 +132,8 @@ fn slab(eta: f64, border_radius: f64) -> Mesh {
     let mut faces = Faces::default();
     for k in 0..nz - 1 {
         for i in 0..nx - 1 {
-            faces.push(&[
-                at(0, i, k),
-                at(0, i, k + 1),
-                at(0, i + 1, k + 1),
-                at(0, i + 1, k),
-            ]);
-            faces.push(&[
-                at(1, i, k),
-                at(1, i + 1, k),
-                at(1, i + 1, k + 1),
-                at(1, i, k + 1),
-            ]);
+            faces.push(&[at(0, i, k), at(0, i, k + 1), at(0, i + 1, k + 1), at(0, i + 1, k)]);
+            faces.push(&[at(1, i, k), at(1, i + 1, k), at(1, i + 1, k + 1), at(1, i, k + 1)]);
         }
     }
     for (b, &(i, k)) in border.iter().enumerate() {
@@ -187,11 +155,7 @@ pub fn end_cap(album: &mut Album) -> Result<()> {
     let oblique = view(DVec3::Y, 30.0, 30.0);
     let (mut panels, mut below) = (Vec::new(), Vec::new());
     let mut last = None;
-    for (letters, eta, radius) in [
-        (["(a)", "(d)"], 1.0, 1.0),
-        (["(b)", "(e)"], 1.5, 1.0),
-        (["(c)", "(f)"], 1.5, 0.8),
-    ] {
+    for (letters, eta, radius) in [(["(a)", "(d)"], 1.0, 1.0), (["(b)", "(e)"], 1.5, 1.0), (["(c)", "(f)"], 1.5, 0.8)] {
         let subject = plain("slab of 6×4 medial atoms", slab(eta, radius * RADIUS));
         let system = subject.system(Scheme::CatmullClark)?;
         let (cage, error) = control(&subject, &system, Setup::Cg, STEPS);
@@ -199,15 +163,11 @@ pub fn end_cap(album: &mut Album) -> Result<()> {
         let heights = surface.mesh.positions.iter().map(|p| p.y);
         let over = 100.0 * (heights.fold(0.0, f64::max) / RADIUS - 1.0);
         let caption = format!("{} η = {eta}, r × {radius}: {over:+.1} %", letters[0]);
-        panels.push(
-            Picture::new(caption, across)
-                .surface(surface.clone())
-                .points(Points {
-                    positions: subject.mesh.positions.clone(),
-                    radius: 1.1,
-                    colour: POINT,
-                }),
-        );
+        panels.push(Picture::new(caption, across).surface(surface.clone()).points(Points {
+            positions: subject.mesh.positions.clone(),
+            radius: 1.1,
+            colour: POINT,
+        }));
         below.push(
             Picture::new(format!("{} reflections", letters[1]), oblique)
                 .surface(surface.finish(Finish::ReflectionLines)),

@@ -46,13 +46,8 @@ pub fn against_butterfly(album: &mut Album) -> Result<()> {
         ("(c) interpolatory √3", ours),
         ("Labsik-Greiner √3", earlier),
     ];
-    let panels = shown
-        .map(|(caption, surface)| {
-            Picture::new(caption, view)
-                .surface(surface)
-                .frame(&mesh.positions)
-        })
-        .to_vec();
+    let panels =
+        shown.map(|(caption, surface)| Picture::new(caption, view).surface(surface).frame(&mesh.positions)).to_vec();
     let line = Line {
         name: "lin-luo-5",
         shows: "Lin-Luo Fig. 5: a mesh with a hole by modified Butterfly and by the interpolatory √3 scheme (α = 1), with \
@@ -72,8 +67,7 @@ pub fn bunny(album: &mut Album) -> Result<()> {
     let view = view(DVec3::Y, 0.0, 10.0);
     let panels = vec![
         Picture::new("(a) the mesh", view).surface(cage(mesh, GIVEN)),
-        Picture::new("(b) after one step", view)
-            .surface(cage(&refined(mesh, &alpha, 1)?, super::CONTROL)),
+        Picture::new("(b) after one step", view).surface(cage(&refined(mesh, &alpha, 1)?, super::CONTROL)),
         Picture::new("(c) after four steps", view).surface(surface(mesh, &alpha)?),
     ];
     let line = Line {
@@ -97,36 +91,22 @@ pub fn parameters(album: &mut Album) -> Result<()> {
     let every = |step: usize| -> Vec<usize> { (0..mesh.len()).step_by(step).collect() };
     let mut panels = vec![Picture::new("control mesh", view).surface(cage(mesh, GIVEN))];
     for alpha in [1.0, 0.8, 0.5] {
-        panels
-            .push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
+        panels.push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
     }
-    for (caption, chosen) in [
-        ("every 4th vertex", every(4)),
-        ("every 2nd vertex", every(2)),
-    ] {
+    for (caption, chosen) in [("every 4th vertex", every(4)), ("every 2nd vertex", every(2))] {
         let mut alpha = all(0.0);
         for &v in &chosen {
             alpha[v] = 1.0;
         }
-        let points = Points {
-            positions: chosen.iter().map(|&v| mesh.positions[v]).collect(),
-            radius: 1.1,
-            colour: POINT,
-        };
-        panels.push(
-            Picture::new(caption, view)
-                .surface(surface(mesh, &alpha)?)
-                .points(points),
-        );
+        let points =
+            Points { positions: chosen.iter().map(|&v| mesh.positions[v]).collect(), radius: 1.1, colour: POINT };
+        panels.push(Picture::new(caption, view).surface(surface(mesh, &alpha)?).points(points));
     }
     for alpha in [0.0, 0.2] {
-        panels
-            .push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
+        panels.push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
     }
-    let framed: Vec<DVec3> = (panels.iter())
-        .flat_map(|p| p.surfaces.iter().flat_map(|s| &s.mesh.positions))
-        .copied()
-        .collect();
+    let framed: Vec<DVec3> =
+        (panels.iter()).flat_map(|p| p.surfaces.iter().flat_map(|s| &s.mesh.positions)).copied().collect();
     for panel in &mut panels {
         panel.framed = Some(framed.clone());
     }

@@ -51,12 +51,7 @@ pub const LEAST_SINE: f64 = 1e-6;
 /// # Errors
 /// As [`SplittingMatrix::on_rings`], and if the leading pair is complex.
 pub fn characteristic_map(scheme: LocalScheme, valence: usize, rings: usize) -> Result<Net> {
-    Ok(Net {
-        scheme,
-        valence,
-        rings,
-        points: SplittingMatrix::on_rings(scheme, valence, rings)?.characteristic_net()?,
-    })
+    Ok(Net { scheme, valence, rings, points: SplittingMatrix::on_rings(scheme, valence, rings)?.characteristic_net()? })
 }
 
 impl Net {
@@ -71,11 +66,7 @@ impl Net {
     /// If the net has not so many.
     pub fn inner(&self, rings: usize) -> Net {
         assert!(rings <= self.rings, "the net has so many rings");
-        Net {
-            rings,
-            points: self.points[..self.layout().len(self.valence, rings)].to_vec(),
-            ..self.clone()
-        }
+        Net { rings, points: self.points[..self.layout().len(self.valence, rings)].to_vec(), ..self.clone() }
     }
 
     /// The net after `rounds` rounds of refinement, as far as these rings determine it: 2r−1 rings from r, with √3
@@ -104,10 +95,7 @@ impl Net {
         let rings = rings.unwrap_or(0);
         Ok(Net {
             rings,
-            points: refined[..layout.len(n, rings)]
-                .iter()
-                .map(|p| p.truncate())
-                .collect(),
+            points: refined[..layout.len(n, rings)].iter().map(|p| p.truncate()).collect(),
             ..self.clone()
         })
     }
@@ -126,8 +114,7 @@ impl Net {
         for face in self.faces().iter() {
             let m = face.len();
             for k in 0..m {
-                let [before, here, after] =
-                    [(k + m - 1) % m, k, (k + 1) % m].map(|c| self.points[face[c] as usize]);
+                let [before, here, after] = [(k + m - 1) % m, k, (k + 1) % m].map(|c| self.points[face[c] as usize]);
                 let (out, back) = (after - here, before - here);
                 let sine = out.perp_dot(back) / (out.length() * back.length());
                 samples += 1;
@@ -135,11 +122,7 @@ impl Net {
                 if sine.is_nan() || sine <= LEAST_SINE {
                     folded_corners += 1;
                 }
-                least_sine = if sine.is_nan() {
-                    least_sine.min(0.0)
-                } else {
-                    least_sine.min(sine)
-                };
+                least_sine = if sine.is_nan() { least_sine.min(0.0) } else { least_sine.min(sine) };
             }
         }
         let ring = self.scheme.layout().boundary(self.valence, self.rings);
@@ -171,10 +154,7 @@ impl Net {
             (p.x, p.y)
         };
         let lines = self.layout().lines(self.valence, self.rings, step);
-        lines
-            .into_iter()
-            .map(|line| line.into_iter().map(point).collect())
-            .collect()
+        lines.into_iter().map(|line| line.into_iter().map(point).collect()).collect()
     }
 
     fn layout(&self) -> Layout {

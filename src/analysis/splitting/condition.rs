@@ -53,19 +53,12 @@ impl Blend {
         let at = |alpha| SplittingMatrix::on_rings(LocalScheme::Sqrt3 { alpha }, valence, 3);
         let matrices = [at(0.0)?, at(1.0)?, at(2.0)?];
         let blocks = (0..=valence / 2).map(|k| matrices.each_ref().map(|m| m.block(k)));
-        Ok(Blend {
-            valence,
-            blocks: blocks.collect(),
-        })
+        Ok(Blend { valence, blocks: blocks.collect() })
     }
 
     /// All eigenvalues at one α, by falling modulus.
     fn modes(&self, alpha: f64) -> Result<Vec<Mode>> {
-        let weights = [
-            (alpha - 1.0) * (alpha - 2.0) / 2.0,
-            alpha * (2.0 - alpha),
-            alpha * (alpha - 1.0) / 2.0,
-        ];
+        let weights = [(alpha - 1.0) * (alpha - 2.0) / 2.0, alpha * (2.0 - alpha), alpha * (alpha - 1.0) / 2.0];
         let mut modes = Vec::new();
         for (frequency, [a, b, c]) in self.blocks.iter().enumerate() {
             let [x, y, z] = weights.map(Complex::from);
@@ -90,10 +83,7 @@ impl Blend {
         let values = all_eigenvalues(&modes, self.valence);
         let lambda = [values[0], values[1], values[2], values[3]];
         let leading_frequency = modes[0].frequency;
-        let pair = modes
-            .iter()
-            .position(|m| m.frequency == 1)
-            .map(|i| modes.remove(i));
+        let pair = modes.iter().position(|m| m.frequency == 1).map(|i| modes.remove(i));
         let pair = pair.map_or(Complex::from(0.0), |m| m.value);
         let next = modes[0];
         let margin = pair.norm() - next.value.norm();

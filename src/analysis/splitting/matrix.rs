@@ -68,12 +68,7 @@ impl SplittingMatrix {
                 }
             }
         }
-        Ok(SplittingMatrix {
-            scheme,
-            valence,
-            rings,
-            entries,
-        })
+        Ok(SplittingMatrix { scheme, valence, rings, entries })
     }
 
     /// The number of control points N.
@@ -89,9 +84,7 @@ impl SplittingMatrix {
         let centre = self.scheme.layout().centre();
         let orbits = (self.size() - centre) / n;
         let own = if k == 0 { centre } else { 0 };
-        let unit: Vec<Complex<f64>> = (0..n)
-            .map(|d| Complex::cis(TAU * ((k * d) % n) as f64 / n as f64))
-            .collect();
+        let unit: Vec<Complex<f64>> = (0..n).map(|d| Complex::cis(TAU * ((k * d) % n) as f64 / n as f64)).collect();
         // The first position of an orbit; the middle, where it takes part, is an orbit of one.
         let start = |o: usize| if o < own { 0 } else { centre + (o - own) * n };
         DMatrix::from_fn(own + orbits, own + orbits, |o, p| {
@@ -99,10 +92,7 @@ impl SplittingMatrix {
             if p < own {
                 return self.entries[(row, 0)].into();
             }
-            unit.iter()
-                .enumerate()
-                .map(|(d, z)| z * self.entries[(row, start(p) + d)])
-                .sum()
+            unit.iter().enumerate().map(|(d, z)| z * self.entries[(row, start(p) + d)]).sum()
         })
     }
 

@@ -55,14 +55,12 @@ fn row(scheme: LocalScheme, valence: usize) -> Result<Row> {
     let eigenvalues = matrix.eigenvalues()?;
     let spaces = matrix.eigenspaces()?;
     let residuals = spaces.iter().map(|s| s.residuals(&matrix.entries));
-    let [residual_right, residual_left] =
-        residuals.fold([0.0_f64; 2], |[a, b], [x, y]| [a.max(x), b.max(y)]);
+    let [residual_right, residual_left] = residuals.fold([0.0_f64; 2], |[a, b], [x, y]| [a.max(x), b.max(y)]);
     let limit_mask = matrix.limit_mask()?;
     let formula = scheme.eigenvalues_formula(valence);
     let has_pair = matrix.leading_pair().is_ok();
-    let tangent_mask_distance = scheme
-        .cosine_mask_formula(valence)
-        .map(|mask| distance_to_space(&DVector::from_vec(mask), &spaces[1].left));
+    let tangent_mask_distance =
+        scheme.cosine_mask_formula(valence).map(|mask| distance_to_space(&DVector::from_vec(mask), &spaces[1].left));
     Ok(Row {
         scheme,
         valence,
@@ -70,9 +68,7 @@ fn row(scheme: LocalScheme, valence: usize) -> Result<Row> {
         lambda_subdominant: eigenvalues[1],
         lambda_subdominant_formula: scheme.subdominant_formula(valence),
         eigenvalue_error: formula.map(|f| largest_difference(&f, &eigenvalues)),
-        limit_mask_error: scheme
-            .limit_mask_formula(valence)
-            .map(|f| mask_error(&f, &limit_mask, &matrix)),
+        limit_mask_error: scheme.limit_mask_formula(valence).map(|f| mask_error(&f, &limit_mask, &matrix)),
         limit_mask: limit_mask.as_slice().to_vec(),
         tangent_masks: match has_pair {
             true => Some(matrix.tangent_masks()?.map(|m| m.as_slice().to_vec())),
@@ -109,7 +105,5 @@ fn mask_error(formula: &[f64], mask: &DVector<f64>, matrix: &SplittingMatrix) ->
         formula.get(orbit).copied().unwrap_or(0.0)
     };
     let weights = mask.iter().enumerate();
-    weights
-        .map(|(i, w)| (w - expected(i)).abs())
-        .fold(0.0, f64::max)
+    weights.map(|(i, w)| (w - expected(i)).abs()).fold(0.0, f64::max)
 }

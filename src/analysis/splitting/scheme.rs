@@ -41,9 +41,7 @@ impl LocalScheme {
             "catmull-clark" => LocalScheme::CatmullClark,
             "loop" => LocalScheme::Loop,
             "doo-sabin" => LocalScheme::DooSabin,
-            "sqrt3" => LocalScheme::Sqrt3 {
-                alpha: alpha.unwrap_or(0.0),
-            },
+            "sqrt3" => LocalScheme::Sqrt3 { alpha: alpha.unwrap_or(0.0) },
             "labsik-greiner" => LocalScheme::LabsikGreiner,
             _ => {
                 return Err(Error::Unknown(format!(
@@ -54,16 +52,10 @@ impl LocalScheme {
         };
         match (scheme, alpha) {
             (LocalScheme::Sqrt3 { alpha }, _) if !ALPHA_RANGE.contains(&alpha) => {
-                Err(Error::Unknown(format!(
-                    "α = {alpha} is outside [{}, {}]",
-                    ALPHA_RANGE.start(),
-                    ALPHA_RANGE.end()
-                )))
+                Err(Error::Unknown(format!("α = {alpha} is outside [{}, {}]", ALPHA_RANGE.start(), ALPHA_RANGE.end())))
             }
             (LocalScheme::Sqrt3 { .. }, _) | (_, None) => Ok(scheme),
-            (_, Some(_)) => Err(Error::Unknown(format!(
-                "{name} has no parameter α: leave it out or choose sqrt3"
-            ))),
+            (_, Some(_)) => Err(Error::Unknown(format!("{name} has no parameter α: leave it out or choose sqrt3"))),
         }
     }
 
@@ -82,9 +74,7 @@ impl LocalScheme {
     pub fn layout(self) -> Layout {
         match self {
             LocalScheme::CatmullClark => Layout::Quads,
-            LocalScheme::Loop | LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => {
-                Layout::Triangles
-            }
+            LocalScheme::Loop | LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => Layout::Triangles,
             LocalScheme::DooSabin => Layout::QuadsAboutFace,
         }
     }
@@ -186,16 +176,12 @@ impl LocalScheme {
         let mut all = vec![1.0];
         match self {
             LocalScheme::CatmullClark => {
-                let (mean, product) = (
-                    (3.0 * size - 7.0) / (8.0 * size),
-                    (size - 3.0) / (16.0 * size),
-                );
+                let (mean, product) = ((3.0 * size - 7.0) / (8.0 * size), (size - 3.0) / (16.0 * size));
                 // Both roots are real: 5n² − 30n + 49 > 0.
                 let spread = (mean * mean - product).sqrt();
                 all.extend([mean + spread, mean - spread]);
                 for k in 1..n {
-                    let (middle, spread) =
-                        (5.0 + cosine(k), half(k) * (2.0 * (9.0 + cosine(k))).sqrt());
+                    let (middle, spread) = (5.0 + cosine(k), half(k) * (2.0 * (9.0 + cosine(k))).sqrt());
                     all.extend([(middle + spread) / 16.0, (middle - spread) / 16.0]);
                 }
             }
@@ -241,9 +227,7 @@ impl LocalScheme {
                 Some([0.0].into_iter().chain(orbit(0)).chain(orbit(1)).collect())
             }
             LocalScheme::DooSabin => Some(ring().collect()),
-            LocalScheme::Loop | LocalScheme::Sqrt3 { alpha: 0.0 } => {
-                Some([0.0].into_iter().chain(ring()).collect())
-            }
+            LocalScheme::Loop | LocalScheme::Sqrt3 { alpha: 0.0 } => Some([0.0].into_iter().chain(ring()).collect()),
             LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => None,
         }
     }
@@ -286,14 +270,8 @@ impl Round {
             let turned = topology.counter_clockwise(&refined.faces, root);
             root = turned.ok_or_else(|| Error::Computation("the star is open".into()))?;
         }
-        let found = scheme
-            .layout()
-            .walk(&refined.faces, &topology, root, n, rings)?;
-        Ok(Round {
-            scheme,
-            topologies,
-            found,
-        })
+        let found = scheme.layout().walk(&refined.faces, &topology, root, n, rings)?;
+        Ok(Round { scheme, topologies, found })
     }
 
     /// The refined positions of the star, by their number in it.
@@ -302,10 +280,6 @@ impl Round {
         for topology in &self.topologies[1..] {
             refined = self.scheme.step(&refined, topology)?;
         }
-        Ok(self
-            .found
-            .iter()
-            .map(|&v| refined.positions[v as usize])
-            .collect())
+        Ok(self.found.iter().map(|&v| refined.positions[v as usize]).collect())
     }
 }

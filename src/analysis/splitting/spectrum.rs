@@ -52,10 +52,7 @@ impl Eigenspace {
             let image = s * x;
             (&image - x * (x.transpose() * &image)).amax()
         };
-        [
-            residual(matrix, &self.right),
-            residual(&matrix.transpose(), &self.left),
-        ]
+        [residual(matrix, &self.right), residual(&matrix.transpose(), &self.left)]
     }
 }
 
@@ -114,9 +111,7 @@ impl SplittingMatrix {
                 let imaginary = cluster.iter().map(|z| z.im.abs()).sum::<f64>() / size;
                 let columns = |basis: DMatrix<Complex<f64>>, side| {
                     let vectors = basis.column_iter();
-                    vectors
-                        .flat_map(|v| self.real_columns(frequency, &v.into_owned(), side))
-                        .collect()
+                    vectors.flat_map(|v| self.real_columns(frequency, &v.into_owned(), side)).collect()
                 };
                 parts.push(Part {
                     value: Complex::new(real, imaginary),
@@ -194,9 +189,7 @@ impl SplittingMatrix {
         };
         let pair = modes[at].value;
         // The first is λ_0; of the others none may come close, and the sort puts the largest first.
-        let next = (1..modes.len())
-            .find(|&i| i != at)
-            .map_or(0.0, |i| modes[i].value.norm());
+        let next = (1..modes.len()).find(|&i| i != at).map_or(0.0, |i| modes[i].value.norm());
         Ok(at > 0 && pair.im.abs() < EQUAL && pair.norm() - next > LEAD)
     }
 
@@ -208,8 +201,7 @@ impl SplittingMatrix {
     pub fn tangent_masks(&self) -> Result<[DVector<f64>; 2]> {
         let vector = self.frequency_one(Side::Left)?;
         let columns = self.real_columns(1, &vector, Side::Left);
-        <[_; 2]>::try_from(columns)
-            .map_err(|_| Error::Computation("frequency 1 has two masks".into()))
+        <[_; 2]>::try_from(columns).map_err(|_| Error::Computation("frequency 1 has two masks".into()))
     }
 
     /// The right eigenvectors of the [`leading_pair`](Self::leading_pair) as points of the plane: the control net of
@@ -221,10 +213,7 @@ impl SplittingMatrix {
         let vector = self.frequency_one(Side::Right)?;
         let [x, y] = <[_; 2]>::try_from(self.real_columns(1, &vector, Side::Right))
             .map_err(|_| Error::Computation("frequency 1 has two eigenvectors".into()))?;
-        Ok(x.iter()
-            .zip(&y)
-            .map(|(&x, &y)| glam::DVec2::new(x, y))
-            .collect())
+        Ok(x.iter().zip(&y).map(|(&x, &y)| glam::DVec2::new(x, y)).collect())
     }
 
     /// The eigenvector of block 1 for the leading eigenvalue, 1 at the first orbit.
@@ -266,20 +255,11 @@ impl SplittingMatrix {
 
     /// The real and imaginary parts of x_(o,s) = v_o e^{2πiks/n}, of a real block the real part alone. A left
     /// vector of block 0 weighs the sum of an orbit, hence 1/n at each of its positions.
-    fn real_columns(
-        &self,
-        k: usize,
-        vector: &DVector<Complex<f64>>,
-        side: Side,
-    ) -> Vec<DVector<f64>> {
+    fn real_columns(&self, k: usize, vector: &DVector<Complex<f64>>, side: Side) -> Vec<DVector<f64>> {
         let n = self.valence;
         let centre = self.scheme.layout().centre();
         let own = if k == 0 { centre } else { 0 };
-        let share = if k == 0 && side == Side::Left {
-            1.0 / n as f64
-        } else {
-            1.0
-        };
+        let share = if k == 0 && side == Side::Left { 1.0 / n as f64 } else { 1.0 };
         let value = |i: usize| {
             if i < centre {
                 return if k == 0 { vector[0] } else { 0.0.into() };
@@ -306,9 +286,8 @@ pub(super) fn eigenvalues(block: &DMatrix<Complex<f64>>) -> Result<Vec<Complex<f
         let z = block[(i, j)];
         faer::c64::new(z.re, z.im)
     });
-    let values = dense
-        .eigenvalues()
-        .map_err(|e| Error::Computation(format!("eigenvalues of a Fourier block: {e:?}")))?;
+    let values =
+        dense.eigenvalues().map_err(|e| Error::Computation(format!("eigenvalues of a Fourier block: {e:?}")))?;
     let mut values: Vec<_> = values.iter().map(|z| Complex::new(z.re, z.im)).collect();
     sort(&mut values);
     Ok(values)
@@ -333,9 +312,7 @@ pub(super) fn sort(values: &mut [Complex<f64>]) {
 
 fn falling(a: &Complex<f64>, b: &Complex<f64>) -> std::cmp::Ordering {
     let modulus = b.norm().total_cmp(&a.norm());
-    modulus
-        .then(b.re.total_cmp(&a.re))
-        .then(b.im.total_cmp(&a.im))
+    modulus.then(b.re.total_cmp(&a.re)).then(b.im.total_cmp(&a.im))
 }
 
 /// Groups of values within [`CLUSTER`] of another of the group; λ and λ̄ count as close.
@@ -359,13 +336,8 @@ fn clusters(values: Vec<Complex<f64>>) -> Vec<Vec<Complex<f64>>> {
 ///
 /// Each step takes the last right singular vector of B − λ as eigenvector and goes on with B on the other ones. λ is
 /// computed anew each time: the values of a defective eigenvalue move when one of them is taken away.
-fn invariant_subspace(
-    block: &DMatrix<Complex<f64>>,
-    cluster: &[Complex<f64>],
-) -> Result<DMatrix<Complex<f64>>> {
-    let failed = |e: &dyn std::fmt::Debug| {
-        Error::Computation(format!("singular values of a Fourier block: {e:?}"))
-    };
+fn invariant_subspace(block: &DMatrix<Complex<f64>>, cluster: &[Complex<f64>]) -> Result<DMatrix<Complex<f64>>> {
+    let failed = |e: &dyn std::fmt::Debug| Error::Computation(format!("singular values of a Fourier block: {e:?}"));
     let size = block.nrows();
     let mean = cluster.iter().map(folded).sum::<Complex<f64>>() / cluster.len() as f64;
     let distance = |z: &Complex<f64>| (folded(z) - mean).norm();
@@ -374,14 +346,10 @@ fn invariant_subspace(
     for mut column in basis.column_iter_mut() {
         let reduced = complement.adjoint() * block * &complement;
         let values = eigenvalues(&reduced)?;
-        let nearest = values
-            .iter()
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let nearest = values.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
         let Some(&lambda) = nearest else { break };
         let order = reduced.nrows();
-        let shifted = Mat::from_fn(order, order, |i, j| {
-            reduced[(i, j)] - if i == j { lambda } else { 0.0.into() }
-        });
+        let shifted = Mat::from_fn(order, order, |i, j| reduced[(i, j)] - if i == j { lambda } else { 0.0.into() });
         let svd = shifted.svd().map_err(|e| failed(&e))?;
         let vectors = DMatrix::from_fn(order, order, |i, j| svd.V()[(i, j)]);
         column.copy_from(&(&complement * vectors.column(order - 1)));
@@ -394,18 +362,10 @@ fn invariant_subspace(
 fn real_basis(basis: &DMatrix<Complex<f64>>) -> Result<DMatrix<Complex<f64>>> {
     let dimension = basis.ncols();
     let parts = Mat::from_fn(basis.nrows(), 2 * dimension, |i, j| {
-        if j < dimension {
-            basis[(i, j)].re
-        } else {
-            basis[(i, j - dimension)].im
-        }
+        if j < dimension { basis[(i, j)].re } else { basis[(i, j - dimension)].im }
     });
-    let svd = parts
-        .svd()
-        .map_err(|e| Error::Computation(format!("singular values of a basis: {e:?}")))?;
-    Ok(DMatrix::from_fn(basis.nrows(), dimension, |i, j| {
-        svd.U()[(i, j)].into()
-    }))
+    let svd = parts.svd().map_err(|e| Error::Computation(format!("singular values of a basis: {e:?}")))?;
+    Ok(DMatrix::from_fn(basis.nrows(), dimension, |i, j| svd.U()[(i, j)].into()))
 }
 
 /// λ and λ̄ as one.

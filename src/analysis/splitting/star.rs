@@ -105,23 +105,13 @@ impl Layout {
                     let cells = rings - (1 - self.centre());
                     for i in 0..cells {
                         for j in 0..cells {
-                            faces.push(&[
-                                at(s, i, j),
-                                at(s, i + 1, j),
-                                at(s, i + 1, j + 1),
-                                at(s, i, j + 1),
-                            ]);
+                            faces.push(&[at(s, i, j), at(s, i + 1, j), at(s, i + 1, j + 1), at(s, i, j + 1)]);
                         }
                     }
                     if self == Layout::QuadsAboutFace {
                         // The strip between this sector's grid and the next one's.
                         for j in 0..cells {
-                            faces.push(&[
-                                at(s, 0, j),
-                                at(s, 0, j + 1),
-                                at(s + 1, j + 1, 0),
-                                at(s + 1, j, 0),
-                            ]);
+                            faces.push(&[at(s, 0, j), at(s, 0, j + 1), at(s + 1, j + 1, 0), at(s + 1, j, 0)]);
                         }
                     }
                 }
@@ -133,10 +123,7 @@ impl Layout {
     /// The outermost ring, counter-clockwise.
     pub fn boundary(self, n: usize, rings: usize) -> Vec<u32> {
         let orbits = self.orbits(rings - 1)..self.orbits(rings);
-        (0..n)
-            .flat_map(|s| orbits.clone().map(move |o| o * n + s))
-            .map(|i| (self.centre() + i) as u32)
-            .collect()
+        (0..n).flat_map(|s| orbits.clone().map(move |o| o * n + s)).map(|i| (self.centre() + i) as u32).collect()
     }
 
     /// The disc and one vertex more, joined to the outermost ring, which makes it a closed mesh.
@@ -181,33 +168,16 @@ impl Layout {
     ///
     /// # Errors
     /// [`Error::Computation`] if the walk meets a boundary.
-    pub fn walk(
-        self,
-        faces: &Faces,
-        topology: &Topology,
-        root: u32,
-        n: usize,
-        rings: usize,
-    ) -> Result<Vec<u32>> {
+    pub fn walk(self, faces: &Faces, topology: &Topology, root: u32, n: usize, rings: usize) -> Result<Vec<u32>> {
         let mut found = vec![0; self.len(n, rings)];
         let walker = Walker { faces, topology };
-        self.try_walk(&walker, root, n, rings, &mut found)
-            .ok_or_else(|| {
-                Error::Computation(format!(
-                    "the star of valence {n} has fewer than {rings} rings before a boundary"
-                ))
-            })?;
+        self.try_walk(&walker, root, n, rings, &mut found).ok_or_else(|| {
+            Error::Computation(format!("the star of valence {n} has fewer than {rings} rings before a boundary"))
+        })?;
         Ok(found)
     }
 
-    fn try_walk(
-        self,
-        walker: &Walker<'_>,
-        root: u32,
-        n: usize,
-        rings: usize,
-        found: &mut [u32],
-    ) -> Option<()> {
+    fn try_walk(self, walker: &Walker<'_>, root: u32, n: usize, rings: usize, found: &mut [u32]) -> Option<()> {
         let half = if self == Layout::Triangles { 3 } else { 2 };
         if self.centre() == 1 {
             found[0] = walker.origin(root);
@@ -228,11 +198,7 @@ impl Layout {
                 if i > 1 {
                     along = walker.straight(along, half)?;
                 }
-                let columns = if self == Layout::Triangles {
-                    i - 1
-                } else {
-                    reach
-                };
+                let columns = if self == Layout::Triangles { i - 1 } else { reach };
                 let corner = |j| if self == Layout::Triangles { i - j } else { i };
                 visit(corner(0), 0, walker.end(along));
                 if columns > 0 {
@@ -288,13 +254,7 @@ impl Walker<'_> {
     }
 
     /// Visits the ends of `steps` half-edges in a straight line that starts with `c`, numbered from 1.
-    fn line(
-        &self,
-        mut c: u32,
-        half: usize,
-        steps: usize,
-        mut visit: impl FnMut(usize, u32),
-    ) -> Option<()> {
+    fn line(&self, mut c: u32, half: usize, steps: usize, mut visit: impl FnMut(usize, u32)) -> Option<()> {
         for step in 1..=steps {
             if step > 1 {
                 c = self.straight(c, half)?;
@@ -336,18 +296,11 @@ mod tests {
             let (n, rings) = (5, 4);
             for index in layout.centre()..layout.len(n, rings) {
                 let label = layout.label(n, index);
-                let numbers: Vec<usize> = label
-                    .split([':', ','])
-                    .map(|x| x.parse().expect("a number"))
-                    .collect();
+                let numbers: Vec<usize> = label.split([':', ',']).map(|x| x.parse().expect("a number")).collect();
                 let &[sector, i, j] = numbers.as_slice() else {
                     panic!("{label}");
                 };
-                assert_eq!(
-                    layout.index(n, sector, i, j) as usize,
-                    index,
-                    "{layout:?} {label}"
-                );
+                assert_eq!(layout.index(n, sector, i, j) as usize, index, "{layout:?} {label}");
             }
         }
         assert_eq!(Layout::Quads.label(5, 0), "v");
@@ -355,11 +308,7 @@ mod tests {
 
     #[test]
     fn the_inner_vertices_are_regular() {
-        for (layout, valence) in [
-            (Layout::Triangles, 6),
-            (Layout::Quads, 4),
-            (Layout::QuadsAboutFace, 4),
-        ] {
+        for (layout, valence) in [(Layout::Triangles, 6), (Layout::Quads, 4), (Layout::QuadsAboutFace, 4)] {
             let (n, rings) = (5, 3);
             let faces = layout.closed(n, rings);
             let topology = Topology::new(&faces, layout.len(n, rings) + 1);

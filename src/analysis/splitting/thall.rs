@@ -143,24 +143,17 @@ const MATLAB_3: [[f64; 7]; 2] = [
 ];
 
 /// Table III, and m_2, m_3 of §3.1.
-const TABLE_III: [[f64; 9]; 2] = [
-    [0.0, -1.0, -1.0, 1.0, 1.0, -4.0, 0.0, 4.0, 0.0],
-    [0.0, 1.0, -1.0, -1.0, 1.0, 0.0, -4.0, 0.0, 4.0],
-];
+const TABLE_III: [[f64; 9]; 2] =
+    [[0.0, -1.0, -1.0, 1.0, 1.0, -4.0, 0.0, 4.0, 0.0], [0.0, 1.0, -1.0, -1.0, 1.0, 0.0, -4.0, 0.0, 4.0]];
 
 /// §3.1: the masks quoted from Havemann.
-const HAVEMANN: [[f64; 9]; 2] = [
-    [0.0, 1.0, 1.0, -1.0, -1.0, 1.0, 0.0, -1.0, 0.0],
-    [0.0, 0.0, 2.0, 0.0, -2.0, 1.0, 1.0, -1.0, -1.0],
-];
+const HAVEMANN: [[f64; 9]; 2] =
+    [[0.0, 1.0, 1.0, -1.0, -1.0, 1.0, 0.0, -1.0, 0.0], [0.0, 0.0, 2.0, 0.0, -2.0, 1.0, 1.0, -1.0, -1.0]];
 
 /// Table II, and m_2, m_3 of §4.
 fn table_ii() -> [[f64; 7]; 2] {
     let (low, high) = (-1.0 - 17f64.sqrt(), 2.0 + 2.0 * 17f64.sqrt());
-    [
-        [0.0, -4.0, 2.0, 2.0, low, high, low],
-        [0.0, 2.0, 2.0, -4.0, high, low, low],
-    ]
+    [[0.0, -4.0, 2.0, 2.0, low, high, low], [0.0, 2.0, 2.0, -4.0, high, low, low]]
 }
 
 /// §4: λ_2 = λ_3 as printed at valence 3.
@@ -174,30 +167,14 @@ pub fn thall_tables() -> Result<ThallTables> {
     let three = Star::new(3)?;
     let four = Star::new(4)?;
     let mut entries = Vec::new();
-    three.matrix_entries(
-        "§4",
-        &MATRIX_3.map(|row| row.map(|x| x / 12.0)),
-        &mut entries,
-    );
-    four.matrix_entries(
-        "§3.1",
-        &MATRIX_4.map(|row| row.map(|x| x / 16.0)),
-        &mut entries,
-    );
+    three.matrix_entries("§4", &MATRIX_3.map(|row| row.map(|x| x / 12.0)), &mut entries);
+    four.matrix_entries("§3.1", &MATRIX_4.map(|row| row.map(|x| x / 16.0)), &mut entries);
     for (place, star, printed) in [("§4", &three, LAMBDA_3), ("§3.1", &four, 0.5)] {
-        entries.push(Entry {
-            place,
-            valence: star.n,
-            item: "λ_2 = λ_3".into(),
-            printed,
-            computed: star.lambda,
-        });
+        entries.push(Entry { place, valence: star.n, item: "λ_2 = λ_3".into(), printed, computed: star.lambda });
     }
     for (n, [divisor, vertex]) in (3..).zip(TABLE_I) {
         let mask = Star::new(n)?.limit_mask;
-        let weights = std::iter::once(vertex)
-            .chain(std::iter::repeat_n(1.0, n))
-            .chain(std::iter::repeat_n(4.0, n));
+        let weights = std::iter::once(vertex).chain(std::iter::repeat_n(1.0, n)).chain(std::iter::repeat_n(4.0, n));
         for (i, weight) in weights.enumerate() {
             entries.push(Entry {
                 place: "Table I",
@@ -216,12 +193,7 @@ pub fn thall_tables() -> Result<ThallTables> {
     three.memberships("Table II", ["m_2", "m_3"], &table_ii(), &mut memberships);
     four.memberships("§3.1", ["l_2", "l_3"], &MATLAB_4, &mut memberships);
     four.memberships("Table III", ["m_2", "m_3"], &TABLE_III, &mut memberships);
-    four.memberships(
-        "§3.1",
-        ["Havemann's m_2", "Havemann's m_3"],
-        &HAVEMANN,
-        &mut memberships,
-    );
+    four.memberships("§3.1", ["Havemann's m_2", "Havemann's m_3"], &HAVEMANN, &mut memberships);
 
     let formula = |n| [0, 1].map(|shift| formula_mask(n, shift));
     Ok(ThallTables {
@@ -265,12 +237,7 @@ impl Star {
         })
     }
 
-    fn matrix_entries<const N: usize>(
-        &self,
-        place: &'static str,
-        printed: &[[f64; N]; N],
-        entries: &mut Vec<Entry>,
-    ) {
+    fn matrix_entries<const N: usize>(&self, place: &'static str, printed: &[[f64; N]; N], entries: &mut Vec<Entry>) {
         for (i, row) in printed.iter().enumerate() {
             for (j, &printed) in row.iter().enumerate() {
                 entries.push(Entry {
@@ -291,8 +258,7 @@ impl Star {
         masks: &[[f64; N]; 2],
         memberships: &mut Vec<Membership>,
     ) {
-        let distance =
-            |mask: &[f64]| distance_to_space(&DVector::from_column_slice(mask), &self.left);
+        let distance = |mask: &[f64]| distance_to_space(&DVector::from_column_slice(mask), &self.left);
         for (name, mask) in names.into_iter().zip(masks) {
             let mut scaled = *mask;
             for weight in &mut scaled[self.n + 1..] {
@@ -334,10 +300,7 @@ pub fn formula_mask(n: usize, shift: usize) -> Vec<f64> {
     let cosine = |j: usize| (TAU * j as f64 / n as f64).cos();
     let edge = |m: usize| tangent_constant(n) * cosine(m + n - shift);
     let face = |m: usize| cosine(m + n - shift) + cosine(m + n + 1 - shift);
-    std::iter::once(0.0)
-        .chain((1..=n).map(face))
-        .chain((1..=n).map(|m| edge(m % n + 1)))
-        .collect()
+    std::iter::once(0.0).chain((1..=n).map(face)).chain((1..=n).map(|m| edge(m % n + 1))).collect()
 }
 
 fn mask_entries<const N: usize>(
@@ -348,8 +311,7 @@ fn mask_entries<const N: usize>(
     entries: &mut Vec<Entry>,
 ) {
     for (shift, mask) in printed.iter().enumerate() {
-        for (i, (&printed, computed)) in mask.iter().zip(formula_mask(n, shift)).enumerate().skip(1)
-        {
+        for (i, (&printed, computed)) in mask.iter().zip(formula_mask(n, shift)).enumerate().skip(1) {
             entries.push(Entry {
                 place,
                 valence: n,
@@ -361,25 +323,14 @@ fn mask_entries<const N: usize>(
     }
 }
 
-fn orientation(
-    place: &'static str,
-    n: usize,
-    masks: &'static str,
-    [first, second]: &[Vec<f64>; 2],
-) -> Orientation {
+fn orientation(place: &'static str, n: usize, masks: &'static str, [first, second]: &[Vec<f64>; 2]) -> Orientation {
     let angle = |turns: f64| DVec2::from_angle(TAU * turns / n as f64);
     let point = |i: usize| match i {
         0 => DVec2::ZERO,
         _ if i <= n => 2f64.sqrt() * angle(i as f64 - 0.5),
         _ => angle((i - n) as f64),
     };
-    let apply =
-        |mask: &[f64]| -> DVec2 { mask.iter().enumerate().map(|(i, &w)| w * point(i)).sum() };
+    let apply = |mask: &[f64]| -> DVec2 { mask.iter().enumerate().map(|(i, &w)| w * point(i)).sum() };
     let (a, b) = (apply(first), apply(second));
-    Orientation {
-        place,
-        valence: n,
-        masks,
-        sine: a.perp_dot(b) / (a.length() * b.length()),
-    }
+    Orientation { place, valence: n, masks, sine: a.perp_dot(b) / (a.length() * b.length()) }
 }

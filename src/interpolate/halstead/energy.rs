@@ -30,10 +30,7 @@ pub struct Weights {
 
 impl Default for Weights {
     fn default() -> Self {
-        Weights {
-            thin_plate: 1.0,
-            membrane: 1.0,
-        }
+        Weights { thin_plate: 1.0, membrane: 1.0 }
     }
 }
 
@@ -98,10 +95,7 @@ impl Fairness {
                     for &(column, ref other) in &local {
                         let form = |gram: &Gram| -> f64 {
                             let rows = own.iter().zip(gram);
-                            rows.map(|(a, g)| {
-                                a * other.iter().zip(g).map(|(b, g)| b * g).sum::<f64>()
-                            })
-                            .sum()
+                            rows.map(|(a, g)| a * other.iter().zip(g).map(|(b, g)| b * g).sum::<f64>()).sum()
                         };
                         let values = [16.0 * form(&thin_plate), form(&membrane)];
                         triplets.push((row, column, values));
@@ -110,12 +104,7 @@ impl Fairness {
             }
         }
         let [thin_plate, membrane] = sum_triplets(fine.len(), &triplets);
-        Ok(Fairness {
-            fine,
-            topology,
-            thin_plate,
-            membrane,
-        })
+        Ok(Fairness { fine, topology, thin_plate, membrane })
     }
 
     /// The energies of a surface, from its control points at the fine level.
@@ -128,10 +117,7 @@ impl Fairness {
             let rows = points.iter().enumerate();
             rows.map(|(i, p)| p.dot(k.row_times(i, points))).sum()
         };
-        Energies {
-            thin_plate: form(&self.thin_plate),
-            membrane: form(&self.membrane),
-        }
+        Energies { thin_plate: form(&self.thin_plate), membrane: form(&self.membrane) }
     }
 
     /// The energies of the surface of a control mesh with the given mesh's own connectivity.
@@ -186,21 +172,15 @@ fn patch_grams() -> [Gram; 2] {
         std::array::from_fn(|a| std::array::from_fn(|b| entry(place(a), place(b))))
     };
     [
-        form(&|[i, j], [k, l]| {
-            g2[i][k] * g0[j][l] + 2.0 * g1[i][k] * g1[j][l] + g0[i][k] * g2[j][l]
-        }),
+        form(&|[i, j], [k, l]| g2[i][k] * g0[j][l] + 2.0 * g1[i][k] * g1[j][l] + g0[i][k] * g2[j][l]),
         form(&|[i, j], [k, l]| g1[i][k] * g0[j][l] + g0[i][k] * g1[j][l]),
     ]
 }
 
 /// For corner k of a face, the numbers of its vertex and of the three points around it outside the face: backwards
 /// along u, diagonally, backwards along v, in the frame whose u is the corner's leaving edge.
-const PLACES: [[usize; 4]; 4] = [
-    [4 + 1, 1, 0, 4],
-    [8 + 1, 8, 12, 12 + 1],
-    [8 + 2, 12 + 2, 12 + 3, 8 + 3],
-    [4 + 2, 4 + 3, 3, 2],
-];
+const PLACES: [[usize; 4]; 4] =
+    [[4 + 1, 1, 0, 4], [8 + 1, 8, 12, 12 + 1], [8 + 2, 12 + 2, 12 + 3, 8 + 3], [4 + 2, 4 + 3, 3, 2]];
 
 /// The 16 control points of face `f` if its patch is a bicubic spline: four corners of valence 4, quads all around.
 pub(super) fn regular_patch(faces: &Faces, topology: &Topology, f: usize) -> Option<[u32; 16]> {
@@ -213,9 +193,7 @@ pub(super) fn regular_patch(faces: &Faces, topology: &Topology, f: usize) -> Opt
     for (c, places) in range.zip(&PLACES) {
         let v = corners[c];
         let star = topology.incidence.corners_at(v as usize);
-        let quads = star
-            .iter()
-            .all(|&c| faces.range(topology.incidence.face_of(c)).len() == 4);
+        let quads = star.iter().all(|&c| faces.range(topology.incidence.face_of(c)).len() == 4);
         if star.len() != 4 || !quads {
             return None;
         }
@@ -241,11 +219,7 @@ struct StepMasks<'a> {
 
 impl<'a> StepMasks<'a> {
     fn new(mesh: &'a Mesh, topology: &'a Topology) -> Self {
-        StepMasks {
-            mesh,
-            topology,
-            edges: topology.edge_sides().collect(),
-        }
+        StepMasks { mesh, topology, edges: topology.edge_sides().collect() }
     }
 
     /// Calls `add` with the old vertices and weights of new vertex `w`, numbered as the refinement numbers it.
@@ -346,10 +320,7 @@ mod tests {
 
     fn energy(gram: &Gram, f: impl Fn(f64, f64) -> f64) -> f64 {
         let x: Vec<f64> = (0..16).map(|a| f((a / 4) as f64, (a % 4) as f64)).collect();
-        (0..16)
-            .flat_map(|a| (0..16).map(move |b| (a, b)))
-            .map(|(a, b)| x[a] * gram[a][b] * x[b])
-            .sum()
+        (0..16).flat_map(|a| (0..16).map(move |b| (a, b))).map(|(a, b)| x[a] * gram[a][b] * x[b]).sum()
     }
 
     #[test]
@@ -370,12 +341,7 @@ mod tests {
     #[test]
     fn line_grams_sum_to_the_known_autocorrelations() {
         let known = [
-            [
-                2416.0 / 5040.0,
-                1191.0 / 5040.0,
-                120.0 / 5040.0,
-                1.0 / 5040.0,
-            ],
+            [2416.0 / 5040.0, 1191.0 / 5040.0, 120.0 / 5040.0, 1.0 / 5040.0],
             [2.0 / 3.0, -1.0 / 8.0, -1.0 / 5.0, -1.0 / 120.0],
             [8.0 / 3.0, -3.0 / 2.0, 0.0, 1.0 / 6.0],
         ];
@@ -392,19 +358,11 @@ mod tests {
     /// faces lie.
     #[test]
     fn the_form_is_the_sum_over_the_regular_patches_of_the_next_level() {
-        for name in [
-            "torus:4x5",
-            "cube",
-            "icosahedron",
-            "irregular-poly:30",
-            "star:7",
-        ] {
+        for name in ["torus:4x5", "cube", "icosahedron", "irregular-poly:30", "star:7"] {
             let mut mesh = builtin::builtin(name).expect("a built-in mesh");
             noise::add_noise(&mut mesh, 0.1, 5);
             let fairness = Fairness::new(&mesh).expect("closed");
-            let finer = Refinement::CatmullClark
-                .refine_n(&mesh, LEVELS + 1)
-                .expect("closed");
+            let finer = Refinement::CatmullClark.refine_n(&mesh, LEVELS + 1).expect("closed");
             let topology = Topology::new(&finer.faces, finer.len());
             let grams = patch_grams();
             let mut expected = [0.0; 2];
@@ -425,10 +383,7 @@ mod tests {
             }
             let found = fairness.energies_of(&mesh).expect("closed");
             assert!(patches > finer.faces.len() / 2);
-            assert!(
-                (found.thin_plate / (16.0 * expected[0]) - 1.0).abs() < 1e-11,
-                "{name}"
-            );
+            assert!((found.thin_plate / (16.0 * expected[0]) - 1.0).abs() < 1e-11, "{name}");
             assert!((found.membrane / expected[1] - 1.0).abs() < 1e-11, "{name}");
         }
     }

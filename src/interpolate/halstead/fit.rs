@@ -55,12 +55,7 @@ const MISS: f64 = 1e-8;
 /// # Panics
 /// If there is not one point, and one entry in each list of `wishes`, for each original vertex of the mesh that
 /// `fairness` was made of.
-pub fn fit(
-    fairness: &Fairness,
-    points: &[DVec3],
-    wishes: &Constraints,
-    weights: Weights,
-) -> Result<Fit> {
+pub fn fit(fairness: &Fairness, points: &[DVec3], wishes: &Constraints, weights: Weights) -> Result<Fit> {
     let valid = |w: f64| w >= 0.0 && w.is_finite();
     if !(valid(weights.thin_plate) && valid(weights.membrane) && weights.membrane > 0.0) {
         return Err(Error::Computation(format!(
@@ -69,10 +64,7 @@ pub fn fit(
             weights.thin_plate, weights.membrane
         )));
     }
-    assert!(
-        points.len() < fairness.fine.len(),
-        "the given points, not the fine ones"
-    );
+    assert!(points.len() < fairness.fine.len(), "the given points, not the fine ones");
     wishes.check(points.len())?;
     if wishes.handles.is_some() {
         return Err(Error::Computation(
@@ -84,9 +76,7 @@ pub fn fit(
     require_anchors(fairness, wishes, points.len())?;
     let normals = wishes.normals.map(unit_normals).transpose()?;
     let normals = normals.filter(|n| n.iter().any(Option::is_some));
-    let chosen: Vec<usize> = (0..points.len())
-        .filter(|&v| wishes.is_interpolated(v))
-        .collect();
+    let chosen: Vec<usize> = (0..points.len()).filter(|&v| wishes.is_interpolated(v)).collect();
     let rings = Rings::new(fairness, points.len());
     let x = match normals {
         None => by_points(fairness, &rings, points, &chosen, weights)?,
@@ -100,9 +90,7 @@ pub fn fit(
         let limit: DVec3 = terms.map(|&(j, w)| w * mesh.positions[j as usize]).sum();
         tally.error(points[v] - limit);
     });
-    let size = points
-        .iter()
-        .fold(0.0f64, |a, p| a.max(p.abs().max_element()));
+    let size = points.iter().fold(0.0f64, |a, p| a.max(p.abs().max_element()));
     if !(totals.errors.max <= MISS * size && size.is_finite()) {
         let what = if totals.errors.max.is_finite() {
             "the system is too ill-conditioned; raise the membrane weight"
@@ -114,11 +102,7 @@ pub fn fit(
             totals.errors.max
         )));
     }
-    Ok(Fit {
-        energies: fairness.energies(&mesh.positions),
-        mesh,
-        errors: totals.errors,
-    })
+    Ok(Fit { energies: fairness.energies(&mesh.positions), mesh, errors: totals.errors })
 }
 
 /// Every component needs a point that holds it.
@@ -153,10 +137,7 @@ impl Rings {
     fn new(fairness: &Fairness, originals: usize) -> Self {
         let (faces, topology) = (&fairness.fine.faces, &fairness.topology);
         let mut star = Vec::new();
-        let mut rings = Rings {
-            limits: Vec::with_capacity(originals),
-            tangents: Vec::with_capacity(originals),
-        };
+        let mut rings = Rings { limits: Vec::with_capacity(originals), tangents: Vec::with_capacity(originals) };
         for v in 0..originals {
             topology.star(faces, v, &mut star);
             rings.limits.push(limit_row(faces, topology, v, &star));
@@ -242,9 +223,7 @@ fn by_normals(
         }
         let Some(normal) = normals[v] else { continue };
         for tangent in &rings.tangents[v] {
-            let terms = tangent
-                .iter()
-                .flat_map(|&(j, w)| (0..3).map(move |a| (3 * j + a, w * normal[a as usize])));
+            let terms = tangent.iter().flat_map(|&(j, w)| (0..3).map(move |a| (3 * j + a, w * normal[a as usize])));
             kkt.constraint(terms);
             right.push(DVec3::ZERO);
         }
@@ -262,10 +241,7 @@ struct Kkt {
 
 impl Kkt {
     fn new(unknowns: usize) -> Self {
-        Kkt {
-            unknowns,
-            rows: vec![Row::new(); unknowns],
-        }
+        Kkt { unknowns, rows: vec![Row::new(); unknowns] }
     }
 
     /// Writes K for the unknowns of one axis; `unknowns` is once or three times the number of fine points.
@@ -276,12 +252,9 @@ impl Kkt {
         for i in 0..n {
             let entries = thin.row(i).zip(membrane.row_values(i));
             let row = &mut self.rows[i * stride as usize + axis as usize];
-            row.extend(entries.map(|((j, t), m)| {
-                (
-                    stride * j as u32 + axis,
-                    weights.thin_plate * t + weights.membrane * m,
-                )
-            }));
+            row.extend(
+                entries.map(|((j, t), m)| (stride * j as u32 + axis, weights.thin_plate * t + weights.membrane * m)),
+            );
         }
     }
 
@@ -344,11 +317,7 @@ impl Kkt {
                 *r = right[i] - matrix.row_times(i, &x);
                 r.abs().max_element()
             };
-            let largest = rest
-                .par_iter_mut()
-                .enumerate()
-                .map(residual)
-                .reduce(|| 0.0, f64::max);
+            let largest = rest.par_iter_mut().enumerate().map(residual).reduce(|| 0.0, f64::max);
             // The residual falls by a constant factor until it is rounding, and then no more.
             if largest.is_nan() || largest > 0.5 * smallest {
                 break;

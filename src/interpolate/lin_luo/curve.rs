@@ -65,12 +65,7 @@ pub fn refine(points: &[DVec3], alpha: &[f64], ends: Ends) -> (Vec<DVec3>, Vec<f
 ///
 /// # Panics
 /// As [`refine`].
-pub fn refine_n(
-    points: &[DVec3],
-    alpha: &[f64],
-    ends: Ends,
-    levels: usize,
-) -> (Vec<DVec3>, Vec<f64>) {
+pub fn refine_n(points: &[DVec3], alpha: &[f64], ends: Ends, levels: usize) -> (Vec<DVec3>, Vec<f64>) {
     let start = (points.to_vec(), alpha.to_vec());
     (0..levels).fold(start, |(points, alpha), _| refine(&points, &alpha, ends))
 }
@@ -79,9 +74,7 @@ pub fn refine_n(
 /// divided by the factorial: they approach derivatives).
 pub fn divided_differences(points: &[DVec3], order: usize, spacing: f64) -> Vec<DVec3> {
     let n = points.len();
-    (0..order).fold(points.to_vec(), |p, _| {
-        (0..n).map(|i| (p[(i + 1) % n] - p[i]) / spacing).collect()
-    })
+    (0..order).fold(points.to_vec(), |p, _| (0..n).map(|i| (p[(i + 1) % n] - p[i]) / spacing).collect())
 }
 
 /// The largest jump between neighbouring divided differences of `order` at each of the levels 0 to `levels`, with
@@ -122,11 +115,7 @@ pub const C1_RANGE: (f64, f64) = (-2.0, 6.0);
 pub fn fixed_point_radius(alpha: f64) -> f64 {
     let (trace, determinant) = (1.0 - alpha / 4.0, (2.0 - alpha) / 8.0);
     let discriminant = trace * trace / 4.0 - determinant;
-    let even = if discriminant >= 0.0 {
-        (trace / 2.0).abs() + discriminant.sqrt()
-    } else {
-        determinant.sqrt()
-    };
+    let even = if discriminant >= 0.0 { (trace / 2.0).abs() + discriminant.sqrt() } else { determinant.sqrt() };
     even.max(0.25)
 }
 
@@ -152,14 +141,5 @@ pub fn jump_norm(alpha: f64, steps: u32) -> f64 {
         iterated = longer;
     }
     let stride = 1 << steps;
-    (0..stride)
-        .map(|r| {
-            iterated
-                .iter()
-                .skip(r)
-                .step_by(stride)
-                .map(|w| w.abs())
-                .sum()
-        })
-        .fold(0.0, f64::max)
+    (0..stride).map(|r| iterated.iter().skip(r).step_by(stride).map(|w| w.abs()).sum()).fold(0.0, f64::max)
 }

@@ -75,9 +75,8 @@ pub fn limits(mesh: &Mesh, alpha: &[f64]) -> Result<Limits> {
     for v in 0..mesh.len() {
         present[valence(v)] = true;
     }
-    let rounds: Vec<Option<Round>> = (0..=largest)
-        .map(|n| present[n].then(|| Round::new(n)).transpose())
-        .collect::<Result<_>>()?;
+    let rounds: Vec<Option<Round>> =
+        (0..=largest).map(|n| present[n].then(|| Round::new(n)).transpose()).collect::<Result<_>>()?;
     let at = |v: usize, work: &mut Work| -> Result<(DVec3, DVec3)> {
         let n = valence(v);
         let Some(round) = &rounds[n] else {
@@ -94,10 +93,8 @@ pub fn limits(mesh: &Mesh, alpha: &[f64]) -> Result<Limits> {
         let (moved, normal) = round.follow(n, work);
         Ok((origin + moved, normal))
     };
-    let found: Vec<(DVec3, DVec3)> = (0..mesh.len())
-        .into_par_iter()
-        .map_init(Work::default, |work, v| at(v, work))
-        .collect::<Result<_>>()?;
+    let found: Vec<(DVec3, DVec3)> =
+        (0..mesh.len()).into_par_iter().map_init(Work::default, |work, v| at(v, work)).collect::<Result<_>>()?;
     let (positions, normals) = found.into_iter().unzip();
     Ok(Limits { positions, normals })
 }
@@ -164,14 +161,12 @@ impl Round {
             }
             let star = self.found.iter().map(|&i| i as usize);
             work.star.clear();
-            work.star
-                .extend(star.map(|i| (work.points[i], work.alpha[i])));
+            work.star.extend(star.map(|i| (work.points[i], work.alpha[i])));
             let step = work.star[0].0;
             moved += scale * step;
             scale /= 3.0;
             work.points.clear();
-            work.points
-                .extend(work.star.iter().map(|(p, _)| 3.0 * (*p - step)));
+            work.points.extend(work.star.iter().map(|(p, _)| 3.0 * (*p - step)));
             work.alpha.clear();
             work.alpha.extend(work.star.iter().map(|(_, a)| a));
             if round == ROUNDS / 2 || round >= ROUNDS - 1 {
@@ -183,9 +178,8 @@ impl Round {
         }
         let [before, normal] = normals;
         let last = height(&work.points, normal);
-        let plane = normal != DVec3::ZERO
-            && angle(before, normal) < STEADY
-            && (last < FLAT || last < FLATTER * flatness);
+        let plane =
+            normal != DVec3::ZERO && angle(before, normal) < STEADY && (last < FLAT || last < FLATTER * flatness);
         (moved, if plane { normal } else { DVec3::ZERO })
     }
 }

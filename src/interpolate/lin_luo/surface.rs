@@ -46,9 +46,7 @@ pub fn volume(mesh: &Mesh) -> f64 {
     let at = |v: u32| mesh.positions[v as usize] - origin;
     let fan = |face: &[u32]| -> f64 {
         let pairs = face.windows(2).skip(1);
-        pairs
-            .map(|w| at(face[0]).dot(at(w[0]).cross(at(w[1]))))
-            .sum()
+        pairs.map(|w| at(face[0]).dot(at(w[0]).cross(at(w[1])))).sum()
     };
     mesh.faces.iter().map(fan).sum::<f64>() / 6.0
 }
@@ -122,11 +120,7 @@ pub fn largest_fold(mesh: &Mesh, topology: &Topology) -> f64 {
     let fold = |c: u32| {
         let across = topology.twin(c)?;
         let [n, m] = [c, across].map(|c| normals[topology.incidence.face_of(c)]);
-        Some(if n == DVec3::ZERO || m == DVec3::ZERO {
-            FRAC_PI_2
-        } else {
-            angle(n, m)
-        })
+        Some(if n == DVec3::ZERO || m == DVec3::ZERO { FRAC_PI_2 } else { angle(n, m) })
     };
     topology.edge_sides().filter_map(fold).fold(0.0, f64::max)
 }

@@ -44,19 +44,9 @@ fn every_mesh_is_valid_and_outward_with_the_promised_counts() {
         assert!(report.is_valid(), "{name}: {}", report.summary_line());
         assert!(report.remarks.is_empty(), "{name}: {:?}", report.remarks);
         let c = report.counts.unwrap();
-        let found = (
-            c.vertices,
-            c.faces,
-            c.euler_characteristic,
-            c.min_valence,
-            c.max_valence,
-        );
+        let found = (c.vertices, c.faces, c.euler_characteristic, c.min_valence, c.max_valence);
         assert_eq!(found, (v, f, euler, min, max), "{name}");
-        assert_eq!(
-            c.components,
-            if name == "cubes:5" { 5 } else { 1 },
-            "{name}"
-        );
+        assert_eq!(c.components, if name == "cubes:5" { 5 } else { 1 }, "{name}");
         assert!(volume(&mesh) > 0.0, "{name}");
     }
 }
@@ -71,28 +61,16 @@ fn volumes_are_the_known_ones() {
         ("cube", 8.0),
         ("tetrahedron", 8.0 / 3.0),
         ("octahedron", 4.0 / 3.0),
-        (
-            "icosahedron",
-            5.0 / 12.0 * (3.0 + 5f64.sqrt()) * icosahedron_edge.powi(3),
-        ),
-        (
-            "dodecahedron",
-            (15.0 + 7.0 * 5f64.sqrt()) / 4.0 * dodecahedron_edge.powi(3),
-        ),
+        ("icosahedron", 5.0 / 12.0 * (3.0 + 5f64.sqrt()) * icosahedron_edge.powi(3)),
+        ("dodecahedron", (15.0 + 7.0 * 5f64.sqrt()) / 4.0 * dodecahedron_edge.powi(3)),
         // Edge √2.
-        (
-            "truncated-octahedron",
-            8.0 * 2f64.sqrt() * 2f64.sqrt().powi(3),
-        ),
+        ("truncated-octahedron", 8.0 * 2f64.sqrt() * 2f64.sqrt().powi(3)),
         ("prism:4", 4.0),
         ("bipyramid:6", 3f64.sqrt()),
         ("cubes:3", 24.0),
     ] {
         let found = volume(&builtin(name).unwrap()) / 6.0;
-        assert!(
-            (found - expected).abs() < 1e-14 * expected,
-            "{name}: {found} {expected}"
-        );
+        assert!((found - expected).abs() < 1e-14 * expected, "{name}: {found} {expected}");
     }
     // Fine meshes approach the sphere, 4π/3, and the torus of radii 2 and 1, 4π², quadratically.
     for (coarse, fine, limit) in [
@@ -109,14 +87,7 @@ fn volumes_are_the_known_ones() {
 
 #[test]
 fn spheres_and_stars_lie_on_the_unit_sphere() {
-    for name in [
-        "icosahedron",
-        "dodecahedron",
-        "icosphere:3",
-        "quad-sphere:3",
-        "star:8",
-        "irregular-tri:300",
-    ] {
+    for name in ["icosahedron", "dodecahedron", "icosphere:3", "quad-sphere:3", "star:8", "irregular-tri:300"] {
         for p in builtin(name).unwrap().positions {
             assert!((p.length() - 1.0).abs() < 4.0 * f64::EPSILON, "{name}");
         }
@@ -135,10 +106,7 @@ fn grids_are_numbered_row_by_row() {
             let back = ((n - step.0) % n, (m - step.1) % m);
             let allowed = [(1, 0), (0, 1), (1, 1)];
             let allowed = &allowed[..if diagonal { 3 } else { 2 }];
-            assert!(
-                allowed.contains(&step) || allowed.contains(&back),
-                "{step:?}"
-            );
+            assert!(allowed.contains(&step) || allowed.contains(&back), "{step:?}");
         }
     }
 }
@@ -189,14 +157,8 @@ fn irregular_meshes_have_exactly_the_vertices_asked_for() {
     };
     assert!(counts("irregular-tri:2000").max_valence > 8);
     assert_eq!(counts("irregular-tri:2000").min_valence, 3);
-    assert_eq!(
-        builtin("irregular-tri:200").unwrap(),
-        builtin("irregular-tri:200:1").unwrap()
-    );
-    assert_ne!(
-        builtin("irregular-tri:200").unwrap(),
-        builtin("irregular-tri:200:2").unwrap()
-    );
+    assert_eq!(builtin("irregular-tri:200").unwrap(), builtin("irregular-tri:200:1").unwrap());
+    assert_ne!(builtin("irregular-tri:200").unwrap(), builtin("irregular-tri:200:2").unwrap());
     let sizes = builtin("irregular-poly:2000").unwrap();
     for n in 3..=8 {
         assert!(sizes.faces.iter().any(|f| f.len() == n), "{n}-gons");
@@ -239,10 +201,7 @@ fn wrong_names_and_parameters_say_what_is_right() {
 #[test]
 fn every_listed_name_can_be_built() {
     for (pattern, _) in NAMES {
-        let name = (pattern.split('[').next().unwrap())
-            .replace("NxM", "4x5")
-            .replace(":N", ":30")
-            .replace(":K", ":3");
+        let name = (pattern.split('[').next().unwrap()).replace("NxM", "4x5").replace(":N", ":30").replace(":K", ":3");
         assert!(builtin(&name).is_ok(), "{name}");
     }
 }

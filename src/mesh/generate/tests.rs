@@ -55,9 +55,7 @@ fn splits_add_up() {
         assert_eq!(split.vertices, c.vertices + c.edges);
         assert_eq!((split.faces, split.components), (4 * c.faces, c.components));
         // Old vertices keep their valence, new ones have six.
-        let (old, new) = [&mesh, &fine]
-            .map(|m| Incidence::new(&m.faces, m.len()))
-            .into();
+        let (old, new) = [&mesh, &fine].map(|m| Incidence::new(&m.faces, m.len())).into();
         for v in 0..fine.len() {
             let expected = if v < mesh.len() { old.face_count(v) } else { 6 };
             assert_eq!(new.face_count(v), expected);
@@ -80,10 +78,7 @@ fn the_dual_of_the_dual_is_the_mesh_again() {
         let c = counts(&mesh, seed);
         let dual_mesh = dual(&mesh);
         let d = counts(&dual_mesh, seed);
-        assert_eq!(
-            (d.vertices, d.edges, d.faces),
-            (c.faces, c.edges, c.vertices)
-        );
+        assert_eq!((d.vertices, d.edges, d.faces), (c.faces, c.edges, c.vertices));
         assert_eq!((d.min_valence, d.max_valence), (3, 3));
         let again = dual(&dual_mesh);
         // Up to the corner at which a face starts.
@@ -123,10 +118,7 @@ fn renumbering_and_shuffling_keep_the_mesh() {
     for (k, &v) in order.iter().enumerate() {
         assert_eq!(moved.positions[k], mesh.positions[v as usize]);
     }
-    assert_eq!(
-        permute_vertices(&moved, &crate::mesh::order::inverse(&order)),
-        mesh
-    );
+    assert_eq!(permute_vertices(&moved, &crate::mesh::order::inverse(&order)), mesh);
 
     // As a set of cyclic sequences the faces are the same; as a sequence they are not.
     let canonical = |mesh: &Mesh| {
@@ -173,10 +165,7 @@ fn flips_on_a_star_shaped_sphere_leave_no_fold() {
     let mesh = builtin::irregular_tri(800, 4);
     for face in mesh.faces.iter() {
         let [a, b, c] = [0, 1, 2].map(|k| mesh.positions[face[k] as usize]);
-        assert!(
-            a.dot(b.cross(c)) > 0.0,
-            "seen from the centre the face is turned round"
-        );
+        assert!(a.dot(b.cross(c)) > 0.0, "seen from the centre the face is turned round");
     }
 }
 
@@ -220,11 +209,7 @@ fn ring_spheres_of_every_size_are_even() {
 fn irregular_quads_exist_for_every_size_and_seed_tried() {
     for n in (26..60).step_by(2) {
         for seed in 0..500 {
-            assert_eq!(
-                builtin::irregular_quad(n, seed).len(),
-                n,
-                "n = {n}, seed {seed}"
-            );
+            assert_eq!(builtin::irregular_quad(n, seed).len(), n, "n = {n}, seed {seed}");
         }
     }
 }

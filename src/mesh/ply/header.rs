@@ -94,11 +94,7 @@ impl Scalar {
 impl Header {
     pub fn read(s: &mut Scanner, path: &Path) -> Result<Self> {
         if s.token() != b"ply" || !s.at_line_end() {
-            return Err(Error::parse(
-                path,
-                Some(1),
-                "not a PLY file: its first line is not \"ply\"",
-            ));
+            return Err(Error::parse(path, Some(1), "not a PLY file: its first line is not \"ply\""));
         }
         // Only then may `end_header` and a single '\r' be followed by data that start with the byte of '\n'.
         let lone_returns = matches!(s.rest(), [b'\r', next, ..] if *next != b'\n');
@@ -160,9 +156,7 @@ fn read_format(s: &mut Scanner) -> Result<Format> {
         b"binary_little_endian" => Format::BinaryLittleEndian,
         b"binary_big_endian" => Format::BinaryBigEndian,
         _ => {
-            return Err(
-                s.unexpected("a PLY format (ascii, binary_little_endian or binary_big_endian)")
-            );
+            return Err(s.unexpected("a PLY format (ascii, binary_little_endian or binary_big_endian)"));
         }
     };
     s.token();
@@ -181,23 +175,16 @@ fn read_element(s: &mut Scanner) -> Result<Element> {
         b"vertex" => Kind::Vertex,
         b"face" => Kind::Face,
         b"tristrips" => {
-            return Err(s.error(
-                "faces as triangle strips are not read: convert the file to single faces (element face)",
-            ));
+            return Err(
+                s.error("faces as triangle strips are not read: convert the file to single faces (element face)")
+            );
         }
         _ => Kind::Other,
     };
     s.skip_blanks();
     let name = String::from_utf8_lossy(name).escape_debug().to_string();
-    let count = s
-        .unsigned()
-        .ok_or_else(|| s.unexpected(format_args!("the number of elements {name}")))?;
-    Ok(Element {
-        name,
-        kind,
-        count,
-        properties: Vec::new(),
-    })
+    let count = s.unsigned().ok_or_else(|| s.unexpected(format_args!("the number of elements {name}")))?;
+    Ok(Element { name, kind, count, properties: Vec::new() })
 }
 
 fn read_property(s: &mut Scanner, element: &mut Element) -> Result<()> {
@@ -223,10 +210,9 @@ fn read_property(s: &mut Scanner, element: &mut Element) -> Result<()> {
     }
     let name = s.token();
     let keep = match (element.kind, name) {
-        (Kind::Vertex, _) if length.is_none() => COORDINATES
-            .iter()
-            .position(|c| c.as_bytes() == name)
-            .map_or(Keep::No, Keep::Coordinate),
+        (Kind::Vertex, _) if length.is_none() => {
+            COORDINATES.iter().position(|c| c.as_bytes() == name).map_or(Keep::No, Keep::Coordinate)
+        }
         (Kind::Face, b"vertex_indices" | b"vertex_index") if is_list => {
             if scalar.is_float() {
                 return Err(s.error("the vertices of a face must be whole numbers"));
@@ -249,8 +235,8 @@ fn read_property(s: &mut Scanner, element: &mut Element) -> Result<()> {
 
 fn read_type(s: &mut Scanner) -> Result<Scalar> {
     s.skip_blanks();
-    let scalar = Scalar::of(s.peek_token())
-        .ok_or_else(|| s.unexpected("a PLY type (char, uchar, short, …, float, double)"))?;
+    let scalar =
+        Scalar::of(s.peek_token()).ok_or_else(|| s.unexpected("a PLY type (char, uchar, short, …, float, double)"))?;
     s.token();
     Ok(scalar)
 }
@@ -263,10 +249,7 @@ fn check(elements: &mut [Element]) -> std::result::Result<(), String> {
         .find(|e| e.kind == Kind::Vertex)
         .ok_or("the header announces no element vertex: not a mesh")?;
     if let Some(missing) = (0..3).find(|&k| !keeps(vertex, Keep::Coordinate(k))) {
-        return Err(format!(
-            "the element vertex has no property {}: a mesh needs x, y and z",
-            COORDINATES[missing]
-        ));
+        return Err(format!("the element vertex has no property {}: a mesh needs x, y and z", COORDINATES[missing]));
     }
     if !(3..6).all(|k| keeps(vertex, Keep::Coordinate(k))) {
         for property in &mut vertex.properties {

@@ -143,9 +143,7 @@ impl Values for Binary<'_> {
         let start = self.at;
         // All whole numbers of the format are exact as doubles; none of them reaches 2³².
         let value = self.number(scalar)?;
-        let fitting = (value >= 0.0)
-            .then(|| T::try_from(value as u64).ok())
-            .flatten();
+        let fitting = (value >= 0.0).then(|| T::try_from(value as u64).ok()).flatten();
         if fitting.is_none() {
             self.at = start;
         }
@@ -153,10 +151,8 @@ impl Values for Binary<'_> {
     }
 
     fn skip(&mut self, scalar: Scalar, count: u64) -> Option<()> {
-        let length = usize::try_from(count)
-            .ok()
-            .and_then(|n| n.checked_mul(scalar.bytes()))
-            .filter(|&n| n <= self.bytes_left());
+        let length =
+            usize::try_from(count).ok().and_then(|n| n.checked_mul(scalar.bytes())).filter(|&n| n <= self.bytes_left());
         self.at += length.unwrap_or(self.bytes_left());
         length.map(|_| ())
     }

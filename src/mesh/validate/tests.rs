@@ -36,9 +36,7 @@ fn an_index_out_of_range_comes_first_and_hides_the_topology_only() {
     let (vertex_lines, face_lines) = ([2, 3, 4, 5, 6], [7, 8, 9, 11]);
     let report = validate(&m, Some((&vertex_lines, &face_lines)), Boundary::Refuse);
     assert!(report.topology.is_none() && report.counts.is_none());
-    let places: Vec<_> = (report.defects.iter())
-        .map(|d| (d.kind, d.face, d.vertex, d.line))
-        .collect();
+    let places: Vec<_> = (report.defects.iter()).map(|d| (d.kind, d.face, d.vertex, d.line)).collect();
     use DefectKind::*;
     assert_eq!(
         places,
@@ -71,55 +69,23 @@ fn empty_meshes_say_what_is_missing() {
     use DefectKind::*;
     assert_eq!(kinds(&mesh(0, &[])), [(NoVertices, 1), (NoFaces, 1)]);
     assert_eq!(kinds(&mesh(3, &[])), [(NoFaces, 1)]);
-    assert!(
-        refuse(&mesh(3, &[]))
-            .summary_line()
-            .starts_with("no faces; ")
-    );
-    assert_eq!(
-        kinds(&mesh(0, &[&[0, 1, 2]])),
-        [(NoVertices, 1), (IndexOutOfRange, 3)]
-    );
+    assert!(refuse(&mesh(3, &[])).summary_line().starts_with("no faces; "));
+    assert_eq!(kinds(&mesh(0, &[&[0, 1, 2]])), [(NoVertices, 1), (IndexOutOfRange, 3)]);
 }
 
 #[test]
 fn faces_of_two_one_and_no_corners_are_defects_and_do_no_harm() {
-    let m = mesh(
-        4,
-        &[
-            &[0, 1, 2],
-            &[0, 3, 1],
-            &[1, 3, 2],
-            &[2, 3, 0],
-            &[1, 2],
-            &[3],
-            &[],
-        ],
-    );
+    let m = mesh(4, &[&[0, 1, 2], &[0, 3, 1], &[1, 3, 2], &[2, 3, 0], &[1, 2], &[3], &[]]);
     let report = refuse(&m);
-    let small: Vec<_> = (report.defects.iter())
-        .filter(|d| d.kind == DefectKind::TooFewCorners)
-        .map(|d| (d.face, d.count))
-        .collect();
-    assert_eq!(
-        small,
-        [(Some(4), Some(2)), (Some(5), Some(1)), (Some(6), Some(0))]
-    );
+    let small: Vec<_> =
+        (report.defects.iter()).filter(|d| d.kind == DefectKind::TooFewCorners).map(|d| (d.face, d.count)).collect();
+    assert_eq!(small, [(Some(4), Some(2)), (Some(5), Some(1)), (Some(6), Some(0))]);
 }
 
 #[test]
 fn a_vertex_twice_in_a_row_is_no_edge_defect() {
     // A cone over the square 0123 whose faces at the apex 4 are quads with the apex twice, and its base.
-    let m = mesh(
-        5,
-        &[
-            &[0, 1, 4, 4],
-            &[1, 2, 4, 4],
-            &[2, 3, 4, 4],
-            &[3, 0, 4, 4],
-            &[3, 2, 1, 0],
-        ],
-    );
+    let m = mesh(5, &[&[0, 1, 4, 4], &[1, 2, 4, 4], &[2, 3, 4, 4], &[3, 0, 4, 4], &[3, 2, 1, 0]]);
     let report = refuse(&m);
     assert_eq!(kinds(&report), [(DefectKind::RepeatedVertex, 4)]);
     let counts = report.counts.unwrap();
@@ -135,10 +101,7 @@ fn an_open_mesh_is_refused_or_treated_as_interior() {
     assert!(report.summary_line().contains("--boundary as-interior"));
     let report = validate(&open, None, Boundary::AsInterior);
     assert!(report.is_valid());
-    assert_eq!(
-        report.remarks,
-        ["3 boundary edges in 1 loop: boundary vertices are treated as interior"]
-    );
+    assert_eq!(report.remarks, ["3 boundary edges in 1 loop: boundary vertices are treated as interior"]);
     // Valences count edges: the removed face took no edge away.
     assert_eq!(report.counts.unwrap().min_valence, 5);
     // A single triangle has valence 2 whatever is made of its boundary.
@@ -164,15 +127,10 @@ fn turned_faces_are_found_and_the_fewest_are_named() {
         // An edge is misoriented when just one of its two faces is turned.
         let topology = Topology::new(&base.faces, base.len());
         let is_turned = |c: u32| turned.contains(&topology.incidence.face_of(c));
-        let expected = (topology.edge_sides())
-            .filter(|&c| is_turned(c) != is_turned(topology.twin(c).unwrap()))
-            .count();
+        let expected =
+            (topology.edge_sides()).filter(|&c| is_turned(c) != is_turned(topology.twin(c).unwrap())).count();
         assert_eq!(report.defects.len(), expected);
-        assert!(
-            report
-                .summary_line()
-                .contains("to orient the mesh consistently")
-        );
+        assert!(report.summary_line().contains("to orient the mesh consistently"));
     }
 }
 
@@ -187,60 +145,26 @@ fn a_moebius_band_cannot_be_oriented() {
         .collect();
     let lists: Vec<&[u32]> = band.iter().map(|f| &f[..]).collect();
     let report = refuse(&mesh(2 * n as usize, &lists));
-    assert_eq!(
-        kinds(&report),
-        [
-            (DefectKind::InconsistentOrientation, 1),
-            (DefectKind::BoundaryEdge, 2 * n as usize)
-        ]
-    );
-    assert_eq!(
-        report.orientation.as_ref().unwrap().unorientable_components,
-        1
-    );
+    assert_eq!(kinds(&report), [(DefectKind::InconsistentOrientation, 1), (DefectKind::BoundaryEdge, 2 * n as usize)]);
+    assert_eq!(report.orientation.as_ref().unwrap().unorientable_components, 1);
     assert!(report.summary_line().contains("Möbius"));
 }
 
 #[test]
 fn two_surfaces_in_one_vertex_or_edge_are_not_manifold() {
     // Two tetrahedra that share vertex 0, then edge 0-1.
-    let at_vertex = mesh(
-        7,
-        &[
-            &[0, 1, 2],
-            &[0, 3, 1],
-            &[1, 3, 2],
-            &[2, 3, 0],
-            &[0, 4, 5],
-            &[0, 6, 4],
-            &[4, 6, 5],
-            &[5, 6, 0],
-        ],
-    );
+    let at_vertex =
+        mesh(7, &[&[0, 1, 2], &[0, 3, 1], &[1, 3, 2], &[2, 3, 0], &[0, 4, 5], &[0, 6, 4], &[4, 6, 5], &[5, 6, 0]]);
     let report = refuse(&at_vertex);
     assert_eq!(kinds(&report), [(DefectKind::NonManifoldVertex, 1)]);
     assert_eq!(report.defects[0].vertex, Some(0));
     assert_eq!(report.defects[0].count, Some(2));
-    let at_edge = mesh(
-        6,
-        &[
-            &[0, 1, 2],
-            &[0, 3, 1],
-            &[1, 3, 2],
-            &[2, 3, 0],
-            &[0, 1, 4],
-            &[0, 5, 1],
-            &[1, 5, 4],
-            &[4, 5, 0],
-        ],
-    );
+    let at_edge =
+        mesh(6, &[&[0, 1, 2], &[0, 3, 1], &[1, 3, 2], &[2, 3, 0], &[0, 1, 4], &[0, 5, 1], &[1, 5, 4], &[4, 5, 0]]);
     let report = refuse(&at_edge);
     assert_eq!(kinds(&report), [(DefectKind::NonManifoldEdge, 1)]);
     let edge = &report.defects[0];
-    assert_eq!(
-        (edge.vertex, edge.other_vertex, edge.count),
-        (Some(0), Some(1), Some(4))
-    );
+    assert_eq!((edge.vertex, edge.other_vertex, edge.count), (Some(0), Some(1), Some(4)));
 }
 
 #[test]

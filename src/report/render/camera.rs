@@ -39,11 +39,7 @@ impl View {
     /// above the horizon; orthographic. The front is the side of +z, or of −y if `up` is nearer to the z axis.
     pub fn around(up: DVec3, azimuth: f64, elevation: f64) -> Self {
         let up = up.normalize_or(DVec3::Y);
-        let front = if up.z.abs() > up.y.abs() {
-            DVec3::NEG_Y
-        } else {
-            DVec3::Z
-        };
+        let front = if up.z.abs() > up.y.abs() { DVec3::NEG_Y } else { DVec3::Z };
         let front = front.reject_from_normalized(up).normalize_or(DVec3::X);
         let side = up.cross(front);
         let (sin_a, cos_a) = azimuth.to_radians().sin_cos();
@@ -62,12 +58,10 @@ impl View {
     /// [`Error::Unknown`] for another name.
     pub fn named(name: &str) -> Result<Self> {
         let found = NAMES.iter().find(|(known, _, _)| *known == name);
-        found
-            .map(|&(_, azimuth, elevation)| View::around(DVec3::Y, azimuth, elevation))
-            .ok_or_else(|| {
-                let known = NAMES.map(|(name, _, _)| name).join(", ");
-                Error::Unknown(format!("unknown view \"{name}\": choose one of {known}"))
-            })
+        found.map(|&(_, azimuth, elevation)| View::around(DVec3::Y, azimuth, elevation)).ok_or_else(|| {
+            let known = NAMES.map(|(name, _, _)| name).join(", ");
+            Error::Unknown(format!("unknown view \"{name}\": choose one of {known}"))
+        })
     }
 
     /// The same view with this perspective angle, in degrees.
@@ -116,11 +110,7 @@ impl Camera {
     /// # Errors
     /// No points, one that is not finite, a direction of view without length, an angle out of its range.
     pub fn framing(view: &View, points: &[DVec3], (width, height): (u32, u32)) -> Result<Self> {
-        let refuse = |what: String| {
-            Err(Error::Computation(format!(
-                "cannot place the camera: {what}"
-            )))
-        };
+        let refuse = |what: String| Err(Error::Computation(format!("cannot place the camera: {what}")));
         let back = view.toward_eye.normalize_or_zero();
         let up = view.up.reject_from(back).normalize_or_zero();
         if !back.is_normalized() || !up.is_normalized() {
@@ -139,22 +129,15 @@ impl Camera {
         let (half_width, half_height) = (f64::from(width) / 2.0, f64::from(height) / 2.0);
         let tangent = match view.projection {
             Projection::Orthographic => 0.0,
-            Projection::Perspective { angle } if angle > 0.0 && angle < 180.0 => {
-                (angle / 2.0).to_radians().tan()
-            }
+            Projection::Perspective { angle } if angle > 0.0 && angle < 180.0 => (angle / 2.0).to_radians().tan(),
             Projection::Perspective { angle } => {
-                return refuse(format!(
-                    "a perspective of {angle} degrees; it must lie between 0 and 180"
-                ));
+                return refuse(format!("a perspective of {angle} degrees; it must lie between 0 and 180"));
             }
         };
         // Tangents of the half angles within the margin.
         let shown = 1.0 - 2.0 * MARGIN;
         let shorter = half_width.min(half_height);
-        let reach = (
-            shown * tangent * half_width / shorter,
-            shown * tangent * half_height / shorter,
-        );
+        let reach = (shown * tangent * half_width / shorter, shown * tangent * half_height / shorter);
         // The planes through the sides of the picture touch the points: with the eye at (c, e), |x − c| ≤ (e − z)t
         // is c + et ≥ x + zt and et − c ≥ zt − x.
         let mut bounds = [f64::NEG_INFINITY; 4];
@@ -162,12 +145,7 @@ impl Camera {
         let mut farthest = f64::INFINITY;
         for p in points {
             let (x, y, z) = (p.dot(right), p.dot(up), p.dot(back));
-            let ends = [
-                x + reach.0 * z,
-                reach.0 * z - x,
-                y + reach.1 * z,
-                reach.1 * z - y,
-            ];
+            let ends = [x + reach.0 * z, reach.0 * z - x, y + reach.1 * z, reach.1 * z - y];
             for (bound, end) in bounds.iter_mut().zip(ends) {
                 *bound = bound.max(end);
             }
@@ -191,31 +169,16 @@ impl Camera {
         };
         if camera.is_perspective {
             let eye = (half.0 / reach.0).max(half.1 / reach.1);
-            Ok(Camera {
-                eye: eye.max(nearest + 1e-3 * deep),
-                scale: shorter / tangent,
-                ..camera
-            })
+            Ok(Camera { eye: eye.max(nearest + 1e-3 * deep), scale: shorter / tangent, ..camera })
         } else {
             let scale = shown * (half_width / half.0.max(0.0)).min(half_height / half.1.max(0.0));
-            Ok(Camera {
-                eye: nearest,
-                scale: if scale.is_finite() {
-                    scale
-                } else {
-                    shown * shorter / deep
-                },
-                ..camera
-            })
+            Ok(Camera { eye: nearest, scale: if scale.is_finite() { scale } else { shown * shorter / deep }, ..camera })
         }
     }
 
     /// Where `p` is seen; `None` at the eye and behind it.
     pub fn project(&self, p: DVec3) -> Option<Projected> {
-        let (x, y) = (
-            p.dot(self.right) - self.centre.0,
-            p.dot(self.up) - self.centre.1,
-        );
+        let (x, y) = (p.dot(self.right) - self.centre.0, p.dot(self.up) - self.centre.1);
         let distance = self.eye - p.dot(self.back);
         let (weight, depth) = if self.is_perspective {
             if distance <= 0.0 {
@@ -235,11 +198,7 @@ impl Camera {
 
     /// `direction` with x to the right, y upward, z to the eye.
     pub fn turned(&self, direction: DVec3) -> DVec3 {
-        DVec3::new(
-            direction.dot(self.right),
-            direction.dot(self.up),
-            direction.dot(self.back),
-        )
+        DVec3::new(direction.dot(self.right), direction.dot(self.up), direction.dot(self.back))
     }
 
     /// The length of a pixel at the place of weight `weight`.
@@ -249,11 +208,7 @@ impl Camera {
 
     /// By how much a depth falls where something comes nearer by `length`, to first order.
     pub fn nearer(&self, weight: f64, length: f64) -> f64 {
-        if self.is_perspective {
-            length * weight * weight
-        } else {
-            length
-        }
+        if self.is_perspective { length * weight * weight } else { length }
     }
 }
 
@@ -265,9 +220,7 @@ mod tests {
     const SIZE: (u32, u32) = (300, 200);
 
     fn cube() -> Vec<DVec3> {
-        (0..8)
-            .map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)))
-            .collect()
+        (0..8).map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2))).collect()
     }
 
     #[test]
@@ -300,10 +253,7 @@ mod tests {
         }
         assert!(toward("oblique").min_element() > 0.0);
         let error = View::named("nowhere").unwrap_err().to_string();
-        assert!(
-            error.contains("front, back") && !error.contains('\n'),
-            "{error}"
-        );
+        assert!(error.contains("front, back") && !error.contains('\n'), "{error}");
         // Blender's way: z upward, the front at −y, the right at +x.
         let front = View::around(DVec3::Z, 0.0, 0.0).toward_eye;
         assert!((front - DVec3::NEG_Y).length() < 1e-12);
@@ -314,25 +264,18 @@ mod tests {
     fn perspective_divides_by_the_distance() {
         // A square of side 2 at z = 0, the eye on the z axis, 90° over 200 pixels: within the margin the half
         // height 1 is seen under tan = 0.94, so the eye is at 1/0.94 and a unit there is 100·0.94 pixels.
-        let square = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-            .map(|(x, y)| DVec3::new(x, y, 0.0));
+        let square = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec3::new(x, y, 0.0));
         let view = View::named("front").unwrap().perspective(90.0);
         let camera = Camera::framing(&view, &square, (200, 200)).unwrap();
         let shown = 1.0 - 2.0 * MARGIN;
         let corner = camera.project(square[2]).unwrap();
-        assert!(
-            (corner.x - (100.0 + 100.0 * shown)).abs() < 1e-9,
-            "{corner:?}"
-        );
+        assert!((corner.x - (100.0 + 100.0 * shown)).abs() < 1e-9, "{corner:?}");
         assert!((corner.weight - shown).abs() < 1e-12);
         // Twice as far, half as large.
         let far = camera.project(DVec3::new(1.0, 0.0, -1.0 / shown)).unwrap();
         assert!((far.x - (100.0 + 50.0 * shown)).abs() < 1e-9, "{far:?}");
         assert!(far.depth > corner.depth);
-        assert_eq!(
-            camera.project(DVec3::new(0.0, 0.0, 1.0 / shown + 1e-9)),
-            None
-        );
+        assert_eq!(camera.project(DVec3::new(0.0, 0.0, 1.0 / shown + 1e-9)), None);
         // The step of depth for a step of length, against a difference quotient.
         let step = 1e-6;
         let nearer = camera.project(DVec3::new(0.0, 0.0, step)).unwrap();
@@ -344,17 +287,12 @@ mod tests {
     #[test]
     fn nothing_to_frame_is_an_error() {
         let view = View::named("front").unwrap();
-        let message = |view: &View, points: &[DVec3]| {
-            Camera::framing(view, points, SIZE).unwrap_err().to_string()
-        };
+        let message = |view: &View, points: &[DVec3]| Camera::framing(view, points, SIZE).unwrap_err().to_string();
         assert!(message(&view, &[]).contains("no points"));
         let broken = [DVec3::ZERO, DVec3::new(0.0, f64::NAN, 0.0)];
         assert!(message(&view, &broken).contains("point 1 is not finite"));
         assert!(message(&view.perspective(180.0), &cube()).contains("180 degrees"));
-        let along = View {
-            up: 2.0 * view.toward_eye,
-            ..view
-        };
+        let along = View { up: 2.0 * view.toward_eye, ..view };
         assert!(message(&along, &cube()).contains("not parallel"));
         // A single point is in the middle.
         for view in [view, view.perspective(40.0)] {

@@ -53,9 +53,7 @@ impl ColourMap {
 
     /// The map at [`STEPS`] equal steps.
     pub(super) fn table(self) -> Vec<Colour> {
-        (0..STEPS)
-            .map(|i| self.colour(i as f64 / (STEPS - 1) as f64))
-            .collect()
+        (0..STEPS).map(|i| self.colour(i as f64 / (STEPS - 1) as f64)).collect()
     }
 }
 
@@ -63,11 +61,7 @@ impl ColourMap {
 fn oklab(rgb: [u8; 3]) -> [f64; 3] {
     let [r, g, b] = rgb.map(|c| {
         let c = f64::from(c) / 255.0;
-        if c <= 0.04045 {
-            c / 12.92
-        } else {
-            ((c + 0.055) / 1.055).powf(2.4)
-        }
+        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
     });
     let l = (0.412_221_470_8 * r + 0.536_332_536_3 * g + 0.051_445_992_9 * b).cbrt();
     let m = (0.211_903_498_2 * r + 0.680_699_545_1 * g + 0.107_396_956_6 * b).cbrt();
@@ -89,11 +83,7 @@ fn from_oklab([lightness, a, b]: [f64; 3]) -> [u8; 3] {
         -0.004_196_086_3 * l - 0.703_418_614_7 * m + 1.707_614_701_0 * s,
     ];
     linear.map(|c| {
-        let c = if c <= 0.003_130_8 {
-            12.92 * c
-        } else {
-            1.055 * c.powf(1.0 / 2.4) - 0.055
-        };
+        let c = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
         (255.0 * c).round() as u8 // saturates
     })
 }
@@ -111,28 +101,17 @@ pub struct ColourScale {
 impl ColourScale {
     /// Magnitudes on a linear scale.
     pub fn linear(label: impl Into<String>, range: (f64, f64)) -> Self {
-        ColourScale {
-            label: label.into(),
-            map: ColourMap::Sequential,
-            scale: Scale::Linear,
-            range,
-        }
+        ColourScale { label: label.into(), map: ColourMap::Sequential, scale: Scale::Linear, range }
     }
 
     /// Magnitudes on a logarithmic scale, where 0 has the colour of the least.
     pub fn logarithmic(label: impl Into<String>, range: (f64, f64)) -> Self {
-        ColourScale {
-            scale: Scale::Log,
-            ..ColourScale::linear(label, range)
-        }
+        ColourScale { scale: Scale::Log, ..ColourScale::linear(label, range) }
     }
 
     /// Signed numbers from −`size` to `size`.
     pub fn signed(label: impl Into<String>, size: f64) -> Self {
-        ColourScale {
-            map: ColourMap::Diverging,
-            ..ColourScale::linear(label, (-size, size))
-        }
+        ColourScale { map: ColourMap::Diverging, ..ColourScale::linear(label, (-size, size)) }
     }
 
     /// The axis of the colour bar.
@@ -173,29 +152,18 @@ mod tests {
     #[test]
     fn sequential_steps_look_equal_and_get_lighter() {
         let table = ColourMap::Sequential.table();
-        assert_eq!(
-            (table[0], table[STEPS - 1]),
-            (Colour(68, 1, 84), Colour(253, 231, 37))
-        );
+        assert_eq!((table[0], table[STEPS - 1]), (Colour(68, 1, 84), Colour(253, 231, 37)));
         // Over sixteenths of the map, wide enough that rounding to whole bytes does not count.
-        let colours: Vec<[f64; 3]> = (0..=16)
-            .map(|i| lab(ColourMap::Sequential.colour(f64::from(i) / 16.0)))
-            .collect();
+        let colours: Vec<[f64; 3]> = (0..=16).map(|i| lab(ColourMap::Sequential.colour(f64::from(i) / 16.0))).collect();
         let steps: Vec<f64> = colours
             .windows(2)
             .map(|w| {
                 assert!(w[1][0] > w[0][0] + 0.02, "lighter by a visible step");
-                (0..3)
-                    .map(|k| (w[1][k] - w[0][k]).powi(2))
-                    .sum::<f64>()
-                    .sqrt()
+                (0..3).map(|k| (w[1][k] - w[0][k]).powi(2)).sum::<f64>().sqrt()
             })
             .collect();
         let mean = steps.iter().sum::<f64>() / steps.len() as f64;
-        assert!(
-            steps.iter().all(|s| (0.6..1.6).contains(&(s / mean))),
-            "{steps:?}"
-        );
+        assert!(steps.iter().all(|s| (0.6..1.6).contains(&(s / mean))), "{steps:?}");
     }
 
     #[test]

@@ -118,34 +118,22 @@ impl Surface {
 
     /// Normals that are averaged at the vertices.
     pub fn smooth(mesh: Mesh) -> Self {
-        Surface {
-            shading: Shading::Smooth,
-            ..Surface::flat(mesh)
-        }
+        Surface { shading: Shading::Smooth, ..Surface::flat(mesh) }
     }
 
     /// Given normals, such as those of a limit surface.
     pub fn with_normals(mesh: Mesh, normals: Vec<DVec3>) -> Self {
-        Surface {
-            shading: Shading::Normals(normals),
-            ..Surface::flat(mesh)
-        }
+        Surface { shading: Shading::Normals(normals), ..Surface::flat(mesh) }
     }
 
     /// Edges alone, that nothing of this mesh hides.
     pub fn wireframe(mesh: Mesh, width: f64) -> Self {
-        Surface {
-            paint: None,
-            ..Surface::flat(mesh).edges(width)
-        }
+        Surface { paint: None, ..Surface::flat(mesh).edges(width) }
     }
 
     /// The same surface with dark edges of this width, in points.
     pub fn edges(mut self, width: f64) -> Self {
-        self.edges = Some(Stroke {
-            width,
-            colour: EDGE_COLOUR,
-        });
+        self.edges = Some(Stroke { width, colour: EDGE_COLOUR });
         self
     }
 

@@ -1,9 +1,7 @@
 //! A picture in its figure: caption, image, colour bar.
 
 use super::super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Rect, text_width};
-use super::super::figure::{
-    self, FRAME_COLOUR, FRAME_WIDTH, LABEL_SIZE, Slot, TEXT_COLOUR, TICK_SIZE, TITLE_SIZE,
-};
+use super::super::figure::{self, FRAME_COLOUR, FRAME_WIDTH, LABEL_SIZE, Slot, TEXT_COLOUR, TICK_SIZE, TITLE_SIZE};
 use super::super::png::Image;
 use super::scene::Scene;
 use super::{ColourScale, Picture, raster};
@@ -56,20 +54,9 @@ impl Picture {
             draw_bar(canvas, frame, scale)?;
         }
         // A caption that is longer than its picture is wide is made smaller.
-        let size =
-            TITLE_SIZE * (frame.width() / text_width(&self.caption, TITLE_SIZE)?.max(1.0)).min(1.0);
-        let place = (
-            frame.centre().0,
-            frame.top - figure::title_room(&self.caption) + 2.0 + TITLE_SIZE,
-        );
-        canvas.text(
-            &self.caption,
-            place,
-            size,
-            Anchor::Middle,
-            false,
-            TEXT_COLOUR,
-        )
+        let size = TITLE_SIZE * (frame.width() / text_width(&self.caption, TITLE_SIZE)?.max(1.0)).min(1.0);
+        let place = (frame.centre().0, frame.top - figure::title_room(&self.caption) + 2.0 + TITLE_SIZE);
+        canvas.text(&self.caption, place, size, Anchor::Middle, false, TEXT_COLOUR)
     }
 }
 
@@ -90,11 +77,7 @@ fn draw_bar(canvas: &Canvas<'_>, frame: Rect, scale: &ColourScale) -> Result<()>
             let Colour(r, g, b) = scale.map.colour(t);
             [r, g, b].repeat(width as usize)
         };
-        Ok(Image {
-            width,
-            height,
-            rgb: (0..height).flat_map(row).collect(),
-        })
+        Ok(Image { width, height, rgb: (0..height).flat_map(row).collect() })
     })?;
     canvas.outline(bar, FRAME_WIDTH, FRAME_COLOUR)?;
     let mut right = bar.right + TICK_LENGTH;
@@ -103,15 +86,11 @@ fn draw_bar(canvas: &Canvas<'_>, frame: Rect, scale: &ColourScale) -> Result<()>
         let y = bar.bottom - tick.at * bar.height();
         let reach = (bar.right, bar.right + TICK_LENGTH);
         canvas.level(y, reach, FRAME_WIDTH, FRAME_COLOUR)?;
-        let place = (
-            bar.right + TICK_LENGTH + TICK_GAP,
-            y + CAP_HEIGHT / 2.0 * TICK_SIZE,
-        );
+        let place = (bar.right + TICK_LENGTH + TICK_GAP, y + CAP_HEIGHT / 2.0 * TICK_SIZE);
         canvas.text(label, place, TICK_SIZE, Anchor::Start, false, TEXT_COLOUR)?;
         right = right.max(place.0 + text_width(label, TICK_SIZE)?);
     }
-    let size =
-        LABEL_SIZE * (frame.height() / text_width(&scale.label, LABEL_SIZE)?.max(1.0)).min(1.0);
+    let size = LABEL_SIZE * (frame.height() / text_width(&scale.label, LABEL_SIZE)?.max(1.0)).min(1.0);
     let place = (right + 6.0 + CAP_HEIGHT * LABEL_SIZE, bar.centre().1);
     canvas.text(&scale.label, place, size, Anchor::Middle, true, TEXT_COLOUR)
 }

@@ -30,23 +30,13 @@ const NOTHING: u32 = u32::MAX;
 pub(super) fn draw(scene: &Scene, width: u32, height: u32) -> Image {
     let (columns, rows) = (width as usize, height as usize);
     let mut rgb = vec![BACKGROUND; 3 * columns * rows];
-    let widest = scene
-        .segments
-        .iter()
-        .map(|s| s.half_width)
-        .fold(0.0, f64::max);
+    let widest = scene.segments.iter().map(|s| s.half_width).fold(0.0, f64::max);
     // The point of a line that a pixel asks for is so far away, and asks its own neighbours.
-    let halo = if scene.segments.is_empty() {
-        0
-    } else {
-        widest.ceil() as usize + 2
-    };
+    let halo = if scene.segments.is_empty() { 0 } else { widest.ceil() as usize + 2 };
     let bands = rows.div_ceil(BAND);
     let reach = halo as f64;
     let triangles = Bins::new(bands, scene.triangles.len(), |t| {
-        let y = scene.triangles[t]
-            .corners
-            .map(|v| scene.vertices[v as usize].y as f64 / GRID as f64);
+        let y = scene.triangles[t].corners.map(|v| scene.vertices[v as usize].y as f64 / GRID as f64);
         let (lo, hi) = (y[0].min(y[1]).min(y[2]), y[0].max(y[1]).max(y[2]));
         (lo - reach, hi + reach)
     });
@@ -55,40 +45,34 @@ pub(super) fn draw(scene: &Scene, width: u32, height: u32) -> Image {
         (ball.y - ball.radius - reach, ball.y + ball.radius + reach)
     });
     let segments = Bins::new(bands, scene.segments.len(), |s| {
-        let Segment {
-            ends: [a, b],
-            half_width,
-            ..
-        } = scene.segments[s];
+        let Segment { ends: [a, b], half_width, .. } = scene.segments[s];
         (a.y.min(b.y) - half_width, a.y.max(b.y) + half_width)
     });
-    rgb.par_chunks_mut(3 * columns * BAND)
-        .enumerate()
-        .for_each(|(index, pixels)| {
-            let first = index * BAND;
-            let top = first.saturating_sub(halo);
-            let bottom = (first + BAND + halo).min(rows);
-            let mut band = Band {
-                columns,
-                rows,
-                top,
-                bottom,
-                depths: vec![f64::INFINITY; columns * (bottom - top)],
-                seen: vec![NOTHING; columns * (bottom - top)],
-            };
-            for &t in triangles.of(index) {
-                let corners = scene.triangles[t as usize].corners;
-                band.triangle(corners.map(|v| scene.vertices[v as usize]), t);
-            }
-            let count = scene.triangles.len() as u32;
-            for &b in balls.of(index) {
-                band.ball(&scene.balls[b as usize], count + b);
-            }
-            band.shade(scene, first, pixels);
-            for &s in segments.of(index) {
-                band.segment(&scene.segments[s as usize], first, pixels);
-            }
-        });
+    rgb.par_chunks_mut(3 * columns * BAND).enumerate().for_each(|(index, pixels)| {
+        let first = index * BAND;
+        let top = first.saturating_sub(halo);
+        let bottom = (first + BAND + halo).min(rows);
+        let mut band = Band {
+            columns,
+            rows,
+            top,
+            bottom,
+            depths: vec![f64::INFINITY; columns * (bottom - top)],
+            seen: vec![NOTHING; columns * (bottom - top)],
+        };
+        for &t in triangles.of(index) {
+            let corners = scene.triangles[t as usize].corners;
+            band.triangle(corners.map(|v| scene.vertices[v as usize]), t);
+        }
+        let count = scene.triangles.len() as u32;
+        for &b in balls.of(index) {
+            band.ball(&scene.balls[b as usize], count + b);
+        }
+        band.shade(scene, first, pixels);
+        for &s in segments.of(index) {
+            band.segment(&scene.segments[s as usize], first, pixels);
+        }
+    });
     Image { width, height, rgb }
 }
 
@@ -104,10 +88,7 @@ impl Bins {
         let band = |y: f64| (y / BAND as f64).floor().clamp(-1.0, bands as f64) as i64;
         let range = |item: usize| {
             let (lo, hi) = extent(item);
-            (
-                band(lo).max(0) as usize,
-                (band(hi) + 1).clamp(0, bands as i64) as usize,
-            )
+            (band(lo).max(0) as usize, (band(hi) + 1).clamp(0, bands as i64) as usize)
         };
         let ranges: Vec<(u32, u32)> = (0..items)
             .into_par_iter()
@@ -134,10 +115,7 @@ impl Bins {
                 *slot += 1;
             }
         }
-        Bins {
-            offsets,
-            items: sorted,
-        }
+        Bins { offsets, items: sorted }
     }
 
     fn of(&self, band: usize) -> &[u32] {
@@ -171,11 +149,7 @@ fn centre(pixel: usize) -> i64 {
 fn pixels_between(lo: i64, hi: i64, window: std::ops::Range<usize>) -> std::ops::Range<usize> {
     let first = (lo - GRID / 2).div_euclid(GRID).max(window.start as i64);
     let last = (hi - GRID / 2).div_euclid(GRID).min(window.end as i64 - 1);
-    if last < first {
-        0..0
-    } else {
-        first as usize..last as usize + 1
-    }
+    if last < first { 0..0 } else { first as usize..last as usize + 1 }
 }
 
 impl Band {
@@ -195,16 +169,8 @@ impl Band {
             depth.swap(1, 2);
             area = -area;
         }
-        let ys = pixels_between(
-            p[0].1.min(p[1].1).min(p[2].1),
-            p[0].1.max(p[1].1).max(p[2].1),
-            self.top..self.bottom,
-        );
-        let xs = pixels_between(
-            p[0].0.min(p[1].0).min(p[2].0),
-            p[0].0.max(p[1].0).max(p[2].0),
-            0..self.columns,
-        );
+        let ys = pixels_between(p[0].1.min(p[1].1).min(p[2].1), p[0].1.max(p[1].1).max(p[2].1), self.top..self.bottom);
+        let xs = pixels_between(p[0].0.min(p[1].0).min(p[2].0), p[0].0.max(p[1].0).max(p[2].0), 0..self.columns);
         if xs.is_empty() || ys.is_empty() {
             return;
         }
@@ -223,13 +189,10 @@ impl Band {
             let mut at = row;
             let start = self.index(xs.start, y);
             let end = start + xs.len();
-            let pixels = self.depths[start..end]
-                .iter_mut()
-                .zip(&mut self.seen[start..end]);
+            let pixels = self.depths[start..end].iter_mut().zip(&mut self.seen[start..end]);
             for (nearest, seen) in pixels {
                 if at[0] >= bias[0] && at[1] >= bias[1] && at[2] >= bias[2] {
-                    let depth =
-                        at[0] as f64 * scale[0] + at[1] as f64 * scale[1] + at[2] as f64 * scale[2];
+                    let depth = at[0] as f64 * scale[0] + at[1] as f64 * scale[1] + at[2] as f64 * scale[2];
                     if depth < *nearest {
                         (*nearest, *seen) = (depth, id);
                     }
@@ -246,16 +209,8 @@ impl Band {
 
     fn ball(&mut self, ball: &Ball, id: u32) {
         let grid = |v: f64| (v * GRID as f64).round() as i64;
-        let ys = pixels_between(
-            grid(ball.y - ball.radius),
-            grid(ball.y + ball.radius),
-            self.top..self.bottom,
-        );
-        let xs = pixels_between(
-            grid(ball.x - ball.radius),
-            grid(ball.x + ball.radius),
-            0..self.columns,
-        );
+        let ys = pixels_between(grid(ball.y - ball.radius), grid(ball.y + ball.radius), self.top..self.bottom);
+        let xs = pixels_between(grid(ball.x - ball.radius), grid(ball.x + ball.radius), 0..self.columns);
         for y in ys {
             for x in xs.clone() {
                 let Some(height) = ball_height(ball, x, y) else {
@@ -297,8 +252,7 @@ impl Band {
         let half = segment.half_width.max(0.5);
         let rows = pixels.len() / (3 * self.columns);
         let low = |v: f64| (v - half - 0.5).ceil().max(0.0) as usize;
-        let high =
-            |v: f64, end: usize| ((v + half - 0.5).floor() + 1.0).clamp(0.0, end as f64) as usize;
+        let high = |v: f64, end: usize| ((v + half - 0.5).floor() + 1.0).clamp(0.0, end as f64) as usize;
         for y in low(a.y.min(b.y)).max(first)..high(a.y.max(b.y), first + rows) {
             // Only where the line, as wide as it is, crosses this row.
             let (mut left, mut right) = (a.x.min(b.x), a.x.max(b.x));
@@ -309,11 +263,7 @@ impl Band {
             }
             for x in low(left)..high(right, self.columns) {
                 let (px, py) = (x as f64 + 0.5 - a.x, y as f64 + 0.5 - a.y);
-                let t = if squared > 0.0 {
-                    ((px * dx + py * dy) / squared).clamp(0.0, 1.0)
-                } else {
-                    0.0
-                };
+                let t = if squared > 0.0 { ((px * dx + py * dy) / squared).clamp(0.0, 1.0) } else { 0.0 };
                 let distance = (px - t * dx).powi(2) + (py - t * dy).powi(2);
                 if distance <= half * half && self.shows(a.lerp(b, t), segment.offset) {
                     let Colour(r, g, b) = segment.colour;
@@ -330,16 +280,12 @@ impl Band {
         let depth = point.z - offset;
         for row in y - 1..=y + 1 {
             for column in x - 1..=x + 1 {
-                let is_inside = (0..self.columns as i64).contains(&column)
-                    && (0..self.rows as i64).contains(&row);
+                let is_inside = (0..self.columns as i64).contains(&column) && (0..self.rows as i64).contains(&row);
                 if !is_inside {
                     // Nothing is known there, so nothing hides the line.
                     return true;
                 }
-                debug_assert!(
-                    (self.top as i64..self.bottom as i64).contains(&row),
-                    "the halo is wide enough"
-                );
+                debug_assert!((self.top as i64..self.bottom as i64).contains(&row), "the halo is wide enough");
                 if self.depths[self.index(column as usize, row as usize)] >= depth {
                     return true;
                 }
@@ -358,10 +304,7 @@ fn ball_height(ball: &Ball, x: usize, y: usize) -> Option<f64> {
 
 /// A pixel relative to a ball, in radii.
 fn ball_place(ball: &Ball, x: usize, y: usize) -> (f64, f64) {
-    (
-        (x as f64 + 0.5 - ball.x) / ball.radius,
-        (y as f64 + 0.5 - ball.y) / ball.radius,
-    )
+    ((x as f64 + 0.5 - ball.x) / ball.radius, (y as f64 + 0.5 - ball.y) / ball.radius)
 }
 
 fn ball_colour(ball: &Ball, x: usize, y: usize) -> [u8; 3] {
@@ -384,16 +327,13 @@ fn triangle_colour(scene: &Scene, triangle: &Triangle, x: usize, y: usize) -> [u
         edge(p[0], p[1], at) as f64 * vertices[2].weight,
     ];
     let sum = parts[0] + parts[1] + parts[2];
-    let mixed = |values: [f64; 3]| {
-        (parts[0] * values[0] + parts[1] * values[1] + parts[2] * values[2]) / sum
-    };
+    let mixed = |values: [f64; 3]| (parts[0] * values[0] + parts[1] * values[1] + parts[2] * values[2]) / sum;
 
     let mut normal = scene.face_normals[triangle.face as usize];
     if !material.is_flat {
         let corners = triangle.corners.map(|v| scene.normals[v as usize]);
         if corners.iter().all(|n| *n != DVec3::ZERO) {
-            let mean =
-                (parts[0] * corners[0] + parts[1] * corners[1] + parts[2] * corners[2]) / sum;
+            let mean = (parts[0] * corners[0] + parts[1] * corners[1] + parts[2] * corners[2]) / sum;
             normal = mean.try_normalize().unwrap_or(normal);
         }
     }
@@ -409,16 +349,9 @@ fn triangle_colour(scene: &Scene, triangle: &Triangle, x: usize, y: usize) -> [u
         Dye::One => (material.colour, false),
         Dye::Faces => (scene.face_colours[triangle.face as usize], false),
         Dye::Table(table) => {
-            let place = mixed(
-                triangle
-                    .corners
-                    .map(|v| f64::from(scene.places[v as usize])),
-            );
+            let place = mixed(triangle.corners.map(|v| f64::from(scene.places[v as usize])));
             let last = table.len() - 1;
-            (
-                table[((place * last as f64).round() as usize).min(last)],
-                true,
-            )
+            (table[((place * last as f64).round() as usize).min(last)], true)
         }
     };
     if let (false, Some(back)) = (is_front, material.back) {

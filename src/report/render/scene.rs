@@ -118,10 +118,7 @@ impl Scene {
         let lists = lists.chain(picture.vectors.iter().flat_map(|v| [&v.tails, &v.vectors]));
         for list in lists {
             if let Some(i) = list.iter().position(|p| !p.is_finite()) {
-                return Err(cannot_draw(&format!(
-                    "point or vector {i} is not finite: {}",
-                    list[i]
-                )));
+                return Err(cannot_draw(&format!("point or vector {i} is not finite: {}", list[i])));
             }
         }
         let camera = match &picture.framed {
@@ -160,11 +157,8 @@ impl Scene {
             .collect::<Result<Vec<DVec4>>>()?;
         let first_vertex = self.vertices.len() as u32;
         let first_face = self.face_normals.len() as u32;
-        self.vertices
-            .extend(projected.iter().chain(&centroids).map(snap));
-        let areas: Vec<DVec3> = (mesh.faces.iter())
-            .map(|f| area_vector(&mesh.positions, f))
-            .collect();
+        self.vertices.extend(projected.iter().chain(&centroids).map(snap));
+        let areas: Vec<DVec3> = (mesh.faces.iter()).map(|f| area_vector(&mesh.positions, f)).collect();
         let unit = |v: &DVec3| camera.turned(*v).normalize_or_zero();
         let is_flat = match &surface.shading {
             Shading::Flat => true,
@@ -198,13 +192,7 @@ impl Scene {
             }
         }
         let material = self.materials.len() as u32;
-        self.materials.push(Material {
-            colour,
-            back: surface.back,
-            finish: surface.finish,
-            is_flat,
-            dye,
-        });
+        self.materials.push(Material { colour, back: surface.back, finish: surface.finish, is_flat, dye });
         let mut next_centroid = mesh.len() as u32;
         for (f, face) in mesh.faces.iter().enumerate() {
             let mut add = |corners: [u32; 3]| {
@@ -250,14 +238,7 @@ impl Scene {
         Ok(())
     }
 
-    fn add_edges(
-        &mut self,
-        faces: &Faces,
-        projected: &[DVec4],
-        camera: &Camera,
-        stroke: Stroke,
-        pixels: f64,
-    ) {
+    fn add_edges(&mut self, faces: &Faces, projected: &[DVec4], camera: &Camera, stroke: Stroke, pixels: f64) {
         let topology = Topology::new(faces, projected.len());
         let corners = faces.corners();
         for c in topology.edge_sides() {
@@ -315,12 +296,7 @@ fn project(camera: &Camera, p: DVec3, name: &dyn Fn() -> String) -> Result<DVec4
 }
 
 fn snap(p: &DVec4) -> Vertex {
-    Vertex {
-        x: (p.x * GRID as f64).round() as i64,
-        y: (p.y * GRID as f64).round() as i64,
-        depth: p.z,
-        weight: p.w,
-    }
+    Vertex { x: (p.x * GRID as f64).round() as i64, y: (p.y * GRID as f64).round() as i64, depth: p.z, weight: p.w }
 }
 
 /// What is wrong with a surface, if anything.
@@ -331,29 +307,17 @@ fn check(surface: &Surface) -> std::result::Result<(), String> {
     }
     let is_missing = |&c: &u32| c as usize >= positions.len();
     if let Some(f) = faces.iter().position(|face| face.iter().any(is_missing)) {
-        return Err(format!(
-            "face {f} names a vertex that is not there: there are {}",
-            positions.len()
-        ));
+        return Err(format!("face {f} names a vertex that is not there: there are {}", positions.len()));
     }
     if let Shading::Normals(normals) = &surface.shading {
-        assert!(
-            normals.len() == positions.len(),
-            "one normal for each vertex"
-        );
+        assert!(normals.len() == positions.len(), "one normal for each vertex");
         if let Some(v) = normals.iter().position(|n| !n.is_finite()) {
-            return Err(format!(
-                "the normal of vertex {v} is not finite: {}",
-                normals[v]
-            ));
+            return Err(format!("the normal of vertex {v} is not finite: {}", normals[v]));
         }
     }
     match &surface.paint {
         Some(Paint::Scalars { values, .. }) => {
-            assert!(
-                values.len() == positions.len(),
-                "one number for each vertex"
-            );
+            assert!(values.len() == positions.len(), "one number for each vertex");
             if let Some(v) = values.iter().position(|x| x.is_nan()) {
                 return Err(format!("the number of vertex {v} is not one (NaN)"));
             }
@@ -376,13 +340,7 @@ fn everything(picture: &Picture) -> Vec<DVec3> {
     }
     for vectors in &picture.vectors {
         all.extend_from_slice(&vectors.tails);
-        all.extend(
-            vectors
-                .tails
-                .iter()
-                .zip(&vectors.vectors)
-                .map(|(&t, &v)| t + v),
-        );
+        all.extend(vectors.tails.iter().zip(&vectors.vectors).map(|(&t, &v)| t + v));
     }
     all
 }
@@ -406,9 +364,7 @@ fn area_vector(positions: &[DVec3], face: &[u32]) -> DVec3 {
         return DVec3::ZERO;
     };
     let from_first = |v: u32| positions[v as usize] - positions[first as usize];
-    let sum: DVec3 = (face.windows(2))
-        .map(|side| from_first(side[0]).cross(from_first(side[1])))
-        .sum();
+    let sum: DVec3 = (face.windows(2)).map(|side| from_first(side[0]).cross(from_first(side[1]))).sum();
     0.5 * sum
 }
 
@@ -429,11 +385,7 @@ fn cuts_first_diagonal(positions: &[DVec3], face: &[u32], area: DVec3) -> bool {
     let turns = |a: usize, b: usize, c: usize| (p(b) - p(a)).cross(p(c) - p(a)).dot(area) > 0.0;
     let first = turns(0, 1, 2) && turns(0, 2, 3);
     let second = turns(1, 2, 3) && turns(1, 3, 0);
-    if first == second {
-        p(0).distance_squared(p(2)) <= p(1).distance_squared(p(3))
-    } else {
-        first
-    }
+    if first == second { p(0).distance_squared(p(2)) <= p(1).distance_squared(p(3)) } else { first }
 }
 
 /// Sides of a shaft and of a head.
@@ -444,14 +396,8 @@ const HEAD_LENGTH: f64 = 4.5;
 
 /// Arrows as small meshes: a tube and a cone each.
 fn arrows(vectors: &Vectors, camera: &Camera, pixels: f64) -> Result<Vec<Surface>> {
-    assert!(
-        vectors.tails.len() == vectors.vectors.len(),
-        "one vector for each tail"
-    );
-    let (mut tubes, mut cones) = (
-        Mesh::new(Vec::new(), Faces::default()),
-        Mesh::new(Vec::new(), Faces::default()),
-    );
+    assert!(vectors.tails.len() == vectors.vectors.len(), "one vector for each tail");
+    let (mut tubes, mut cones) = (Mesh::new(Vec::new(), Faces::default()), Mesh::new(Vec::new(), Faces::default()));
     for (i, (&tail, &vector)) in vectors.tails.iter().zip(&vectors.vectors).enumerate() {
         let Some(axis) = vector.try_normalize() else {
             continue;
@@ -468,25 +414,18 @@ fn arrows(vectors: &Vectors, camera: &Camera, pixels: f64) -> Result<Vec<Surface
             })
         };
         let base = tubes.positions.len() as u32;
-        tubes
-            .positions
-            .extend(ring(tail, width / 2.0).chain(ring(neck, width / 2.0)));
+        tubes.positions.extend(ring(tail, width / 2.0).chain(ring(neck, width / 2.0)));
         let cone = cones.positions.len() as u32;
         cones.positions.extend(ring(neck, HEAD_RADIUS * width));
         cones.positions.push(tail + vector);
         let sides = SIDES as u32;
         for k in 0..sides {
             let next = (k + 1) % sides;
-            tubes
-                .faces
-                .push(&[base + k, base + next, base + sides + next, base + sides + k]);
+            tubes.faces.push(&[base + k, base + next, base + sides + next, base + sides + k]);
             cones.faces.push(&[cone + k, cone + next, cone + sides]);
         }
         let base_of_cone: Vec<u32> = (0..sides).rev().map(|k| cone + k).collect();
         cones.faces.push(&base_of_cone);
     }
-    Ok(vec![
-        Surface::smooth(tubes).colour(vectors.colour),
-        Surface::flat(cones).colour(vectors.colour),
-    ])
+    Ok(vec![Surface::smooth(tubes).colour(vectors.colour), Surface::flat(cones).colour(vectors.colour)])
 }

@@ -35,9 +35,7 @@ pub(super) fn shade(n: DVec3, colour: Colour, finish: Finish, is_scale: bool) ->
     let rim = (n.z / RIM_WIDTH).clamp(0.0, 1.0);
     let rim = RIM_DARKEST + (1.0 - RIM_DARKEST) * rim * (2.0 - rim);
     let key = KEY.normalize();
-    let diffuse = AMBIENT
-        + KEY_STRENGTH * n.dot(key).max(0.0)
-        + FILL_STRENGTH * n.dot(FILL.normalize()).max(0.0);
+    let diffuse = AMBIENT + KEY_STRENGTH * n.dot(key).max(0.0) + FILL_STRENGTH * n.dot(FILL.normalize()).max(0.0);
     let (strength, highlight) = match finish {
         Finish::Matte if is_scale => {
             let lit = PAINT_DARKEST + (1.0 - PAINT_DARKEST) * (diffuse * rim).min(1.0);
@@ -45,10 +43,7 @@ pub(super) fn shade(n: DVec3, colour: Colour, finish: Finish, is_scale: bool) ->
         }
         Finish::Matte => {
             let half = (key + DVec3::Z).normalize();
-            (
-                diffuse * rim,
-                HIGHLIGHT * n.dot(half).max(0.0).powi(SHININESS),
-            )
+            (diffuse * rim, HIGHLIGHT * n.dot(half).max(0.0).powi(SHININESS))
         }
         Finish::ReflectionLines => {
             // How steeply the reflected line of sight rises.
@@ -75,19 +70,12 @@ mod tests {
     fn what_faces_the_key_light_is_brightest() {
         let at = |n: DVec3| shade(n.normalize(), GREY, Finish::Matte, false)[0];
         let lit = at(KEY);
-        for n in [
-            DVec3::Z,
-            DVec3::new(0.5, -0.5, 0.7),
-            DVec3::new(0.9, 0.0, 0.1),
-        ] {
+        for n in [DVec3::Z, DVec3::new(0.5, -0.5, 0.7), DVec3::new(0.9, 0.0, 0.1)] {
             assert!(at(n) < lit, "{n}");
         }
         // A ripple of two degrees on what faces the eye shows in whole steps of grey.
         let tilt = 2.0_f64.to_radians();
-        let (up, down) = (
-            at(DVec3::new(0.0, tilt, 1.0)),
-            at(DVec3::new(0.0, -tilt, 1.0)),
-        );
+        let (up, down) = (at(DVec3::new(0.0, tilt, 1.0)), at(DVec3::new(0.0, -tilt, 1.0)));
         assert!(up >= down + 3, "{up} {down}");
     }
 

@@ -52,19 +52,13 @@ impl Cholesky {
         };
         let broken = |why: &dyn std::fmt::Debug| failed(name, Outcome::Breakdown, why);
         let pattern = faer_pattern(m);
-        let symbolic = factorize_symbolic_cholesky(
-            pattern,
-            Side::Upper,
-            SymmetricOrdering::Amd,
-            Default::default(),
-        )
-        .map_err(|e| broken(&e))?;
+        let symbolic = factorize_symbolic_cholesky(pattern, Side::Upper, SymmetricOrdering::Amd, Default::default())
+            .map_err(|e| broken(&e))?;
         let matrix = SparseColMatRef::new(pattern, m.values());
         let mut values = vec![0.0; symbolic.len_val()];
         match kind {
             Kind::Llt => {
-                let need =
-                    symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+                let need = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
                 let mut memory = MemBuffer::try_new(need).map_err(|e| broken(&e))?;
                 symbolic
                     .factorize_numeric_llt(
@@ -84,8 +78,7 @@ impl Cholesky {
                     })?;
             }
             Kind::Ldlt => {
-                let need =
-                    symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
+                let need = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
                 let mut memory = MemBuffer::try_new(need).map_err(|e| broken(&e))?;
                 symbolic
                     .factorize_numeric_ldlt(
@@ -98,22 +91,15 @@ impl Cholesky {
                         Default::default(),
                     )
                     .map_err(|e| match e {
-                        LdltError::ZeroPivot { index } => Failure {
-                            outcome: Outcome::Singular,
-                            detail: format!("{name}: pivot {index} vanishes"),
-                        },
+                        LdltError::ZeroPivot { index } => {
+                            Failure { outcome: Outcome::Singular, detail: format!("{name}: pivot {index} vanishes") }
+                        }
                     })?;
             }
         }
-        let scratch = MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(3, Par::Seq))
-            .map_err(|e| broken(&e))?;
-        Ok(Cholesky {
-            kind,
-            symbolic,
-            values,
-            right_hand_sides: Mat::zeros(m.len(), 3),
-            scratch,
-        })
+        let scratch =
+            MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(3, Par::Seq)).map_err(|e| broken(&e))?;
+        Ok(Cholesky { kind, symbolic, values, right_hand_sides: Mat::zeros(m.len(), 3), scratch })
     }
 }
 

@@ -3,9 +3,7 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::lu::{
-    LuRef, LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu,
-};
+use faer::sparse::linalg::lu::{LuRef, LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};
 use faer::{Conj, Mat, Par};
 use glam::DVec3;
 
@@ -33,13 +31,8 @@ impl SparseLu {
         let broken = |why: &dyn std::fmt::Debug| failed("LU", Outcome::Breakdown, why);
         // Column j of A holds h_i m_ij: row j of M, weighted by the column's H.
         let m = &system.m;
-        let values: Vec<f64> = m
-            .pattern()
-            .columns()
-            .iter()
-            .zip(m.values())
-            .map(|(&i, &m)| system.h[i as usize] * m)
-            .collect();
+        let values: Vec<f64> =
+            m.pattern().columns().iter().zip(m.values()).map(|(&i, &m)| system.h[i as usize] * m).collect();
         let pattern = faer_pattern(m);
         let params = LuSymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
@@ -58,14 +51,9 @@ impl SparseLu {
                 Default::default(),
             )
             .map_err(|e| failed("LU", Outcome::Singular, e))?;
-        let scratch = MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(3, Par::Seq))
-            .map_err(|e| broken(&e))?;
-        Ok(SparseLu {
-            symbolic,
-            numeric,
-            right_hand_sides: Mat::zeros(m.len(), 3),
-            scratch,
-        })
+        let scratch =
+            MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(3, Par::Seq)).map_err(|e| broken(&e))?;
+        Ok(SparseLu { symbolic, numeric, right_hand_sides: Mat::zeros(m.len(), 3), scratch })
     }
 }
 

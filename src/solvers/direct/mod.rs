@@ -75,19 +75,9 @@ impl<'a, S: System, F: Factorization> Direct<'a, S, F> {
 fn smallest_eigenvalue(h: &[f64], factorization: &mut impl Factorization) -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(0x7069_766f_7473);
     let mut x: Vec<DVec3> = (0..h.len())
-        .map(|_| {
-            DVec3::new(
-                rng.random_range(-1.0..1.0),
-                rng.random_range(-1.0..1.0),
-                rng.random_range(-1.0..1.0),
-            )
-        })
+        .map(|_| DVec3::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0)))
         .collect();
-    let norm = |x: &[DVec3]| {
-        x.iter()
-            .fold(DVec3::ZERO, |sum, v| sum + *v * *v)
-            .map(f64::sqrt)
-    };
+    let norm = |x: &[DVec3]| x.iter().fold(DVec3::ZERO, |sum, v| sum + *v * *v).map(f64::sqrt);
     let mut estimate = DVec3::ONE;
     for _ in 0..3 {
         let before = norm(&x);
@@ -104,29 +94,16 @@ fn smallest_eigenvalue(h: &[f64], factorization: &mut impl Factorization) -> f64
             break;
         }
     }
-    if estimate.is_nan() {
-        f64::NAN
-    } else {
-        estimate.min_element()
-    }
+    if estimate.is_nan() { f64::NAN } else { estimate.min_element() }
 }
 
 impl<S: System, F: Factorization> Iterate for Direct<'_, S, F> {
     fn errors(&mut self) -> Errors {
-        self.rows
-            .residual(
-                self.system,
-                self.points,
-                &self.current,
-                &mut self.residual,
-                |_, e, out, _| *out = e,
-            )
-            .errors
+        self.rows.residual(self.system, self.points, &self.current, &mut self.residual, |_, e, out, _| *out = e).errors
     }
 
     fn advance(&mut self) -> Result<(), Failure> {
-        self.factorization
-            .solve(self.system.weights(), &mut self.residual);
+        self.factorization.solve(self.system.weights(), &mut self.residual);
         for (v, d) in self.current.iter_mut().zip(&self.residual) {
             *v += *d;
         }
@@ -140,8 +117,5 @@ impl<S: System, F: Factorization> Iterate for Direct<'_, S, F> {
 
 /// A factorization that could not be made.
 fn failed(method: &str, outcome: Outcome, why: impl std::fmt::Debug) -> Failure {
-    Failure {
-        outcome,
-        detail: format!("{method}: {why:?}"),
-    }
+    Failure { outcome, detail: format!("{method}: {why:?}") }
 }

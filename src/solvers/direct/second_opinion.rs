@@ -29,13 +29,9 @@ impl SecondOpinion {
     pub fn new(m: &Csr) -> Result<Self, Failure> {
         let name = "nalgebra-sparse Cholesky";
         let n = m.len();
-        let symbolic = factorize_symbolic_cholesky(
-            faer_pattern(m),
-            Side::Upper,
-            SymmetricOrdering::Amd,
-            Default::default(),
-        )
-        .map_err(|e| failed(name, Outcome::Breakdown, e))?;
+        let symbolic =
+            factorize_symbolic_cholesky(faer_pattern(m), Side::Upper, SymmetricOrdering::Amd, Default::default())
+                .map_err(|e| failed(name, Outcome::Breakdown, e))?;
         let order: Vec<u32> = match symbolic.perm() {
             Some(perm) => perm.arrays().0.to_vec(),
             None => (0..n as u32).collect(),
@@ -58,13 +54,8 @@ impl SecondOpinion {
         }
         let permuted = CscMatrix::try_from_csc_data(n, n, offsets, rows, values)
             .map_err(|e| failed(name, Outcome::Breakdown, e))?;
-        let factor =
-            CscCholesky::factor(&permuted).map_err(|e| failed(name, Outcome::Singular, e))?;
-        Ok(SecondOpinion {
-            factor,
-            order,
-            right_hand_sides: DMatrix::zeros(n, 3),
-        })
+        let factor = CscCholesky::factor(&permuted).map_err(|e| failed(name, Outcome::Singular, e))?;
+        Ok(SecondOpinion { factor, order, right_hand_sides: DMatrix::zeros(n, 3) })
     }
 }
 
