@@ -63,27 +63,41 @@ pub enum Neighbours {
     Far(Vec<u32>),
 }
 
-/// The neighbours with where each row's start, checked once: every neighbour is one of the N vertices, and none is
-/// further from its row than the reach. The fields do not change after that, which is what the sums rely on.
+/// The neighbours with where each row's start, checked once: every neighbour is one of the N vertices, none is further
+/// from its row than the reach, and the rows of one run have equally many. The fields do not change after that, which is
+/// what the sums rely on.
 #[derive(Clone, Debug)]
 pub struct Codes {
     offsets: Vec<u32>,
+    /// The first row of each run.
+    runs: Vec<u32>,
     neighbours: Neighbours,
     reach: usize,
 }
 
 impl Codes {
-    /// `offsets` says where the neighbours of each row start, and the end; `fill(i, neighbours)` names those of row
-    /// i. One parallel pass, two where a distance does not fit 16 bits.
+    /// `offsets` says where the neighbours of each row start, and the end; `runs` names the first rows of the runs, whose
+    /// rows are alike; `fill(i, neighbours)` names the neighbours of row i. One parallel pass, two where a distance does
+    /// not fit 16 bits.
     ///
     /// # Panics
-    /// If the offsets do not ascend from 0, or a neighbour is no vertex.
-    pub(super) fn new(offsets: Vec<u32>, fill: impl Fn(usize, &mut [u32]) + Sync) -> Self {
+    /// If the offsets do not ascend from 0, the runs do not ascend from row 0, the rows of a run have not equally many
+    /// neighbours, or a neighbour is no vertex.
+    pub(super) fn new(offsets: Vec<u32>, runs: Vec<u32>, fill: impl Fn(usize, &mut [u32]) + Sync) -> Self {
         assert!(offsets.first() == Some(&0), "offsets from 0");
+        let n = offsets.len() - 1;
+        assert!(runs.first() == (n > 0).then_some(&0), "runs from row 0");
+        (0..runs.len()).into_par_iter().with_min_len(CHUNK).for_each(|k| {
+            let rows = rows_of_run(&runs, k, n);
+            assert!(!rows.is_empty() && rows.end <= n, "runs ascend");
+            let lengths = offsets[rows.start..=rows.end].windows(2).map(|w| w[1].checked_sub(w[0]));
+            let first = offsets[rows.start + 1].checked_sub(offsets[rows.start]);
+            assert!(first.is_some() && lengths.into_iter().all(|l| l == first), "rows of one length in run {k}");
+        });
         let near = encode(&offsets, &fill).map(|(reach, near)| (reach, Neighbours::Near(near)));
         let far = || encode(&offsets, &fill).map(|(reach, far)| (reach, Neighbours::Far(far)));
         let (reach, neighbours) = near.or_else(far).expect("every distance has a code of 32 bits");
-        Codes { offsets, neighbours, reach: reach as usize }
+        Codes { offsets, runs, neighbours, reach: reach as usize }
     }
 
     pub(super) fn rows(&self) -> usize {
@@ -92,6 +106,16 @@ impl Codes {
 
     pub(super) fn offsets(&self) -> &[u32] {
         &self.offsets
+    }
+
+    /// The first row of each run.
+    pub(super) fn runs(&self) -> &[u32] {
+        &self.runs
+    }
+
+    /// The rows of run `k`.
+    pub(super) fn run(&self, k: usize) -> Range<usize> {
+        rows_of_run(&self.runs, k, self.rows())
     }
 
     pub(super) fn neighbours(&self) -> &Neighbours {
@@ -125,12 +149,16 @@ impl Codes {
             "rows {rows:?} reach beyond the points {start}..{}",
             start + points.len()
         );
-        let offsets = &self.offsets;
         match &self.neighbours {
-            Neighbours::Near(codes) => Windows::Near(Window { offsets, codes, rows, points, start, reach: self.reach }),
-            Neighbours::Far(codes) => Windows::Far(Window { offsets, codes, rows, points, start, reach: self.reach }),
+            Neighbours::Near(codes) => Windows::Near(Window { all: self, codes, rows, points, start }),
+            Neighbours::Far(codes) => Windows::Far(Window { all: self, codes, rows, points, start }),
         }
     }
+}
+
+/// The rows of run `k` of those that start at `runs`, among `n` rows.
+fn rows_of_run(runs: &[u32], k: usize, n: usize) -> Range<usize> {
+    runs[k] as usize..runs.get(k + 1).map_or(n, |&next| next as usize)
 }
 
 /// The neighbours of all rows in one kind of code, and the greatest distance; `None` if that has no code.
@@ -184,91 +212,46 @@ pub(super) enum Windows<'a, P> {
 /// Some rows, and the points that they see: [`Codes::window`] has made sure that every neighbour of the rows is
 /// among the points.
 pub(super) struct Window<'a, P, C> {
-    offsets: &'a [u32],
+    all: &'a Codes,
+    /// The neighbours of `all`.
     codes: &'a [C],
     rows: Range<usize>,
     points: &'a [P],
     start: usize,
-    reach: usize,
+}
+
+/// Rows of a [`Window`] that belong to one run of its [`Codes`]: only [`Window::runs`] makes such, so they have equally
+/// many neighbours and are rows of the window.
+pub(super) struct Run<'w, 'a, P, C> {
+    window: &'w Window<'a, P, C>,
+    rows: Range<usize>,
+    /// Neighbours of each row.
+    length: usize,
 }
 
 impl<'a, P: Point, C: Code> Window<'a, P, C> {
-    pub(super) fn rows(&self) -> Range<usize> {
-        self.rows.clone()
+    /// The rows of the window, run by run.
+    pub(super) fn runs<'w>(&'w self) -> impl Iterator<Item = Run<'w, 'a, P, C>> {
+        let Codes { runs, offsets, .. } = self.all;
+        let mut next = runs.partition_point(|&r| r as usize <= self.rows.start);
+        let mut from = self.rows.start;
+        std::iter::from_fn(move || {
+            if from >= self.rows.end {
+                return None;
+            }
+            let to = runs.get(next).map_or(self.rows.end, |&r| self.rows.end.min(r as usize));
+            next += 1;
+            let rows = from..to;
+            from = to;
+            let length = (offsets[rows.start + 1] - offsets[rows.start]) as usize;
+            Some(Run { window: self, rows, length })
+        })
     }
 
     /// The neighbours of row `i`.
     pub(super) fn codes(&self, i: usize) -> &'a [C] {
-        &self.codes[self.offsets[i] as usize..self.offsets[i + 1] as usize]
-    }
-
-    /// For rows of 2N neighbours each, `visit(slot, own, sum of the first N, sum of the others)`, `slot` from
-    /// `slots`.
-    ///
-    /// # Panics
-    /// If the rows are not among those of the window, or have another number of neighbours.
-    #[inline(always)]
-    pub(super) fn halves<const N: usize, T>(
-        &self,
-        rows: Range<usize>,
-        slots: impl Iterator<Item = T>,
-        mut visit: impl FnMut(T, P, P, P),
-    ) {
-        self.each(rows, 2 * N, slots, |slot, own, at, codes| {
-            let (near, across) = codes.split_at(N);
-            // SAFETY: `at` and `codes` are of one row.
-            let sums = unsafe { (self.sum::<N>(at, near), self.sum::<N>(at, across)) };
-            visit(slot, own, sums.0, sums.1);
-        });
-    }
-
-    /// For rows of N neighbours each, `visit(slot, own, their sum)`.
-    ///
-    /// # Panics
-    /// As [`halves`](Self::halves).
-    #[inline(always)]
-    pub(super) fn wholes<const N: usize, T>(
-        &self,
-        rows: Range<usize>,
-        slots: impl Iterator<Item = T>,
-        mut visit: impl FnMut(T, P, P),
-    ) {
-        self.each(rows, N, slots, |slot, own, at, codes| {
-            // SAFETY: `at` and `codes` are of one row.
-            let sum = unsafe { self.sum::<N>(at, codes) };
-            visit(slot, own, sum);
-        });
-    }
-
-    /// `visit(slot, own)` for rows of which no neighbour is asked for.
-    #[inline(always)]
-    pub(super) fn alone<T>(&self, rows: Range<usize>, slots: impl Iterator<Item = T>, mut visit: impl FnMut(T, P)) {
-        let own = &self.points[rows.start - self.start..][..rows.len()];
-        slots.zip(own).for_each(|(slot, &own)| visit(slot, own));
-    }
-
-    /// `visit(slot, own, place, codes)` for rows of `length` neighbours.
-    #[inline(always)]
-    fn each<T>(
-        &self,
-        rows: Range<usize>,
-        length: usize,
-        slots: impl Iterator<Item = T>,
-        mut visit: impl FnMut(T, P, usize, &[C]),
-    ) {
-        assert!(self.rows.start <= rows.start && rows.end <= self.rows.end, "rows of the window");
-        let codes = &self.codes[self.offsets[rows.start] as usize..self.offsets[rows.end] as usize];
-        assert_eq!(codes.len(), rows.len() * length, "rows of {length} neighbours");
-        let first = rows.start - self.start;
-        let own = &self.points[first..][..rows.len()];
-        let lists = codes.chunks_exact(length);
-        // The rows move on at one pace; what they read for the first time is as far ahead as they reach.
-        let front = first + self.reach + AHEAD / size_of::<P>();
-        for (k, ((slot, &own), list)) in slots.zip(own).zip(lists).enumerate() {
-            prefetch(self.points, front + k);
-            prefetch(list, AHEAD / size_of::<C>());
-            visit(slot, own, first + k, list);
-        }
+        let offsets = &self.all.offsets;
+        &self.codes[offsets[i] as usize..offsets[i + 1] as usize]
     }
 
     /// The sum over N neighbours of the row at place `at` of the points. Without a check of each neighbour: 2.5 ns
@@ -290,6 +273,75 @@ impl<'a, P: Point, C: Code> Window<'a, P, C> {
     }
 }
 
+impl<P: Point, C: Code> Run<'_, '_, P, C> {
+    pub(super) fn rows(&self) -> Range<usize> {
+        self.rows.clone()
+    }
+
+    /// The number of neighbours of each row.
+    pub(super) fn neighbours(&self) -> usize {
+        self.length
+    }
+
+    /// For rows of 2N neighbours each, `visit(slot, own, sum of the first N, sum of the others)`, `slot` from
+    /// `slots`.
+    ///
+    /// # Panics
+    /// If the rows have another number of neighbours.
+    #[inline(always)]
+    pub(super) fn halves<const N: usize, T>(&self, slots: impl Iterator<Item = T>, mut visit: impl FnMut(T, P, P, P)) {
+        self.each(2 * N, slots, |slot, own, at, codes| {
+            let (near, across) = codes.split_at(N);
+            // SAFETY: `each` hands out the neighbours of the row at `at`, which is one of the window.
+            let sums = unsafe { (self.window.sum::<N>(at, near), self.window.sum::<N>(at, across)) };
+            visit(slot, own, sums.0, sums.1);
+        });
+    }
+
+    /// For rows of N neighbours each, `visit(slot, own, their sum)`.
+    ///
+    /// # Panics
+    /// As [`halves`](Self::halves).
+    #[inline(always)]
+    pub(super) fn wholes<const N: usize, T>(&self, slots: impl Iterator<Item = T>, mut visit: impl FnMut(T, P, P)) {
+        self.each(N, slots, |slot, own, at, codes| {
+            // SAFETY: as in `halves`.
+            let sum = unsafe { self.window.sum::<N>(at, codes) };
+            visit(slot, own, sum);
+        });
+    }
+
+    /// `visit(slot, own)` for rows of which no neighbour is asked for.
+    #[inline(always)]
+    pub(super) fn alone<T>(&self, slots: impl Iterator<Item = T>, mut visit: impl FnMut(T, P)) {
+        slots.zip(self.own()).for_each(|(slot, &own)| visit(slot, own));
+    }
+
+    /// The points of the rows themselves.
+    #[inline(always)]
+    fn own(&self) -> &[P] {
+        &self.window.points[self.rows.start - self.window.start..][..self.rows.len()]
+    }
+
+    /// `visit(slot, own, place, codes)` for rows of `length` neighbours: `codes` are those of the row whose point is at
+    /// `place`, since all rows of a run have the number of neighbours that is asserted here.
+    #[inline(always)]
+    fn each<T>(&self, length: usize, slots: impl Iterator<Item = T>, mut visit: impl FnMut(T, P, usize, &[C])) {
+        assert_eq!(self.length, length, "neighbours of a row");
+        let Window { all, codes, points, start, .. } = self.window;
+        let codes = &codes[all.offsets[self.rows.start] as usize..all.offsets[self.rows.end] as usize];
+        let first = self.rows.start - start;
+        let lists = codes.chunks_exact(length);
+        // The rows move on at one pace; what they read for the first time is as far ahead as they reach.
+        let front = first + all.reach + AHEAD / size_of::<P>();
+        for (k, ((slot, &own), list)) in slots.zip(self.own()).zip(lists).enumerate() {
+            prefetch(points, front + k);
+            prefetch(list, AHEAD / size_of::<C>());
+            visit(slot, own, first + k, list);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -297,7 +349,7 @@ mod tests {
     /// A cycle of `n` vertices: the distances of the ends of the file do not fit a narrow band.
     fn cycle_of(n: u32) -> Codes {
         let offsets = (0..=n).map(|i| 2 * i).collect();
-        Codes::new(offsets, |i, neighbours| {
+        Codes::new(offsets, vec![0], |i, neighbours| {
             neighbours.copy_from_slice(&[(i as u32 + 1) % n, (i as u32 + n - 1) % n]);
         })
     }
@@ -326,7 +378,35 @@ mod tests {
     #[test]
     #[should_panic(expected = "no vertex")]
     fn a_neighbour_beyond_the_last_vertex_is_refused() {
-        Codes::new(vec![0, 1, 2], |i, neighbours| neighbours[0] = i as u32 + 1);
+        Codes::new(vec![0, 1, 2], vec![0], |i, neighbours| neighbours[0] = i as u32 + 1);
+    }
+
+    #[test]
+    #[should_panic(expected = "rows of one length in run 0")]
+    fn rows_of_several_lengths_are_no_run() {
+        // As many neighbours as two rows of two have: a check of the sum alone would let them pass.
+        Codes::new(vec![0, 1, 4], vec![0], |_, neighbours| neighbours.fill(0));
+    }
+
+    #[test]
+    fn runs_that_do_not_cover_the_rows_once_are_refused() {
+        for runs in [vec![], vec![1], vec![0, 1, 1], vec![0, 3], vec![0, 2, 1]] {
+            let made = std::panic::catch_unwind(|| Codes::new(vec![0, 0, 0], runs.clone(), |_, _| {}));
+            assert!(made.is_err(), "{runs:?}");
+        }
+        assert_eq!(Codes::new(vec![0], vec![], |_, _| {}).rows(), 0);
+    }
+
+    #[test]
+    fn a_window_is_cut_into_the_runs_that_it_overlaps() {
+        // Rows of 0, 2, 2, 2, 1 and 1 neighbours.
+        let codes = Codes::new(vec![0, 0, 2, 4, 6, 7, 8], vec![0, 1, 3, 4], |_, neighbours| neighbours.fill(3));
+        let points = [0.0f64; 6];
+        let Windows::Near(window) = codes.window(0..5, &points, 0) else { panic!("near") };
+        let found: Vec<_> = window.runs().map(|run| (run.rows(), run.neighbours())).collect();
+        assert_eq!(found, [(0..1, 0), (1..3, 2), (3..4, 2), (4..5, 1)]);
+        let Windows::Near(window) = codes.window(2..3, &points, 0) else { panic!("near") };
+        assert_eq!(window.runs().map(|run| run.rows()).collect::<Vec<_>>(), [2..3]);
     }
 
     #[test]
@@ -337,11 +417,11 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "rows of 1 neighbours")]
+    #[should_panic(expected = "neighbours of a row")]
     fn rows_of_another_length_are_refused() {
         let (codes, points) = (cycle(), [0.0f64; 10]);
         if let Windows::Near(window) = codes.window(0..10, &points, 0) {
-            window.wholes::<1, _>(0..10, 0..10, |_, _, _| {});
+            window.runs().for_each(|run| run.wholes::<1, _>(0..10, |_, _, _| {}));
         }
     }
 
@@ -351,7 +431,8 @@ mod tests {
         let points: Vec<f64> = (0..10).map(|i| f64::from(1 << i)).collect();
         let mut sums = [0.0; 10];
         if let Windows::Near(window) = codes.window(0..10, &points, 0) {
-            window.wholes::<2, _>(0..10, sums.iter_mut(), |slot, _, sum| *slot = sum);
+            let mut slots = sums.iter_mut();
+            window.runs().for_each(|run| run.wholes::<2, _>(slots.by_ref(), |slot, _, sum| *slot = sum));
         }
         for (i, &sum) in sums.iter().enumerate() {
             assert_eq!(sum, points[(i + 1) % 10] + points[(i + 9) % 10]);

@@ -93,14 +93,14 @@ impl Operator {
         let polygons = source.polygons(&kinds);
         let offsets = source.offsets(&kinds)?;
         let runs = runs(&kinds, &source.valences);
-        let codes = source.codes(&kinds, offsets);
+        let codes = source.codes(&kinds, offsets, runs);
         let double = source.rings();
-        let stencil = Stencil { runs, codes, kinds, single: double.single(), double, polygons };
+        let stencil = Stencil { codes, kinds, single: double.single(), double, polygons };
         // The rows of a run are alike, but for the sizes of faces that are summed: there the extremes tell all.
-        let (valences, diagonal): (Vec<u32>, Vec<f64>) = (0..stencil.runs.len())
+        let (valences, diagonal): (Vec<u32>, Vec<f64>) = (0..stencil.codes.runs().len())
             .into_par_iter()
             .flat_map_iter(|k| {
-                let run = stencil.run(k);
+                let run = stencil.codes.run(k);
                 let n = source.valences[run.start];
                 let [least, greatest] = stencil.extremes(run);
                 [(n, least), (n, greatest)]

@@ -244,14 +244,14 @@ impl Polygons {
     }
 
     /// Where the sums lie, among those of all faces, of the faces whose first corner is in `rows`: blocks of rows, or up
-    /// to the last.
+    /// to the last. Nowhere if no face is summed.
     pub(super) fn sums_of(&self, rows: Range<usize>) -> Range<usize> {
+        if self.blocks.is_empty() {
+            return 0..0;
+        }
         let first = |row: usize| {
             debug_assert!(row.is_multiple_of(BLOCK) || row.div_ceil(BLOCK) + 1 == self.blocks.len());
-            match self.blocks.get(row.div_ceil(BLOCK)) {
-                Some(&face) => self.parts * face as usize,
-                None => 0,
-            }
+            self.parts * self.blocks[row.div_ceil(BLOCK)] as usize
         };
         first(rows.start)..first(rows.end)
     }

@@ -139,21 +139,26 @@ impl<'a> Source<'a> {
         Ok(offsets)
     }
 
-    /// The neighbours of all rows.
-    pub(super) fn codes(&self, kinds: &[Kind], offsets: Vec<u32>) -> Codes {
+    /// The neighbours of all rows; `runs` are the first rows of those of equal kind and valence.
+    pub(super) fn codes(&self, kinds: &[Kind], offsets: Vec<u32>, runs: Vec<u32>) -> Codes {
         // Where all faces are of one size, the corners of a face take no look-up.
         match self.faces.uniform_size() {
-            Some(3) => self.codes_by(kinds, offsets, |c| c / 3 * 3..c / 3 * 3 + 3),
-            Some(4) => self.codes_by(kinds, offsets, |c| c / 4 * 4..c / 4 * 4 + 4),
-            _ => self.codes_by(kinds, offsets, |c| self.faces.range(self.incidence.face_of(c as u32))),
+            Some(3) => self.codes_by(kinds, (offsets, runs), |c| c / 3 * 3..c / 3 * 3 + 3),
+            Some(4) => self.codes_by(kinds, (offsets, runs), |c| c / 4 * 4..c / 4 * 4 + 4),
+            _ => self.codes_by(kinds, (offsets, runs), |c| self.faces.range(self.incidence.face_of(c as u32))),
         }
     }
 
     /// `corners_by` tells the corners of the face of a corner.
-    fn codes_by(&self, kinds: &[Kind], offsets: Vec<u32>, corners_by: impl Fn(usize) -> Range<usize> + Sync) -> Codes {
+    fn codes_by(
+        &self,
+        kinds: &[Kind],
+        (offsets, runs): (Vec<u32>, Vec<u32>),
+        corners_by: impl Fn(usize) -> Range<usize> + Sync,
+    ) -> Codes {
         let incidence = self.incidence;
         let corners = self.faces.corners();
-        Codes::new(offsets, |k, row| {
+        Codes::new(offsets, runs, |k, row| {
             if row.is_empty() {
                 return;
             }

@@ -5,7 +5,7 @@ use std::ops::{Add, AddAssign, Range, Sub};
 
 use glam::{DVec3, Vec3A};
 
-use super::codes::{Code, Codes, Row, Window, Windows};
+use super::codes::{self, Code, Codes, Row, Window, Windows};
 use super::polygons::Polygons;
 
 /// What an operator acts on: three right-hand sides of one vertex, interleaved, in doubles (24 bytes) or singles
@@ -160,9 +160,8 @@ pub enum Kind {
 #[derive(Clone, Debug)]
 pub struct Stencil {
     pub(super) codes: Codes,
+    /// By row; equal within a run of the codes, as is the valence.
     pub(super) kinds: Vec<Kind>,
-    /// The first rows of the runs of equal kind and valence.
-    pub(super) runs: Vec<u32>,
     pub(super) double: Rings<f64>,
     pub(super) single: Rings<Vec3A>,
     pub(super) polygons: Polygons,
@@ -175,12 +174,6 @@ pub(super) fn runs(kinds: &[Kind], valences: &[u32]) -> Vec<u32> {
 }
 
 impl Stencil {
-    /// The rows of run `k`.
-    pub(super) fn run(&self, k: usize) -> Range<usize> {
-        let end = self.runs.get(k + 1).map_or(self.kinds.len(), |&r| r as usize);
-        self.runs[k] as usize..end
-    }
-
     /// The weights of row `i`.
     fn ring(&self, i: usize) -> &Ring<f64> {
         let n = self.valence(i);
@@ -255,13 +248,9 @@ impl Stencil {
         mut visit: impl FnMut(I::Item, P, P),
     ) {
         let rings = P::rings(self);
-        let rows = window.rows();
-        let mut next = self.runs.partition_point(|&r| r as usize <= rows.start);
-        let mut from = rows.start;
-        while from < rows.end {
-            let to = self.runs.get(next).map_or(rows.end, |&r| rows.end.min(r as usize));
-            next += 1;
-            let run = Run { window, rows: from..to, slots: slots(to - from) };
+        for rows in window.runs() {
+            let Range { start: from, end: to } = rows.rows();
+            let run = Run { rows, slots: slots(to - from) };
             match (self.kinds[from], self.valence(from)) {
                 (Kind::Quads, 4) => run.quads::<4>(rings, &mut visit),
                 (Kind::Quads, 3) => run.quads::<3>(rings, &mut visit),
@@ -285,7 +274,6 @@ impl Stencil {
                     }
                 }
             }
-            from = to;
         }
     }
 
@@ -370,10 +358,9 @@ fn sum<P: Point, C: Code>(codes: &[C], window: &[P], row: usize, start: usize) -
     sum
 }
 
-/// Consecutive rows of one kind and valence.
+/// Consecutive rows of one kind and valence, with what they are visited with.
 struct Run<'w, 'a, P, C, I> {
-    window: &'w Window<'a, P, C>,
-    rows: Range<usize>,
+    rows: codes::Run<'w, 'a, P, C>,
     slots: I,
 }
 
@@ -382,7 +369,7 @@ impl<P: Point, C: Code, I: Iterator> Run<'_, '_, P, C, I> {
     #[inline(always)]
     fn quads<const N: usize>(self, rings: &Rings<P::Weight>, visit: &mut impl FnMut(I::Item, P, P)) {
         let ring = rings.quads[N];
-        self.window.halves::<N, _>(self.rows, self.slots, |slot, own, edge, across| {
+        self.rows.halves::<N, _>(self.slots, |slot, own, edge, across| {
             visit(slot, own, ring.value(own, edge, across));
         });
     }
@@ -391,7 +378,7 @@ impl<P: Point, C: Code, I: Iterator> Run<'_, '_, P, C, I> {
     #[inline(always)]
     fn edges<const N: usize>(self, rings: &Rings<P::Weight>, visit: &mut impl FnMut(I::Item, P, P)) {
         let ring = rings.edges[N];
-        self.window.wholes::<N, _>(self.rows, self.slots, |slot, own, edge| {
+        self.rows.wholes::<N, _>(self.slots, |slot, own, edge| {
             visit(slot, own, ring.value_of_edges(own, edge));
         });
     }
@@ -406,15 +393,15 @@ impl<P: Point, C: Code, I: Iterator> Run<'_, '_, P, C, I> {
         visit: &mut impl FnMut(I::Item, P, P),
     ) {
         let ring = rings.polygons[N];
-        let listed = (polygons.at(self.rows.start).start..).step_by(N);
+        let listed = (polygons.at(self.rows.rows().start).start..).step_by(N);
         let slots = self.slots.zip(listed);
-        if self.window.codes(self.rows.start).is_empty() {
-            self.window.alone(self.rows, slots, |(slot, e), own| {
+        if self.rows.neighbours() == 0 {
+            self.rows.alone(slots, |(slot, e), own| {
                 let across = polygons.gather::<N, P>(e, sums);
                 visit(slot, own, ring.value_alone(own, across));
             });
         } else {
-            self.window.wholes::<N, _>(self.rows, slots, |(slot, e), own, edge| {
+            self.rows.wholes::<N, _>(slots, |(slot, e), own, edge| {
                 let across = polygons.gather::<N, P>(e, sums);
                 visit(slot, own, ring.value(own, edge, across));
             });

@@ -150,8 +150,7 @@ fn operator(mesh: &Mesh, topology: Option<&Topology>, scheme: Scheme) -> Result<
         }
     };
     // Among mixed faces the search costs twice as much.
-    let few = usual_lambda_min(scheme) >= std::env::var("LL_FEW").map_or(FEW, |x| x.parse().unwrap())
-        && mesh.faces.uniform_size().is_none();
+    let few = usual_lambda_min(scheme) >= FEW && mesh.faces.uniform_size().is_none();
     let number = || {
         if mesh.len() >= ORDERED && !few {
             Some(in_fronts(&mesh.faces, incidence))
