@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use limitlab::Result;
 use limitlab::assemble::{LimitSystem, Scheme};
-use limitlab::cli::{self, STAND_IN_NOISE};
+use limitlab::cli::{Printer, STAND_IN_NOISE};
 use limitlab::error::Error;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::validate::{Boundary, validate};
@@ -12,6 +12,8 @@ use limitlab::mesh::{Mesh, Topology, builtin, io};
 use limitlab::output::create_dir;
 use limitlab::report::index::{self, Entry};
 use limitlab::report::{Animation, Figure, Table, compare};
+
+use serde_json::{Value as Json, json};
 
 use crate::claims::Record;
 
@@ -33,6 +35,7 @@ pub struct Context {
     pub quick: bool,
     check: Option<PathBuf>,
     differences: Vec<String>,
+    pub printer: Printer,
     /// The ledger of claims, once it is computed.
     pub ledger: Vec<Record>,
 }
@@ -60,7 +63,13 @@ impl Subject {
 }
 
 impl Context {
-    pub fn new(root: &Path, models: Option<&Path>, quick: bool, check: Option<&Path>) -> Result<Self> {
+    pub fn new(
+        root: &Path,
+        models: Option<&Path>,
+        quick: bool,
+        check: Option<&Path>,
+        printer: Printer,
+    ) -> Result<Self> {
         if let Some(folder) = models
             && !folder.join("closed").is_dir()
         {
@@ -75,6 +84,7 @@ impl Context {
             quick,
             check: check.map(Path::to_path_buf),
             differences: Vec::new(),
+            printer,
             ledger: Vec::new(),
         };
         create_dir(&context.folder())?;
@@ -172,7 +182,7 @@ impl Context {
     pub fn table(&mut self, mut table: Table) -> Result<()> {
         table.notes.insert(0, self.note_on_meshes());
         table.write(&self.folder())?;
-        cli::print(&table.to_markdown())?;
+        self.printer.table(&table)?;
         self.compare(&table)
     }
 
@@ -244,11 +254,20 @@ impl Context {
         )
     }
 
-    /// Success, or what differs from `--check`.
+    /// The end of a run: with `--json` its object, in which `claims` are those that were computed; then success, or what differs from
+    /// `--check`.
     ///
     /// # Errors
-    /// The first difference and their number.
-    pub fn verdict(&self) -> Result<()> {
+    /// The first difference and their number; standard output that cannot be written.
+    pub fn finish(self, claims: Json) -> Result<()> {
+        let folder = self.folder();
+        self.printer.finish(json!({
+            "meshes": self.models.map_or("built-in".into(), |folder| folder.display().to_string()),
+            "quick": self.quick,
+            "folder": folder.display().to_string(),
+            "claims": claims,
+            "differences": self.differences,
+        }))?;
         for difference in &self.differences {
             eprintln!("differs: {difference}");
         }

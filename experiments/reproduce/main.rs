@@ -28,7 +28,7 @@ use clap::Parser;
 use claims::Claim;
 use context::{Context, Item};
 use limitlab::Result;
-use limitlab::cli::{self, CommonFlags, Progress};
+use limitlab::cli::{self, CommonFlags, Printer, Progress};
 use limitlab::error::Error;
 
 /// Regenerates the papers' tables and figures with what this workbench measures beside what they print.
@@ -53,6 +53,9 @@ struct Arguments {
     /// A subset of the rows, within a minute
     #[arg(long)]
     quick: bool,
+    /// Print one JSON object on standard output, and nothing else there: all tables, and the claims with their numbers
+    #[arg(long)]
+    json: bool,
     /// Compare every table with the one of the same name in this report folder, and fail if they differ
     #[arg(long, value_name = "DIR")]
     check: Option<PathBuf>,
@@ -109,8 +112,13 @@ fn run(arguments: &Arguments) -> Result<()> {
             return Err(Error::Unknown(format!("no item or claim is called \"{id}\"; see reproduce --list")));
         }
     }
-    let mut context =
-        Context::new(&arguments.out, arguments.meshes.as_deref(), arguments.quick, arguments.check.as_deref())?;
+    let mut context = Context::new(
+        &arguments.out,
+        arguments.meshes.as_deref(),
+        arguments.quick,
+        arguments.check.as_deref(),
+        Printer::new(arguments.json),
+    )?;
     let steps = chosen.len() + usize::from(!claims.is_empty());
     let progress = Progress::new("reproduce", steps, arguments.common.quiet);
     for item in &chosen {
@@ -128,5 +136,6 @@ fn run(arguments: &Arguments) -> Result<()> {
         context.write_index(&ITEMS)?;
         arguments.common.remark(format_args!("reports: {}", context.folder().display()));
     }
-    context.verdict()
+    let claims = claims::json(&context.ledger);
+    context.finish(claims)
 }

@@ -1,8 +1,9 @@
-//! What the machine gives: memory bandwidth by STREAM's triad, and the process's memory.
+//! Memory bandwidth by STREAM's triad, and the heap that a run takes.
 
 use std::hint::black_box;
 use std::time::Instant;
 
+use peak_alloc::PeakAlloc;
 use rayon::prelude::*;
 
 /// Bytes per second of `a ← b + s·c` on arrays far larger than the caches, as STREAM counts them (24 bytes an
@@ -28,24 +29,15 @@ pub fn triad() -> f64 {
     24.0 * ENTRIES as f64 / best
 }
 
-/// The memory that `work` needs beyond what was held before, in bytes, where the system tells (Linux).
-pub fn peak_memory<T>(work: impl FnOnce() -> T) -> (T, Option<u64>) {
-    // 5 resets the peak of the resident set (proc(5)).
-    let reset = std::fs::write("/proc/self/clear_refs", "5").is_ok();
-    let before = status("VmRSS:");
-    let result = work();
-    let peak = status("VmHWM:");
-    let more = match (reset, before, peak) {
-        (true, Some(before), Some(peak)) => Some(peak.saturating_sub(before)),
-        _ => None,
-    };
-    (result, more)
-}
+/// Counts the heap. (What the system counts, the resident set, says nothing of a run: memory that an earlier run has let
+/// go is taken again.)
+#[global_allocator]
+static HEAP: PeakAlloc = PeakAlloc;
 
-/// A line of /proc/self/status, in bytes.
-fn status(name: &str) -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = text.lines().find(|l| l.starts_with(name))?;
-    let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(1024 * kilobytes)
+/// The most bytes of heap that `work` holds at once, beyond what was held before.
+pub fn peak_memory<T>(work: impl FnOnce() -> T) -> (T, usize) {
+    HEAP.reset_peak_usage();
+    let before = HEAP.current_usage();
+    let result = work();
+    (result, HEAP.peak_usage().saturating_sub(before))
 }

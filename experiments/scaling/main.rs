@@ -14,9 +14,11 @@ use std::time::Instant;
 
 use clap::Parser;
 use glam::DVec3;
+use serde_json::json;
+
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::{LimitSystem, Operator, Scheme};
-use limitlab::cli::{self, CommonFlags, List, Progress};
+use limitlab::cli::{self, CommonFlags, List, Printer, Progress, number};
 use limitlab::error::{Error, Result};
 use limitlab::interpolate::automatic::{control_points, renumbered};
 use limitlab::mesh::colours::in_colours;
@@ -74,6 +76,9 @@ struct Arguments {
     /// Folder for the CSV, Markdown and PNG files
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
+    /// Print one JSON object on standard output, and nothing else there: all tables
+    #[arg(long)]
+    json: bool,
     #[command(flatten)]
     common: CommonFlags,
 }
@@ -95,6 +100,7 @@ fn main() -> ExitCode {
 fn measure(arguments: &Arguments) -> Result<()> {
     let threads = rayon::current_num_threads();
     let bandwidth = machine::triad();
+    let mut printer = Printer::new(arguments.json);
     let mut table = Table::new(
         "scaling",
         "Time and memory from faces in memory to control points",
@@ -114,8 +120,8 @@ fn measure(arguments: &Arguments) -> Result<()> {
     );
     table.note(format!(
         "{threads} threads, STREAM triad {:.1} GB/s in this run. Noise 0.1 on every mesh; start V = P; stop at max_i ‖p_i − \
-         (A v)_i‖ ≤ {:e}·L. Seconds count topology, order, set-up and solve; the memory is what is needed beyond the \
-         mesh. Order random: vertices and faces shuffled.",
+         (A v)_i‖ ≤ {:e}·L. Seconds count topology, order, set-up and solve; the memory is the most heap that is held \
+         at once beyond the mesh. Order random: vertices and faces shuffled.",
         bandwidth / 1e9,
         arguments.tol
     ));
@@ -136,28 +142,28 @@ fn measure(arguments: &Arguments) -> Result<()> {
         (figure.width, figure.height) = (900, 40 + 230 * rows);
         figure.render()?.save(&arguments.out.join("scaling.png"))?;
     }
-    local_edits(arguments)?;
+    local_edits(arguments, &mut printer)?;
     if arguments.steps >= LEAST {
-        steps::steps(arguments.steps, &arguments.out)?;
+        steps::steps(arguments.steps, &arguments.out, &mut printer)?;
     }
     let all = rayon::current_num_threads();
     if arguments.gains >= LEAST && all > 1 {
-        threads::gains(arguments, all)?;
+        threads::gains(arguments, all, &mut printer)?;
     }
     if arguments.profile >= LEAST {
         let name = family(Scheme::CatmullClark, arguments.profile);
         let mesh = noisy(&name)?;
         let profile = profile::profile(&name, &mesh, Scheme::CatmullClark, all)?;
         profile.write(&arguments.out)?;
-        cli::print(&profile.to_markdown())?;
+        printer.table(&profile)?;
     }
-    cli::print(&table.to_markdown())?;
+    printer.table(&table)?;
     arguments.common.remark(format_args!("tables and plot: {}", arguments.out.display()));
-    Ok(())
+    printer.finish(json!({ "threads": threads, "triad_bytes_per_second": number(bandwidth) }))
 }
 
 /// Local edits on the meshes of all schemes and sizes, and the decay on the largest.
-fn local_edits(arguments: &Arguments) -> Result<()> {
+fn local_edits(arguments: &Arguments, printer: &mut Printer) -> Result<()> {
     let mut sizes = arguments.sizes.0.clone();
     sizes.retain(|&n| n <= arguments.most_edits);
     let Some(&last) = sizes.last() else {
@@ -177,7 +183,7 @@ fn local_edits(arguments: &Arguments) -> Result<()> {
     }
     table.write(&arguments.out)?;
     edits::decay_table(&largest)?.write(&arguments.out)?;
-    cli::print(&table.to_markdown())
+    printer.table(&table)
 }
 
 /// The built-in mesh of about `n` vertices that suits the scheme.
@@ -308,7 +314,7 @@ fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut 
                     seconds.into(),
                     outcome.solve_seconds.into(),
                     (1e9 * seconds / mesh.len() as f64).into(),
-                    memory.map(|m| m as f64 / 1e6).into(),
+                    (memory as f64 / 1e6).into(),
                 ]);
                 let at = (mesh.len() as f64, 1e9 * seconds / mesh.len() as f64);
                 let known = curves.iter_mut().find(|c| c.way == way && c.random == random);
@@ -379,7 +385,7 @@ fn timed(
     scheme: Scheme,
     way: Way,
     estimate: f64,
-) -> Result<Option<(f64, Outcome, Option<u64>)>> {
+) -> Result<Option<(f64, Outcome, usize)>> {
     let paths = ["points", "control"].map(|name| arguments.out.join(format!("scaling-{name}.ply")));
     if way == Way::Files {
         io::write(&paths[0], mesh, None)?;

@@ -3,7 +3,9 @@
 use std::path::Path;
 use std::time::Instant;
 
+use limitlab::Result;
 use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::cli::Printer;
 use limitlab::error::Error;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::order::Order;
@@ -11,7 +13,6 @@ use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Mesh, Topology, io};
 use limitlab::report::{Cell, Column, Table};
 use limitlab::subdivide::{Refinement, sqrt3, unified_sqrt3};
-use limitlab::{Result, cli};
 
 use super::noisy;
 use super::threads::on_threads;
@@ -21,7 +22,7 @@ const RUNS: usize = 3;
 
 /// Measures all steps at about `n` vertices and writes the table to `folder`, which also takes the mesh files for a
 /// while.
-pub fn steps(n: usize, folder: &Path) -> Result<()> {
+pub fn steps(n: usize, folder: &Path, printer: &mut Printer) -> Result<()> {
     let mut table = Table::new(
         "scaling-steps",
         "The steps around the solve",
@@ -64,7 +65,7 @@ pub fn steps(n: usize, folder: &Path) -> Result<()> {
         }
     }
     table.write(folder)?;
-    cli::print(&table.to_markdown())
+    printer.table(&table)
 }
 
 /// The rows of one mesh and number of threads.

@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
+use limitlab::Result;
 use limitlab::assemble::{Operator, Scheme};
+use limitlab::cli::Printer;
 use limitlab::error::Error;
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::fronts::in_fronts;
@@ -12,7 +14,6 @@ use limitlab::solvers::Method;
 use limitlab::solvers::coloured::Coloured;
 use limitlab::solvers::system::Rows;
 use limitlab::solvers::wavefront::Wavefront;
-use limitlab::{Result, cli};
 
 use super::machine::triad;
 use super::{Arguments, Way, estimate, family, go, noisy};
@@ -41,7 +42,7 @@ pub fn on_threads<T: Send>(count: usize, work: impl FnOnce() -> T + Send) -> Res
 }
 
 /// Writes the table of quads under Catmull-Clark and triangles under Loop.
-pub fn gains(arguments: &Arguments, all: usize) -> Result<()> {
+pub fn gains(arguments: &Arguments, all: usize, printer: &mut Printer) -> Result<()> {
     let runs = usize::from(arguments.runs).max(2);
     let mut table = Table::new(
         "scaling-threads",
@@ -119,7 +120,7 @@ pub fn gains(arguments: &Arguments, all: usize) -> Result<()> {
         }
     }
     table.write(&arguments.out)?;
-    cli::print(&table.to_markdown())
+    printer.table(&table)
 }
 
 /// The building blocks, each with its seconds: products and sweeps in double precision, the operator.

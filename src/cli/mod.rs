@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
+use crate::report::Table;
 use crate::solvers::Stop;
 
 /// Flags of every program: threads and silence.
@@ -192,6 +193,54 @@ pub fn finish(mut results: Vec<Value>, output: &OutputFlags, common: &CommonFlag
         _ => json!({ "results": results }),
     };
     print(&format!("{object:#}"))
+}
+
+/// What a program of several tables prints on standard output: each in Markdown as soon as it is there, or with `--json`
+/// one object with all of them at the end.
+pub struct Printer {
+    json: bool,
+    tables: Vec<Value>,
+}
+
+impl Printer {
+    pub fn new(json: bool) -> Self {
+        Printer { json, tables: Vec::new() }
+    }
+
+    /// A table.
+    ///
+    /// # Errors
+    /// If standard output cannot be written.
+    pub fn table(&mut self, table: &Table) -> Result<()> {
+        if self.json {
+            self.tables.push(json!({ "id": table.id, "title": table.title, "rows": table.to_json() }));
+            return Ok(());
+        }
+        print(&table.to_markdown())
+    }
+
+    /// A page for people, which the JSON object lacks.
+    ///
+    /// # Errors
+    /// As [`table`](Self::table).
+    pub fn page(&self, text: &str) -> Result<()> {
+        if self.json { Ok(()) } else { print(text) }
+    }
+
+    /// The end: with `--json` prints the object of `fields` and `tables`.
+    ///
+    /// # Errors
+    /// As [`table`](Self::table).
+    ///
+    /// # Panics
+    /// If `fields` is not an object.
+    pub fn finish(self, mut fields: Value) -> Result<()> {
+        if !self.json {
+            return Ok(());
+        }
+        fields["tables"] = self.tables.into();
+        print(&format!("{fields:#}"))
+    }
 }
 
 /// A number for JSON: `null` if it is not finite.

@@ -5,6 +5,7 @@ mod common;
 
 mod bad_input;
 mod contract;
+mod metadata;
 mod results;
 
 use std::fs;

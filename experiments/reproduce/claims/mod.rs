@@ -25,7 +25,7 @@ use std::fmt::Write as _;
 use serde_json::{Value as Json, json};
 
 use limitlab::Result;
-use limitlab::cli::{self, number};
+use limitlab::cli::number;
 use limitlab::error::Error;
 use limitlab::output::write_file;
 use limitlab::report::{Cell, Column, Table, readable};
@@ -83,8 +83,10 @@ pub fn find(id: &str) -> Option<&'static Claim> {
 pub fn run_alone(context: &mut Context, claims: &[&'static Claim]) -> Result<()> {
     let records = compute(context, claims.iter().copied())?;
     let sections: Vec<String> = records.iter().map(section).collect();
-    cli::print(&sections.join("\n"))?;
-    context.compare(&table(&records))
+    context.printer.page(&sections.join("\n"))?;
+    context.compare(&table(&records))?;
+    context.ledger = records;
+    Ok(())
 }
 
 fn run_ledger(context: &mut Context) -> Result<()> {
@@ -97,7 +99,7 @@ fn run_ledger(context: &mut Context) -> Result<()> {
     write("claims.md", &page)?;
     write("claims.csv", &table.to_csv())?;
     write("claims.json", &format!("{:#}\n", json(&records)))?;
-    cli::print(&page)?;
+    context.printer.page(&page)?;
     context.compare(&table)?;
     context.ledger = records;
     Ok(())
@@ -113,7 +115,7 @@ fn run_findings(context: &mut Context) -> Result<()> {
     }
     let page = findings::page(&context.note_on_meshes(), &context.ledger)?;
     write_file(&context.folder().join("findings.md"), |out| out.write_all(page.as_bytes()))?;
-    cli::print(&page)
+    context.printer.page(&page)
 }
 
 fn compute(context: &Context, claims: impl Iterator<Item = &'static Claim>) -> Result<Vec<Record>> {
@@ -178,7 +180,7 @@ fn table(records: &[Record]) -> Table {
     table
 }
 
-fn json(records: &[Record]) -> Json {
+pub fn json(records: &[Record]) -> Json {
     let evidence = |e: &Evidence| {
         let value = match e.value {
             Value::Count(n) => n.into(),
