@@ -95,11 +95,11 @@ impl Scalar {
 
 impl Header {
     pub fn read(s: &mut Scanner, path: &Path) -> Result<Self> {
-        let start = s.rest();
-        if s.token() != b"ply" {
-            let what = other_kind(start).unwrap_or("its first line is not \"ply\"");
+        if s.peek_token() != b"ply" {
+            let what = other_kind(s.rest()).unwrap_or("its first line is not \"ply\"");
             return Err(Error::parse(path, Some(1), format!("not a PLY file: {what}")));
         }
+        s.token();
         s.skip_blanks();
         if !s.at_line_end() {
             return Err(s.unexpected("the end of the line"));
