@@ -1,8 +1,9 @@
 //! Writing files so that nothing half-written is ever seen under the name that was asked for.
 //!
 //! A file is first written under another name beside its target, then renamed. A symbolic link at the target is
-//! followed; the file's mode is the one that the umask gives. What is not a regular file (`/dev/stdout`, a
-//! terminal, a pipe) is written straight. Data are handed to the operating system, not forced onto the disk.
+//! followed; a file that is read-only is refused, any other gets the mode that the umask gives. What is not a regular
+//! file (`/dev/stdout`, a terminal, a pipe) is written straight. Data are handed to the operating system, not forced
+//! onto the disk.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
@@ -35,6 +36,20 @@ pub fn write_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<(
     let mut batch = Batch::default();
     batch.write(path, fill)?;
     batch.commit()
+}
+
+/// Checks before the work that [`write_file`] can write `path` after it: the folder is there and takes new files, and
+/// what has the name already is neither a folder nor protected. Nothing is left behind. What is not a regular file is
+/// not opened, for a reader may wait at its other end.
+///
+/// # Errors
+/// [`Error::Io`] naming `path`, as [`write_file`] would give it.
+pub fn check_target(path: &Path) -> Result<()> {
+    let check = || match destination(path)? {
+        Destination::Straight => Ok(()),
+        Destination::Rename { folder, .. } => Temporary::create(&folder).map(|_| ()),
+    };
+    check().map_err(|e| Error::io(path, "write", e))
 }
 
 /// Creates a folder and the folders above it; one that is there already is fine.
@@ -114,11 +129,25 @@ fn destination(path: &Path) -> io::Result<Destination> {
         hop = folder.join(&name);
         match fs::symlink_metadata(&hop) {
             Ok(found) if found.is_symlink() => hop = folder.join(fs::read_link(&hop)?),
-            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
-            _ => return Ok(Destination::Rename { folder, name }),
+            Ok(found) => {
+                check_unprotected(&hop, &found)?;
+                return Ok(Destination::Rename { folder, name });
+            }
+            Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Destination::Rename { folder, name }),
+            Err(e) => return Err(e),
         }
     }
     Err(io::Error::other("too many symbolic links"))
+}
+
+/// Refuses to replace a file that may not be written to: the folder alone decides what can be renamed, but whoever
+/// protects a file means its content. The mode counts for the superuser too, who could open it.
+fn check_unprotected(file: &Path, found: &fs::Metadata) -> io::Result<()> {
+    if found.permissions().readonly() {
+        let what = "the file there is read-only: name another, or allow writing to it first (chmod u+w)";
+        return Err(io::Error::new(io::ErrorKind::PermissionDenied, what));
+    }
+    OpenOptions::new().append(true).open(file).map(|_| ())
 }
 
 /// The folder of `path`, free of links, and the name in it.
@@ -250,6 +279,29 @@ mod tests {
     }
 
     #[test]
+    fn targets_are_checked_before_the_work_as_they_are_when_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let protected = folder.path().join("protected");
+        write(&protected, "mine").unwrap();
+        let mut permissions = fs::metadata(&protected).unwrap().permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(&protected, permissions).unwrap();
+        let missing = folder.path().join("no/a");
+        for (path, what) in [
+            (protected.as_path(), "the file there is read-only: name another"),
+            (&missing, "there is no folder"),
+            (folder.path(), "it is a folder: name a file"),
+        ] {
+            let before = check_target(path).unwrap_err().to_string();
+            assert!(before.contains(what), "{before}");
+            assert_eq!(write(path, "x").unwrap_err().to_string(), before);
+        }
+        assert_eq!(fs::read_to_string(&protected).unwrap(), "mine");
+        check_target(&folder.path().join("fresh")).unwrap();
+        assert_eq!(names(folder.path()), ["protected"]);
+    }
+
+    #[test]
     fn a_batch_appears_as_a_whole_or_not_at_all() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
@@ -314,6 +366,13 @@ mod tests {
     #[cfg(target_os = "linux")]
     mod linux {
         use super::*;
+
+        #[test]
+        fn standard_streams_are_fine_targets_and_are_not_opened_by_the_check() {
+            for path in ["/dev/stdout", "/dev/full", "/dev/fd/1"] {
+                check_target(Path::new(path)).unwrap();
+            }
+        }
 
         #[test]
         fn a_full_device_is_an_error_and_stays_a_device() {

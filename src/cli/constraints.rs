@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use super::input::has_mesh_ending;
 use crate::error::{Error, Result};
-use crate::mesh::io;
+use crate::mesh::text::{Scanner, quoted};
+use crate::mesh::{io, magic};
 
 /// Reads `LIST|FILE` of vertices: numbers and ranges `A..B` (both ends included), separated by commas or white
 /// space; in a file `#` starts a comment. One mark a vertex comes back.
@@ -15,25 +16,28 @@ use crate::mesh::io;
 /// What is no number, and a vertex that the mesh lacks, with the line in a file.
 pub fn vertex_marks(text: &str, vertices: usize) -> Result<Vec<bool>> {
     let path = Path::new(text);
-    let (content, path) = if path.is_file() { (read(path)?, Some(path)) } else { (text.to_owned(), None) };
+    let is_file = path.is_file();
+    let bytes = if is_file { read(path)? } else { text.into() };
+    let mut s = Scanner::new(&bytes, path);
     let mut marks = vec![false; vertices];
-    for (number, line) in content.lines().enumerate() {
-        let refuse = |what: String| match path {
-            Some(path) => Error::parse(path, Some(number + 1), what),
-            None => Error::Unknown(format!("--vertices: {what}")),
-        };
-        let separators = |c: char| c == ',' || c.is_whitespace();
-        for item in strip(line).split(separators).filter(|i| !i.is_empty()) {
-            let (from, to) = item.split_once("..").unwrap_or((item, item));
-            let (Ok(from), Ok(to)) = (from.parse::<usize>(), to.parse::<usize>()) else {
-                return Err(refuse(format!(
-                    "`{item}` is neither a vertex, a range A..B nor a file: vertices are numbered from 0"
-                )));
+    loop {
+        s.skip_space();
+        if s.at_end() {
+            break;
+        }
+        for item in s.token().split(|&b| b == b',').filter(|i| !i.is_empty()) {
+            let refuse = |what: &str| {
+                let what = format!("{} {what}", quoted(item));
+                if is_file { s.error(what) } else { Error::Unknown(format!("--vertices: {what}")) }
             };
+            let range = std::str::from_utf8(item).ok().and_then(|item| {
+                let (from, to) = item.split_once("..").unwrap_or((item, item));
+                Some((from.parse::<usize>().ok()?, to.parse::<usize>().ok()?))
+            });
+            let (from, to) = range
+                .ok_or_else(|| refuse("is neither a vertex, a range A..B nor a file: vertices are numbered from 0"))?;
             if from > to || to >= vertices {
-                return Err(refuse(format!(
-                    "`{item}` names a vertex that the mesh lacks: it has {vertices}, numbered from 0"
-                )));
+                return Err(refuse(&format!("names a vertex that the mesh lacks: it has {vertices}, numbered from 0")));
             }
             marks[from..=to].fill(true);
         }
@@ -56,7 +60,8 @@ pub fn normals(path: &Path, vertices: usize) -> Result<Vec<Option<DVec3>>> {
         return Err(Error::parse(
             path,
             None,
-            "holds no normals: export them, or use a text file with lines `vertex nx ny nz`",
+            "holds no normals that can be told from other numbers: export them, in OFF as NOFF without colours, or \
+             use a text file with lines `vertex nx ny nz`",
         ));
     };
     if normals.len() != vertices {
@@ -84,34 +89,41 @@ pub fn numbers(text: &str, vertices: usize, otherwise: f64) -> Result<Vec<f64>> 
 /// The lines of a text file as a vertex and K numbers each.
 fn rows<const K: usize>(path: &Path, vertices: usize, form: &str) -> Result<Vec<Option<[f64; K]>>> {
     let mut rows = vec![None; vertices];
-    for (number, line) in read(path)?.lines().enumerate() {
-        let refuse = |what: String| Err(Error::parse(path, Some(number + 1), what));
-        let mut items = strip(line).split_whitespace();
-        let Some(vertex) = items.next() else { continue };
+    let bytes = read(path)?;
+    let mut s = Scanner::new(&bytes, path);
+    loop {
+        s.skip_space();
+        if s.at_end() {
+            return Ok(rows);
+        }
+        let vertex: usize =
+            s.unsigned().ok_or_else(|| s.unexpected(format_args!("the vertex (0, 1, 2, …) of a line `{form}`")))?;
         let mut row = [0.0; K];
-        let complete = row.iter_mut().all(|x| {
-            let item = items.next().and_then(|item| item.parse().ok());
-            item.map(|value| *x = value).is_some()
-        });
-        let (Ok(vertex), true, None) = (vertex.parse::<usize>(), complete, items.next()) else {
-            return refuse(format!("`{}` is not of the form `{form}`", line.trim()));
-        };
+        for x in &mut row {
+            s.skip_blanks();
+            let place = s.clone();
+            let number = s.number().filter(|number| number.is_finite());
+            *x = number.ok_or_else(|| place.unexpected(format_args!("a finite number of a line `{form}`")))?;
+        }
+        s.skip_blanks();
+        if !s.at_line_end() {
+            return Err(s.unexpected(format_args!("the end of a line `{form}`")));
+        }
         let Some(place) = rows.get_mut(vertex) else {
-            return refuse(format!("vertex {vertex} is not in the mesh: it has {vertices}, numbered from 0"));
+            return Err(s.error(format!("vertex {vertex} is not in the mesh: it has {vertices}, numbered from 0")));
         };
         if place.replace(row).is_some_and(|before| before != row) {
-            return refuse(format!("vertex {vertex} is given twice, and differently: keep one"));
+            return Err(s.error(format!("vertex {vertex} is given twice, and differently: keep one")));
         }
     }
-    Ok(rows)
 }
 
-fn strip(line: &str) -> &str {
-    line.split('#').next().unwrap_or_default()
-}
-
-fn read(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).map_err(|e| Error::io(path, "read", e))
+fn read(path: &Path) -> Result<Vec<u8>> {
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    match magic::other_kind(&bytes) {
+        Some(what) => Err(Error::parse(path, None, format!("not a text file: {what}"))),
+        None => Ok(bytes),
+    }
 }
 
 #[cfg(test)]
@@ -134,11 +146,12 @@ mod tests {
         let listed = file("# chosen\n0 3..5 # a range\n\n9\n");
         assert_eq!(marked(listed.path().to_str().unwrap()), [0, 3, 4, 5, 9]);
         let refused = |text: &str| vertex_marks(text, 10).unwrap_err().to_string();
-        assert!(refused("3,x").starts_with("--vertices: `x` is neither"));
+        assert!(refused("3,x").starts_with("--vertices: \"x\" is neither"));
         assert!(refused("5..10").contains("the mesh lacks: it has 10"));
         assert!(refused("5..4").contains("lacks"));
+        assert!(refused(file("1 2#3\n").path().to_str().unwrap()).contains(", line 1: \"2#3\""));
         let bad = file("1\n2 ten\n");
-        assert!(refused(bad.path().to_str().unwrap()).contains(", line 2: `ten`"));
+        assert!(refused(bad.path().to_str().unwrap()).contains(", line 2: \"ten\""));
     }
 
     #[test]
@@ -147,9 +160,14 @@ mod tests {
         let found = normals(good.path(), 3).unwrap();
         assert_eq!(found, [Some(DVec3::new(1e-3, 2.0, -3.0)), None, Some(DVec3::Z)]);
         for (text, what) in [
-            ("0 1 2\n", ", line 1: `0 1 2` is not of the form"),
-            ("0 1 2 3 4\n", ", line 1: `0 1 2 3 4` is not of the form"),
-            ("\n-1 1 2 3\n", ", line 2: `-1 1 2 3` is not of the form"),
+            ("0 1 2\n", ", line 1: the line ends where a finite number of a line `vertex nx ny nz`"),
+            ("0 1 2 3 4\n", ", line 1: \"4\" is not the end of a line `vertex nx ny nz`"),
+            ("\n-1 1 2 3\n", ", line 2: \"-1\" is not the vertex (0, 1, 2, …) of a line"),
+            (
+                "# x\r0 1 2 -1.#IND\r",
+                ", line 2: \"-1.#IND\" is not a finite number of a line `vertex nx ny nz`: it stands",
+            ),
+            ("0 1 2 nan\n", ", line 1: \"nan\" is not a finite number"),
             ("0 0 0 1\n3 1 2 3\n", ", line 2: vertex 3 is not in the mesh"),
             ("1 0 0 1\n1 0 0 2\n", ", line 2: vertex 1 is given twice"),
         ] {

@@ -3,8 +3,8 @@
 //! The readers refuse what is not their format, with the line. They do not judge the mesh: indices beyond the last
 //! vertex, coordinates that are not finite, and so on, are for [`validate`](super::validate) to collect.
 
-use std::fs;
-use std::io::{self, Write};
+use std::fs::File;
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use glam::DVec3;
@@ -49,8 +49,31 @@ impl Format {
             "obj" => Ok(Format::Obj),
             "off" => Ok(Format::Off),
             "ply" => Ok(Format::Ply),
+            // Standard streams, and the pipes that shells make, have names without ending.
+            "" if path.starts_with("/dev") => Ok(Format::Obj),
             _ => Err(Error::parse(path, None, "not a known mesh format: the name must end in .obj, .off or .ply")),
         }
+    }
+
+    /// Reads a file, all of it only if its first bytes can be of this format.
+    fn read_file(self, path: &Path) -> Result<Vec<u8>> {
+        const HEAD: u64 = 1 << 16;
+        let refused = |e| Error::io(path, "read", e);
+        let mut file = File::open(path).map_err(refused)?;
+        let mut bytes = Vec::new();
+        (&mut file).take(HEAD).read_to_end(&mut bytes).map_err(refused)?;
+        if bytes.len() as u64 == HEAD {
+            // Whole lines, unless the last is longer than a header's lines are.
+            let end = bytes.iter().rev().take(1 << 12).position(|&b| matches!(b, b'\n' | b'\r'));
+            let lines = bytes.len() - end.unwrap_or(0);
+            match self {
+                Format::Obj => obj::check_head(&bytes[..lines], path),
+                Format::Off => off::check_head(&bytes[..lines], path),
+                Format::Ply => ply::check_head(&bytes[..lines], path),
+            }?;
+            file.read_to_end(&mut bytes).map_err(refused)?;
+        }
+        Ok(bytes)
     }
 }
 
@@ -62,14 +85,15 @@ pub fn check_name(path: &Path) -> Result<()> {
     Format::of(path).map(|_| ())
 }
 
-/// Reads a mesh file, whose extension (`.obj`, `.off` or `.ply` in any case) names its format.
+/// Reads a mesh file, whose extension (`.obj`, `.off` or `.ply` in any case) names its format; what lies in `/dev` and
+/// has none is OBJ.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read; [`Error::Parse`], with the line where there is one, if it is not what
 /// its format says.
 pub fn read(path: &Path) -> Result<Loaded> {
     let format = Format::of(path)?;
-    let bytes = fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let bytes = format.read_file(path)?;
     match format {
         Format::Obj => obj::read_bytes(&bytes, path),
         Format::Off => off::read_bytes(&bytes, path),
@@ -84,10 +108,11 @@ pub fn read(path: &Path) -> Result<Loaded> {
 /// As [`read`], and for OBJ: a vertex whose corners have different normals, a corner that refers to a normal which is
 /// not there.
 pub fn read_normals(path: &Path) -> Result<Option<Vec<DVec3>>> {
-    let Format::Obj = Format::of(path)? else {
+    let format = Format::of(path)?;
+    let Format::Obj = format else {
         return Ok(read(path)?.normals);
     };
-    let bytes = fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let bytes = format.read_file(path)?;
     let loaded = obj::read_bytes(&bytes, path)?;
     obj_normals::read(&bytes, path, loaded.mesh.len())
 }
@@ -255,8 +280,46 @@ mod tests {
         let path = folder.path().join("a.off");
         let text = read(&path).unwrap_err().to_string();
         assert!(text.contains("a.off: cannot read: "), "{text}");
-        fs::create_dir(&path).unwrap();
+        std::fs::create_dir(&path).unwrap();
         assert!(matches!(read(&path), Err(Error::Io { .. })));
+    }
+
+    #[test]
+    fn a_large_file_of_another_kind_is_refused_by_its_first_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        for (start, told) in [
+            ("", ["zero bytes"; 3]),
+            ("ply\nformat text 1.0\n", ["it is a PLY file", "it is a PLY file", "\"text\" is not a PLY format"]),
+            ("OFF\nx", ["it is an OFF file", "is not the number of vertices", "it is an OFF file"]),
+            ("\x1F\u{8b}", ["is not an OBJ statement", "is not an OFF header", "first line is not \"ply\""]),
+        ] {
+            for (ending, told) in ["obj", "off", "ply"].into_iter().zip(told) {
+                let path = folder.path().join(format!("a.{ending}"));
+                std::fs::write(&path, start).unwrap();
+                // Sparse, and more than there is memory for: refused without being read.
+                File::options().write(true).open(&path).unwrap().set_len(1 << 34).unwrap();
+                let text = read(&path).unwrap_err().to_string();
+                assert!(text.contains(told), "{ending} {start:?}: {text}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_large_file_may_begin_with_a_long_comment() {
+        let folder = tempfile::tempdir().unwrap();
+        let comment = "x".repeat(200_000);
+        let triangle = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+        let ply = "property float x\nproperty float y\nproperty float z\nelement face 1\n\
+                   property list uchar int vertex_indices\nend_header\n";
+        for (name, text) in [
+            ("a.obj", format!("# {comment}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")),
+            ("a.off", format!("# {comment}\nOFF\n3 1 0\n{triangle}")),
+            ("a.ply", format!("ply\nformat ascii 1.0\ncomment {comment}\nelement vertex 3\n{ply}{triangle}")),
+        ] {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            assert_eq!(read(&path).unwrap().mesh.faces.len(), 1, "{name}");
+        }
     }
 
     #[test]

@@ -12,13 +12,14 @@ pub mod fronts;
 pub mod generate;
 pub mod incidence;
 pub mod io;
+pub(crate) mod magic;
 pub mod noise;
 pub mod obj;
 mod obj_normals;
 pub mod off;
 pub mod order;
 pub mod ply;
-mod text;
+pub(crate) mod text;
 pub mod topology;
 pub mod validate;
 

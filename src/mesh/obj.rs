@@ -7,7 +7,8 @@ use glam::DVec3;
 
 use super::Mesh;
 use super::io::{Builder, Lines, Loaded, check_normals, write_rows};
-use super::text::{Scanner, leading_digits, push_point, push_unsigned};
+use super::magic::other_kind;
+use super::text::{Scanner, continues_line, leading_digits, push_point, push_unsigned};
 use crate::{Error, Result};
 
 /// Statements that are read over, by what they are about.
@@ -50,15 +51,18 @@ const DROPPED: [(&str, &[&[u8]]); 8] = [
     ),
 ];
 
+/// Statements that end with a name.
+const NAMES: [&[u8]; 6] = [b"g", b"o", b"usemtl", b"mtllib", b"usemap", b"maplib"];
+
 /// Reads the bytes of an OBJ file; `path` is for messages.
 ///
 /// Corners may be `v`, `v/vt`, `v//vn`, `v/vt/vn`, and negative to count back from the last vertex read so far; a
-/// backslash continues a line. One remark names with counts what the mesh does not keep: all other statements,
-/// weights and colours after coordinates. Another tells if the last line has no end, for an OBJ file announces no
+/// backslash continues a line of numbers, and is part of a name, as in Windows paths. One remark names with counts what
+/// the mesh does not keep: all other statements, weights and colours after coordinates. Another tells if the last line has no end, for an OBJ file announces no
 /// counts by which a cut could be noticed.
 ///
 /// # Errors
-/// [`Error::Parse`] with the line: a coordinate that is no number, a corner that is none or that reaches before the
+/// [`Error::Parse`] with the line: another kind of file; a coordinate that is no number, a corner that is none or that reaches before the
 /// first vertex, a face of fewer than three corners; a file without any vertex.
 ///
 /// ```
@@ -69,10 +73,12 @@ const DROPPED: [(&str, &[&[u8]]); 8] = [
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
+    check_kind(bytes, path)?;
     let mut s = Scanner::new(bytes, path);
     let mut builder = Builder::new(Some(Lines::default()));
     let mut dropped = [0usize; DROPPED.len()];
-    let mut extended_vertices = 0;
+    let (mut weighted, mut unequal, mut coloured) = (0usize, 0usize, 0usize);
+    let mut name_with_backslash = None;
     let mut unknown: Option<(usize, Error)> = None;
     loop {
         s.skip_space();
@@ -90,7 +96,14 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
                 s.advance(1);
                 let vertex = builder.vertices();
                 let position = coordinates(&mut s, vertex)?;
-                extended_vertices += usize::from(has_more_numbers(&mut s, vertex)?);
+                match more_numbers(&mut s, vertex)? {
+                    (0, _) => {}
+                    (1, weight) => {
+                        weighted += 1;
+                        unequal += usize::from(weight != 1.0);
+                    }
+                    _ => coloured += 1,
+                }
                 builder.vertex(position, line).map_err(at)?;
             }
             b"f" => {
@@ -105,14 +118,16 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
                 builder.end_face(line).map_err(at)?;
             }
             keyword => {
-                match DROPPED.iter().position(|(_, words)| words.contains(&keyword)) {
+                match kind_of(keyword) {
                     Some(kind) => dropped[kind] += 1,
                     None => match &mut unknown {
                         Some((count, _)) => *count += 1,
                         None => unknown = Some((1, s.unexpected("an OBJ statement"))),
                     },
                 }
-                skip_statement(&mut s);
+                if skip_statement(&mut s, keyword) {
+                    name_with_backslash.get_or_insert(line);
+                }
             }
         }
     }
@@ -127,8 +142,16 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
         .filter(|&(_, count)| count > 0)
         .map(|((what, _), count)| format!("{count} {what}"))
         .collect();
-    if extended_vertices > 0 {
-        not_kept.push(format!("weights or colours of {extended_vertices} vertices"));
+    if weighted > 0 {
+        let unequal = if unequal > 0 {
+            format!(" ({unequal} of them are not 1: the coordinates are not divided by them)")
+        } else {
+            String::new()
+        };
+        not_kept.push(format!("weights of {weighted} vertices{unequal}"));
+    }
+    if coloured > 0 {
+        not_kept.push(format!("colours of {coloured} vertices"));
     }
     let mut remarks = Vec::new();
     if !not_kept.is_empty() {
@@ -137,30 +160,71 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     if let Some((count, first)) = unknown {
         remarks.push(format!("{count} unknown statements passed over, the first at {first}"));
     }
+    if let Some(line) = name_with_backslash {
+        remarks.push(format!(
+            "a backslash ends the name on line {line}: it is read as part of the name and does not continue the line"
+        ));
+    }
     if s.ends_within_a_line() {
         remarks.push("the last line has no end: was the file cut off?".into());
     }
     Ok(builder.finish(path, None, remarks))
 }
 
+/// Refuses the first bytes of a file, whole lines, if all that they hold is no OBJ.
+pub(super) fn check_head(head: &[u8], path: &Path) -> Result<()> {
+    check_kind(head, path)?;
+    let mut s = Scanner::of_head(head, path);
+    s.skip_space();
+    let first = s.unexpected("an OBJ statement");
+    while !s.at_end() {
+        let keyword = s.token();
+        if matches!(keyword, b"v" | b"f") || kind_of(keyword).is_some() {
+            return Ok(());
+        }
+        s.skip_line();
+        s.skip_space();
+        if s.at_end() {
+            return Err(first);
+        }
+    }
+    Ok(())
+}
+
+fn check_kind(bytes: &[u8], path: &Path) -> Result<()> {
+    match other_kind(bytes) {
+        Some(what) => Err(Error::parse(path, None, format!("not an OBJ file: {what}"))),
+        None => Ok(()),
+    }
+}
+
+/// Which of [`DROPPED`] a keyword is.
+fn kind_of(keyword: &[u8]) -> Option<usize> {
+    DROPPED.iter().position(|(_, words)| words.contains(&keyword))
+}
+
 /// Skips blanks, over line ends that a backslash continues.
 pub(super) fn skip_blanks(s: &mut Scanner) {
     s.skip_blanks();
-    while let [b'\\', b'\n' | b'\r', ..] = s.rest() {
+    while continues_line(s.rest()) {
         s.advance(1);
         s.skip_line_break();
         s.skip_blanks();
     }
 }
 
-pub(super) fn skip_statement(s: &mut Scanner) {
+/// Skips what is left of a statement: its line, and those that continue it. Only numbers are continued; whether a
+/// backslash ends a name instead is given back.
+pub(super) fn skip_statement(s: &mut Scanner, keyword: &[u8]) -> bool {
+    let is_name = NAMES.contains(&keyword);
     loop {
         let start = s.rest();
         s.skip_to_line_end();
         let line = &start[..start.len() - s.rest().len()];
         s.skip_line_break();
-        if line.last() != Some(&b'\\') {
-            return;
+        let has_backslash = line.last() == Some(&b'\\');
+        if is_name || !has_backslash {
+            return has_backslash;
         }
     }
 }
@@ -177,16 +241,19 @@ fn coordinates(s: &mut Scanner, vertex: usize) -> Result<DVec3> {
     Ok(position)
 }
 
-/// Passes over the numbers after the coordinates of a vertex.
-fn has_more_numbers(s: &mut Scanner, vertex: usize) -> Result<bool> {
-    let mut found = false;
+/// Passes over the numbers after the coordinates of a vertex: how many, and the first.
+fn more_numbers(s: &mut Scanner, vertex: usize) -> Result<(usize, f64)> {
+    let (mut count, mut first) = (0, 0.0);
     loop {
         skip_blanks(s);
         if s.at_line_end() {
-            return Ok(found);
+            return Ok((count, first));
         }
-        s.number().ok_or_else(|| s.unexpected(format_args!("a weight or colour of vertex {vertex}")))?;
-        found = true;
+        let number = s.number().ok_or_else(|| s.unexpected(format_args!("a weight or colour of vertex {vertex}")))?;
+        if count == 0 {
+            first = number;
+        }
+        count += 1;
     }
 }
 
@@ -294,7 +361,7 @@ mod tests {
     #[test]
     fn what_is_not_kept_is_named_with_counts() {
         let text = "mtllib a.mtl\no thing\nv 0 0 0 1 0 0\nv 1 0 0 2\nv 0 1 0\nvt 0 0\nvt 1 0\nvn 0 0 1\n\
-                    g a b\ns 1\nusemtl c:\\m\\\nname\nf 1 2 3\nl 1 2\np 1\nblob 1\nblob 2\nend";
+                    g a b\ns 1\nusemtl c:\\m\\name\nvp 0 \\\n0\nf 1 2 3\nl 1 2\np 1\nblob 1\nblob 2\nend";
         let loaded = parse(text).unwrap();
         assert_eq!(loaded.mesh.len(), 3);
         assert_eq!(loaded.normals, None);
@@ -303,11 +370,36 @@ mod tests {
             [
                 "not kept: 2 texture coordinates (vt), 1 normals (vn), 2 group names (g, o), \
                  1 smoothing groups (s), 2 material statements, 1 lines (l), 1 points (p), \
-                 1 free-form and display statements, weights or colours of 2 vertices",
-                "2 unknown statements passed over, the first at a.obj, line 16: \"blob\" is not an OBJ statement",
+                 2 free-form and display statements, \
+                 weights of 1 vertices (1 of them are not 1: the coordinates are not divided by them), \
+                 colours of 1 vertices",
+                "2 unknown statements passed over, the first at a.obj, line 17: \"blob\" is not an OBJ statement",
                 "the last line has no end: was the file cut off?",
             ]
         );
+    }
+
+    #[test]
+    fn a_backslash_that_ends_a_name_takes_no_line() {
+        for statement in ["usemtl Wood\\Dark\\", "mtllib C:\\a\\", "g left\\", "o x\\"] {
+            let loaded = parse(&format!("{TRIANGLE}{statement}\nf 1 2 3\n")).unwrap();
+            assert_eq!(loaded.mesh.faces.len(), 1);
+            assert!(loaded.remarks[1].starts_with("a backslash ends the name on line 4"), "{:?}", loaded.remarks);
+        }
+        let loaded = parse("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 \\\r\n3\\").unwrap();
+        assert_eq!(loaded.mesh.faces.face(0), [0, 1, 2]);
+        assert_eq!(loaded.remarks[0], "not kept: weights of 3 vertices");
+    }
+
+    #[test]
+    fn other_kinds_of_files_are_told() {
+        for (start, what) in [("ply\nformat", "it is a PLY file"), ("\u{1f}\u{8b}", "is not an OBJ statement")] {
+            let text = refusal(start);
+            assert!(text.contains(what), "{text}");
+        }
+        let utf_16: Vec<u8> = TRIANGLE.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let text = read_bytes(&utf_16, Path::new("a.obj")).unwrap_err().to_string();
+        assert_eq!(text, "a.obj: not an OBJ file: it is text in UTF-16: save it as UTF-8 or ASCII");
     }
 
     #[test]

@@ -30,7 +30,8 @@ pub(super) fn read(bytes: &[u8], path: &Path, vertices: usize) -> Result<Option<
             continue;
         }
         let line = s.line();
-        match s.peek_token() {
+        let keyword = s.peek_token();
+        match keyword {
             b"v" => seen += 1,
             b"vn" => {
                 s.advance(2);
@@ -64,7 +65,7 @@ pub(super) fn read(bytes: &[u8], path: &Path, vertices: usize) -> Result<Option<
             }
             _ => {}
         }
-        skip_statement(&mut s);
+        skip_statement(&mut s, keyword);
     }
     if corners.is_empty() {
         return Ok(None);
@@ -107,6 +108,13 @@ mod tests {
         let found = parse(text).unwrap().unwrap();
         assert_eq!(found, [DVec3::Z, DVec3::X, DVec3::Z, DVec3::ZERO]);
         assert_eq!(parse("vn 0 0 1\nf 1 2/1 3\n").unwrap(), None);
+    }
+
+    #[test]
+    fn every_text_comes_to_an_end() {
+        for text in ["vn 0 0 1\nf 1//1 2//1 0\\x", "f 1//1 \\", "f \\ \n", "f 1 2 \\", "\\", "\\\n\\x\n"] {
+            let _ = parse(text);
+        }
     }
 
     #[test]

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::Mesh;
 use super::io::{Builder, Lines, Loaded, check_normals, write_rows};
+use super::magic::other_kind;
 use super::text::{Scanner, push_point, push_unsigned, quoted};
 use crate::{Error, Result};
 
@@ -16,15 +17,22 @@ struct Header {
     normals: bool,
     colours: bool,
     texture: bool,
+    /// `N` before `C`, against Geomview's order.
+    normals_before_colours: bool,
 }
 
 /// Reads the bytes of an OFF file; `path` is for messages.
 ///
 /// The header may be missing, or have the counts on its line or glued to it; `C`, `N`, `ST` before `OFF` announce
-/// vertex colours, normals (kept) and texture coordinates (in Geomview's order: position, normal, colour, texture).
-/// Comments run from `#` to the line's end. Numbers may be spread over lines freely, except that the colour of a
-/// face, and the colours and texture coordinates of a vertex, stand on the line on which its other numbers end. The
-/// number of edges is ignored; it may be missing if the counts have a line of their own.
+/// vertex colours, normals (kept) and texture coordinates. Geomview's order is position, normal, colour, texture;
+/// MeshLab puts the colour before the normal. Where there are both, the normals are where unit lengths are, and colours
+/// within 0 to 255; if that does not decide, they are in Geomview's place under Geomview's header (`CNOFF`) and are not
+/// kept under another (`NCOFF`).
+///
+/// Comments run from `#` to the line's end. Numbers may be spread over lines freely, except that a face with a
+/// colour has a line of its own, and that the colour and texture coordinates of a vertex stand on the line on which its
+/// other numbers end; where the first row has a line of its own, every row has. The number of edges is ignored; it may be missing if the counts
+/// have a line of their own.
 ///
 /// # Errors
 /// [`Error::Parse`] with the line: `4OFF`, `nOFF` and binary files, with the way out; what is no number; a face of
@@ -46,37 +54,43 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     builder.reserve_vertices(vertices, s.rest().len() / 6);
     builder.reserve_faces(faces, s.rest().len() / 8);
 
-    let mut normals = header.normals.then(Vec::new);
+    let mut normals = Normals::default();
+    let mut extras = Vec::new();
+    s.begin_rows();
     for v in 0..vertices {
-        s.skip_space();
-        let line = s.line();
+        let line = s.begin_row();
         let position =
             s.point().ok_or_else(|| s.unexpected(format_args!("a coordinate of vertex {v} of {vertices}")))?;
-        if let Some(normals) = &mut normals {
-            normals
-                .push(s.point().ok_or_else(|| s.unexpected(format_args!("the normal of vertex {v} of {vertices}")))?);
+        if !header.is_plain() {
+            vertex_extras(&mut s, &header, v, vertices, &mut extras)?;
+            if header.normals {
+                normals.push(&extras, &header);
+            }
         }
-        if header.colours || header.texture {
-            vertex_extras(&mut s, &header, v)?;
-        }
+        s.end_row(format_args!("vertex {v} of {vertices}"))?;
         builder.vertex(position, line).map_err(|what| Error::parse(path, Some(line), what))?;
     }
+    let normals = header.normals.then(|| normals.decide(&header));
 
     let mut coloured = 0;
+    s.begin_rows();
     for f in 0..faces {
-        s.skip_space();
-        let line = s.line();
+        let line = s.begin_row();
         let size: u64 =
             s.unsigned().ok_or_else(|| s.unexpected(format_args!("the number of corners of face {f} of {faces}")))?;
         for _ in 0..size {
-            s.skip_space();
+            s.next_in_row();
             builder.corner(
                 s.unsigned()
                     .ok_or_else(|| s.unexpected(format_args!("a corner (0, 1, 2, …) of face {f} of {faces}")))?,
             );
         }
-        builder.end_face(line).map_err(|what| Error::parse(path, Some(line), what))?;
-        match numbers_to_line_end(&mut s)? {
+        builder.end_face(line).map_err(|what| s.error_at(line, what))?;
+        let mut extra = 0;
+        if s.line() == line {
+            numbers_to_line_end(&mut s, |_| extra += 1)?;
+        }
+        match extra {
             0 => {}
             1 | 3 | 4 => coloured += 1,
             extra => {
@@ -86,6 +100,7 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
                 )));
             }
         }
+        s.end_row(format_args!("face {f} of {faces}"))?;
     }
     s.skip_space();
     if !s.at_end() {
@@ -101,6 +116,10 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     if header.texture {
         not_kept.push("texture coordinates".to_string());
     }
+    if let Some(None) = normals {
+        not_kept
+            .push("normals, which cannot be told from the colours (write them as NOFF, without colours)".to_string());
+    }
     if coloured > 0 {
         not_kept.push(format!("colours of {coloured} faces"));
     }
@@ -108,12 +127,23 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     if !not_kept.is_empty() {
         remarks.push(format!("not kept: {}", not_kept.join(", ")));
     }
-    Ok(builder.finish(path, normals, remarks))
+    Ok(builder.finish(path, normals.flatten(), remarks))
+}
+
+/// Refuses the first bytes of a file, whole lines, if they are no OFF.
+pub(super) fn check_head(head: &[u8], path: &Path) -> Result<()> {
+    let mut s = Scanner::of_head(head, path);
+    let read = header(&mut s).and_then(|_| counts(&mut s));
+    // What a line beyond may hold is not known.
+    if s.at_end() { Ok(()) } else { read.map(|_| ()) }
 }
 
 /// Reads the header word, if there is one, up to counts that may be glued to it.
 fn header(s: &mut Scanner) -> Result<Header> {
     let mut header = Header::default();
+    if let Some(what) = other_kind(s.rest()).filter(|_| !s.rest().starts_with(b"OFF")) {
+        return Err(s.error(format!("not an OFF file: {what}")));
+    }
     s.skip_space();
     let word = s.peek_token();
     if !word.is_empty() && word.iter().all(u8::is_ascii_digit) {
@@ -125,7 +155,10 @@ fn header(s: &mut Scanner) -> Result<Header> {
     while let Some(letter) = letters.first() {
         letters = &letters[1..];
         match letter {
-            b'C' | b'c' => header.colours = true,
+            b'C' | b'c' => {
+                header.colours = true;
+                header.normals_before_colours = header.normals;
+            }
             b'N' => header.normals = true,
             b'S' | b's' if matches!(letters.first(), Some(b'T' | b't')) => {
                 letters = &letters[1..];
@@ -175,11 +208,20 @@ fn counts(s: &mut Scanner) -> Result<(u64, u64)> {
     Ok((vertices, faces))
 }
 
-/// Passes over the colour (3 or 4 numbers) and the texture coordinates (2) of a vertex.
-fn vertex_extras(s: &mut Scanner, header: &Header, v: u64) -> Result<()> {
-    let found = numbers_to_line_end(s)?;
-    let texture = if header.texture { 2 } else { 0 };
-    let fits = match found.checked_sub(texture) {
+/// Reads what follows the position of a vertex: normal (3 numbers), colour (3 or 4) and texture coordinates (2).
+fn vertex_extras(s: &mut Scanner, header: &Header, v: u64, vertices: u64, extras: &mut Vec<f64>) -> Result<()> {
+    extras.clear();
+    if header.normals {
+        let first = s.point().ok_or_else(|| s.unexpected(format_args!("the normal of vertex {v} of {vertices}")))?;
+        extras.extend(first.to_array());
+    }
+    if !header.colours && !header.texture {
+        return Ok(());
+    }
+    let before = extras.len();
+    numbers_to_line_end(s, |number| extras.push(number))?;
+    let found = extras.len() - before;
+    let fits = match found.checked_sub(header.texture_numbers()) {
         Some(colour) if header.colours => matches!(colour, 3 | 4),
         rest => rest == Some(0),
     };
@@ -192,15 +234,71 @@ fn vertex_extras(s: &mut Scanner, header: &Header, v: u64) -> Result<()> {
     )))
 }
 
-fn numbers_to_line_end(s: &mut Scanner) -> Result<usize> {
-    let mut count = 0;
+impl Header {
+    fn is_plain(&self) -> bool {
+        !self.normals && !self.colours && !self.texture
+    }
+
+    fn texture_numbers(&self) -> usize {
+        if self.texture { 2 } else { 0 }
+    }
+}
+
+/// The normals of vertices that may have colours, as if before them and as if after.
+struct Normals {
+    before: Vec<DVec3>,
+    after: Vec<DVec3>,
+    /// Whether all of `before`, and all of `after`, can be normals and the rest colours.
+    fit: [bool; 2],
+}
+
+impl Default for Normals {
+    fn default() -> Self {
+        Normals { before: Vec::new(), after: Vec::new(), fit: [true; 2] }
+    }
+}
+
+impl Normals {
+    /// Adds what follows the position of a vertex.
+    fn push(&mut self, extras: &[f64], header: &Header) {
+        self.before.push(DVec3::from_slice(extras));
+        if !header.colours {
+            return;
+        }
+        let both = &extras[..extras.len() - header.texture_numbers()];
+        let (early, colour) = both.split_at(3);
+        self.fit[0] &= can_be_normal(early) && can_be_colour(colour);
+        let (colour, late) = both.split_at(both.len() - 3);
+        self.fit[1] &= can_be_normal(late) && can_be_colour(colour);
+        self.after.push(DVec3::from_slice(late));
+    }
+
+    fn decide(self, header: &Header) -> Option<Vec<DVec3>> {
+        match self.fit {
+            [false, true] => Some(self.after),
+            [true, false] => Some(self.before),
+            _ => (!header.normals_before_colours).then_some(self.before),
+        }
+    }
+}
+
+/// Whether these are a unit vector as files hold them, rounded, or none.
+fn can_be_normal(numbers: &[f64]) -> bool {
+    let length = DVec3::from_slice(numbers).length();
+    length == 0.0 || (length - 1.0).abs() < 0.01
+}
+
+fn can_be_colour(numbers: &[f64]) -> bool {
+    numbers.iter().all(|x| (0.0..=255.0).contains(x))
+}
+
+fn numbers_to_line_end(s: &mut Scanner, mut each: impl FnMut(f64)) -> Result<()> {
     loop {
         s.skip_blanks();
         if s.at_line_end() {
-            return Ok(count);
+            return Ok(());
         }
-        s.number().ok_or_else(|| s.unexpected("a number or the end of the line"))?;
-        count += 1;
+        each(s.number().ok_or_else(|| s.unexpected("a number or the end of the line"))?);
     }
 }
 
@@ -311,6 +409,56 @@ mod tests {
     }
 
     #[test]
+    fn normals_are_found_before_and_after_colours() {
+        let read = |word: &str, rows: [&str; 3]| {
+            let [a, b, c] = rows;
+            parse(&format!("{word}\n3 1 0\n0 0 0 {a}\n1 0 0 {b}\n0 1 0 {c}\n3 0 1 2\n")).unwrap()
+        };
+        let normals = [DVec3::X, DVec3::Y, DVec3::new(0.6, -0.8, 0.0)];
+        let [x, y, z] = ["1 0 0", "0 1 0", "0.6 -0.8 0"];
+        for colour in ["255 255 255 255", "200 10 0", ".5 .25 0 1", "0 0 0", "1 1 1", "1 0 0"] {
+            for (texture, words) in [("", ["CNOFF", "NCOFF"]), (" .5 .5", ["STCNOFF", "NCSTOFF"])] {
+                for word in words {
+                    let first = [x, y, z].map(|n| format!("{n} {colour}{texture}"));
+                    let last = [x, y, z].map(|n| format!("{colour} {n}{texture}"));
+                    for rows in [first, last] {
+                        let loaded = read(word, rows.each_ref().map(String::as_str));
+                        assert_eq!(loaded.normals.as_deref(), Some(&normals[..]), "{word} {rows:?}");
+                    }
+                }
+            }
+        }
+        // Either may be either, or neither fits.
+        for row in ["1 0 0 0 1 0", "2 0 0 255 255 255"] {
+            assert_eq!(
+                read("CNOFF", [row; 3]).normals,
+                Some(vec![DVec3::from_slice(&[row[..1].parse().unwrap(), 0.0, 0.0]); 3])
+            );
+            let loaded = read("NCOFF", [row; 3]);
+            assert_eq!(loaded.normals, None);
+            assert!(loaded.remarks[0].contains("cannot be told from the colours"), "{:?}", loaded.remarks);
+        }
+    }
+
+    #[test]
+    fn rows_that_are_too_long_or_too_short_are_named() {
+        let long = "\"0\" is one value too many for vertex 1 of 4";
+        let announced = "does the header announce all that a row holds, such as colours?)";
+        for (text, start, end) in [
+            ("4 1 0\n0 0 0\n1 0 0 0\n0 1 0\n0 0 1\n3 0 1 2\n", long, ""),
+            ("4 1 0\n0 0 0\n1 0\n0 1 0\n0 0 1\n3 0 1 2\n", "the line ends where a coordinate of vertex 1", ""),
+            ("4 1 0\n0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n", "vertex 0 of 4 has fewer values on its line", ""),
+            ("3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n3 2 1 0\n", "face 0 of 2 has fewer values on its line", ""),
+            ("3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 2 1\n", "the line ends where a corner", ""),
+            ("2 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "face 0 has 0 corners", "correct the counts in the header)"),
+            ("2 1 0\n0 0 0 1 .5 0\n1 0 0 1 .5 0\n3 0 1 2\n", "face 0 has 1 corner,", announced),
+        ] {
+            let found = refusal(&format!("OFF\n{text}"));
+            assert!(found.contains(start) && found.ends_with(end), "{found}");
+        }
+    }
+
+    #[test]
     fn errors_name_the_line_and_what_to_do() {
         let in_space = "is not a mesh in space: its points have other than three coordinates";
         for (text, message) in [
@@ -318,14 +466,15 @@ mod tests {
             ("# c\n4nOFF\n1 1 0\n".into(), format!("2: \"4nOFF\" {in_space}")),
             ("nOFF\n3\n".into(), format!("1: \"nOFF\" {in_space}")),
             ("OFF BINARY\n\0\0\0\u{8}".into(), "1: binary OFF is not read".into()),
-            ("solid x\n".into(), "1: \"solid\" is not an OFF header".into()),
+            ("solid x\n".into(), "1: not an OFF file: it is an STL file".into()),
+            ("mesh x\n".into(), "1: \"mesh\" is not an OFF header".into()),
             ("ZOFF\n".into(), "1: \"ZOFF\" is not an OFF header".into()),
             ("OFFSET\n".into(), "1: \"OFFSET\" is not an OFF header".into()),
             (String::new(), "1: the file ends where an OFF header".into()),
             ("OFF\n-4 2 0\n".into(), "2: \"-4\" is not the number of vertices".into()),
             ("OFF\n4 x 0\n".into(), "2: \"x\" is not the number of faces".into()),
             ("OFF\n4 2 x\n".into(), "2: \"x\" is not the number of edges".into()),
-            (format!("OFF\n5 2 0\n{BODY}"), "7: face 0 has 2 corners".into()),
+            (format!("OFF\n5 2 0\n{BODY}"), "7: \"2\" is one value too many for vertex 4 of 5".into()),
             (
                 format!("OFF\n4 3 0\n{BODY}"),
                 "8: the file ends where the number of corners of face 2 of 3 should be".into(),

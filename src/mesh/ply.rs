@@ -20,7 +20,8 @@ use values::{Binary, ByteOrder, Text, Values};
 ///
 /// Positions are the properties `x y z` of the element `vertex`, faces the list `vertex_indices` or `vertex_index`
 /// of the element `face`, in any numeric types; `nx ny nz` are kept as normals. Other properties and elements are
-/// passed over and named in a remark. In text files numbers may be spread over lines.
+/// passed over and named in a remark. In text files numbers may be spread over lines; but where the first row of an
+/// element has a line of its own, every row has.
 ///
 /// # Errors
 /// [`Error::Parse`](crate::Error::Parse) with the line, or in binary data with the byte and the element: an unknown
@@ -41,14 +42,22 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     let Header { format, elements } = Header::read(&mut scanner, path)?;
     let order = match format {
         Format::Ascii => {
-            let values = Text { scanner, path };
+            let values = Text { scanner };
             return read_elements(&elements, values, Some(Lines::default()), path);
         }
         Format::BinaryLittleEndian => ByteOrder::Little,
         Format::BinaryBigEndian => ByteOrder::Big,
     };
-    let values = Binary { path, bytes, at: bytes.len() - scanner.rest().len(), order };
+    let values = Binary { path, bytes, at: scanner.offset(), order };
     read_elements(&elements, values, None, path)
+}
+
+/// Refuses the first bytes of a file, whole lines, if they are no PLY.
+pub(super) fn check_head(head: &[u8], path: &Path) -> Result<()> {
+    let mut s = Scanner::of_head(head, path);
+    let read = Header::read(&mut s, path);
+    // What a line beyond may hold is not known.
+    if s.at_end() { Ok(()) } else { read.map(|_| ()) }
 }
 
 fn read_elements<V: Values>(elements: &[Element], mut values: V, lines: Option<Lines>, path: &Path) -> Result<Loaded> {
@@ -85,6 +94,7 @@ fn read_rows<V: Values>(
         Kind::Face => builder.reserve_faces(count, rows_at_most),
         Kind::Other => {}
     }
+    values.begin_rows();
     for row in 0..count {
         let place = values.place();
         let mut coordinates = [0.0; 6];
@@ -119,6 +129,7 @@ fn read_rows<V: Values>(
             Kind::Other => Ok(()),
         }
         .map_err(|what| values.error(place, what))?;
+        values.end_row(format_args!("{name} {row} of {count}"))?;
         if has_normals {
             normals.push(DVec3::new(nx, ny, nz));
         }
@@ -137,10 +148,19 @@ fn not_kept(elements: &[Element]) -> Option<String> {
         let dropped: Vec<&str> =
             element.properties.iter().filter(|p| p.keep == Keep::No).map(|p| p.name.as_str()).collect();
         if !dropped.is_empty() {
-            parts.push(format!("{} properties {}", element.name, dropped.join(" ")));
+            parts.push(format!("{} properties {}", element.name, first_of(&dropped, " ")));
         }
     }
-    (!parts.is_empty()).then(|| format!("not kept: {}", parts.join(", ")))
+    (!parts.is_empty()).then(|| format!("not kept: {}", first_of(&parts, ", ")))
+}
+
+/// Joins names, as many as a line may hold.
+fn first_of<T: AsRef<str>>(names: &[T], separator: &str) -> String {
+    const SHOWN: usize = 20;
+    let shown: Vec<&str> = names.iter().take(SHOWN).map(AsRef::as_ref).collect();
+    let more = names.len() - shown.len();
+    let more = if more > 0 { format!("{separator}and {more} more") } else { String::new() };
+    shown.join(separator) + &more
 }
 
 /// Writes `mesh` as PLY, binary little-endian with doubles, with `normals` (one a vertex) as `nx ny nz` if given.
@@ -308,6 +328,56 @@ mod tests {
         let mut bytes = Vec::new();
         write_to(&mut bytes, &mesh, None).unwrap();
         assert_eq!(parse(&bytes).unwrap().mesh, mesh);
+    }
+
+    #[test]
+    fn headers_of_all_line_ends_stand_before_the_same_bytes() {
+        let mut bytes = Vec::new();
+        write_to(&mut bytes, &triangle(), None).unwrap();
+        let end = b"end_header\n";
+        let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+        let header = String::from_utf8(bytes[..start].to_vec()).unwrap();
+        for line_end in ["\n", "\r\n", "\r", "\n\r", " \n", "\t\r\n"] {
+            // A first byte that could be taken for a line end too.
+            for first in [b'\n', b'\r', 0] {
+                let mut body = bytes[start..].to_vec();
+                body[0] = first;
+                let text = header.replace('\n', line_end);
+                let loaded = parse(&[text.as_bytes(), &body].concat()).unwrap();
+                assert_eq!(loaded.mesh.positions[0].x.to_bits(), u64::from(first), "{line_end:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_header_of_many_elements_takes_linear_time() {
+        use std::fmt::Write;
+        let mut text = ascii(XYZ, "");
+        for n in 0..300_000 {
+            write!(text, "element e{n} 1\nproperty int p\n").unwrap();
+        }
+        write!(text, "{FACE}0 0 0\n1 0 0\n0 1 0\n{}3 0 1 2\n", "5\n".repeat(300_000)).unwrap();
+        let start = std::time::Instant::now();
+        let loaded = parse(text.as_bytes()).unwrap();
+        assert!(start.elapsed().as_secs() < 20, "the square of the elements would take minutes");
+        assert!(loaded.remarks[0].ends_with("element e19 (1), and 299980 more"), "{}", loaded.remarks[0]);
+    }
+
+    #[test]
+    fn rows_that_are_too_long_or_too_short_are_named() {
+        let header = ascii(XYZ, FACE);
+        for (body, message) in [
+            ("0 0 0\n1 0\n0 1 0\n3 0 1 2\n", "11: the line ends where the number z of vertex 1 of 3"),
+            ("0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "10: vertex 0 of 3 has fewer values on its line"),
+            ("0 0 0\n1 0 0 9\n0 1 0\n3 0 1 2\n", "11: \"9\" is one value too many for vertex 1 of 3"),
+            ("0 0 0\n1 0 0\n3 0 1 2\n", "12: \"2\" is one value too many for vertex 2 of 3"),
+            ("0 0 0 9 9 9\n1 0 0 9 9 9\n0 1 0 9 9 9\n3 0 1 2\n", "11: face 0 of 1 has fewer values on its line"),
+        ] {
+            let found = refusal(format!("{header}{body}").as_bytes());
+            assert!(found.starts_with(&format!("a.ply, line {message}")), "{found}");
+        }
+        let found = refusal(format!("{header}0 0 0 9 9 9\n1 0 0 9 9 9\n.5 1 0 9 9 9\n3 0 1 2\n").as_bytes());
+        assert!(found.contains("(line 10 goes on after the first row"), "{found}");
     }
 
     #[test]

@@ -6,26 +6,78 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use crate::Error;
+use crate::{Error, Result};
 
-/// A place in the bytes of a text file. Lines end with `\n`, `\r\n` or `\r` and are counted from 1. A token ends at
-/// white space and at `#` or `\`, which no number holds: the first opens a comment, the second continues a line.
-/// The bytes need not be UTF-8.
+/// A place in the bytes of a text file. Lines end with `\n`, `\r\n` or `\r`, in a file whose first line does so with
+/// `\n\r`, and are counted from 1. A token ends at white space and at a `\` that ends its line, which continues it;
+/// `#` opens a comment where a token would start, and else belongs to the token (`1.#INF`). Zero bytes and DOS's sign
+/// for the end of a file are no text at its end. The bytes need not be UTF-8.
+///
+/// Tables have a row a line where their first row has: then no row takes a value from the next line, or leaves one.
 #[derive(Clone)]
-pub(super) struct Scanner<'a> {
+pub(crate) struct Scanner<'a> {
     path: &'a Path,
+    /// The length of a byte order mark.
+    start: usize,
     bytes: &'a [u8],
     at: usize,
     line: usize,
+    feed_before_return: bool,
+    rows: Rows,
+    /// The line on which the present row starts.
+    row_line: usize,
+    /// The line that a table's first row shares with more.
+    shared_line: Option<usize>,
+}
+
+#[derive(Clone, Copy)]
+enum Rows {
+    None,
+    /// The first row of a table, or of one after another table.
+    First {
+        of_first_table: bool,
+    },
+    OneALine,
+    Free,
 }
 
 impl<'a> Scanner<'a> {
     pub fn new(bytes: &'a [u8], path: &'a Path) -> Self {
-        Scanner { path, bytes: bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes), at: 0, line: 1 }
+        Self::of_head(&bytes[..text_length(bytes)], path)
+    }
+
+    /// Over the first bytes of a file.
+    pub fn of_head(bytes: &'a [u8], path: &'a Path) -> Self {
+        let start = if bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
+        let bytes = &bytes[start..];
+        let first_end = bytes.iter().position(|&b| is_line_end(b)).map_or(&[][..], |at| &bytes[at..]);
+        // `\n\r\n` is an empty line among lines of mixed ends, unless another `\r` follows.
+        let feed_before_return = match first_end {
+            [b'\n', b'\r', b'\n', next, ..] => *next == b'\r',
+            [b'\n', b'\r', b'\n'] => false,
+            [b'\n', b'\r', ..] => true,
+            _ => false,
+        };
+        Scanner {
+            path,
+            start,
+            bytes,
+            at: 0,
+            line: 1,
+            feed_before_return,
+            rows: Rows::None,
+            row_line: 0,
+            shared_line: None,
+        }
     }
 
     pub fn line(&self) -> usize {
         self.line
+    }
+
+    /// The place in the bytes that were given.
+    pub fn offset(&self) -> usize {
+        self.start + self.at
     }
 
     /// What is not read yet.
@@ -39,7 +91,7 @@ impl<'a> Scanner<'a> {
 
     /// Whether the line holds no further token, once blanks are skipped.
     pub fn at_line_end(&self) -> bool {
-        matches!(self.peek(), None | Some(b'\n' | b'\r' | b'#'))
+        self.peek().is_none_or(|b| is_line_end(b) || b == b'#')
     }
 
     pub fn peek(&self) -> Option<u8> {
@@ -77,13 +129,14 @@ impl<'a> Scanner<'a> {
 
     pub fn skip_to_line_end(&mut self) {
         let rest = self.rest();
-        let length = rest.iter().position(|&b| matches!(b, b'\n' | b'\r'));
+        let length = rest.iter().position(|&b| is_line_end(b));
         self.at += length.unwrap_or(rest.len());
     }
 
     /// Skips one line end if the place is at one.
     pub fn skip_line_break(&mut self) {
         self.at += match self.rest() {
+            [b'\n', b'\r', ..] if self.feed_before_return => 2,
             [b'\r', b'\n', ..] => 2,
             [b'\r' | b'\n', ..] => 1,
             _ => return,
@@ -96,11 +149,18 @@ impl<'a> Scanner<'a> {
         !matches!(self.bytes.last(), None | Some(b'\n' | b'\r'))
     }
 
-    /// The token here, possibly empty, without passing it.
+    /// The token here without passing it; empty only before white space and at the end.
     pub fn peek_token(&self) -> &'a [u8] {
         let rest = self.rest();
-        let length = rest.iter().position(|&b| is_separator(b));
-        &rest[..length.unwrap_or(rest.len())]
+        let mut length = 0;
+        loop {
+            let next = rest[length..].iter().position(|&b| is_separator(b));
+            length = next.map_or(rest.len(), |n| length + n);
+            match rest[length..] {
+                [b'\\', ..] if length == 0 || !continues_line(&rest[length..]) => length += 1,
+                _ => return &rest[..length],
+            }
+        }
     }
 
     pub fn token(&mut self) -> &'a [u8] {
@@ -122,10 +182,62 @@ impl<'a> Scanner<'a> {
         Some(number)
     }
 
-    /// The next three numbers, over line ends and comments.
+    /// Begins a table of rows.
+    pub fn begin_rows(&mut self) {
+        self.rows = Rows::First { of_first_table: matches!(self.rows, Rows::None) };
+    }
+
+    /// Goes to the start of the next row and gives its line.
+    pub fn begin_row(&mut self) -> usize {
+        self.skip_space();
+        self.row_line = self.line;
+        self.line
+    }
+
+    /// Goes to the next value of the row; it may stand on another line only where rows do not have one each.
+    pub fn next_in_row(&mut self) {
+        match self.rows {
+            Rows::OneALine => self.skip_blanks(),
+            _ => self.skip_space(),
+        }
+    }
+
+    /// Ends `row`, all of whose values have been read.
+    ///
+    /// # Errors
+    /// Values left on the line of a row where each row has its own, and a first row that ends within another line.
+    pub fn end_row(&mut self, row: impl Display) -> Result<()> {
+        self.skip_blanks();
+        let ends = self.at_line_end();
+        let stays = self.line == self.row_line;
+        match (self.rows, ends) {
+            (Rows::OneALine, false) => {
+                let word = quoted(self.word());
+                return Err(self.error(format!(
+                    "{word} is one value too many for {row}: correct the line, or what the header announces"
+                )));
+            }
+            (Rows::First { .. }, false) if !stays => {
+                return Err(self.error_at(
+                    self.row_line,
+                    format!("{row} has fewer values on its line than the header announces: correct one of them"),
+                ));
+            }
+            (Rows::First { .. }, _) => {
+                self.rows = if ends && stays { Rows::OneALine } else { Rows::Free };
+                if !ends {
+                    self.shared_line = Some(self.line);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// The next three numbers of the row.
     pub fn point(&mut self) -> Option<DVec3> {
         let mut coordinate = || {
-            self.skip_space();
+            self.next_in_row();
             self.number()
         };
         Some(DVec3::new(coordinate()?, coordinate()?, coordinate()?))
@@ -144,7 +256,21 @@ impl<'a> Scanner<'a> {
 
     /// An error at this line.
     pub fn error(&self, what: impl Into<String>) -> Error {
-        Error::parse(self.path, Some(self.line), what)
+        self.error_at(self.line, what)
+    }
+
+    /// An error at `line`, with a doubt about the header where the rows give reason to one.
+    pub fn error_at(&self, line: usize, what: impl Into<String>) -> Error {
+        let mut what = what.into();
+        if let Some(shared) = self.shared_line {
+            what += &format!(
+                " (line {shared} goes on after the first row: does the header announce all that a row holds, such as \
+                 colours?)"
+            );
+        } else if let Rows::First { of_first_table: false } = self.rows {
+            what += " (if the line belongs to the rows before, correct the counts in the header)";
+        }
+        Error::parse(self.path, Some(line), what)
     }
 
     /// The error of finding something else here than `wanted`.
@@ -152,16 +278,54 @@ impl<'a> Scanner<'a> {
         if self.at_end() {
             let after_last = self.line > 1 && !self.ends_within_a_line();
             let line = self.line - usize::from(after_last);
-            let what = format!("the file ends where {wanted} should be: is it complete?");
-            return Error::parse(self.path, Some(line), what);
+            return self.error_at(line, format!("the file ends where {wanted} should be: is it complete?"));
         }
         if self.at_line_end() {
             return self.error(format!("the line ends where {wanted} should be"));
         }
-        let end = |&b: &u8| is_blank(b) || matches!(b, b'\n' | b'\r');
-        let word = self.rest().split(end).next().unwrap_or_default();
-        self.error(format!("{} is not {wanted}", quoted(word)))
+        let word = self.word();
+        let hint = hint(word).map_or_else(String::new, |hint| format!(": {hint}"));
+        self.error(format!("{} is not {wanted}{hint}", quoted(word)))
     }
+
+    /// What stands here up to white space.
+    fn word(&self) -> &'a [u8] {
+        let end = |&b: &u8| is_blank(b) || is_line_end(b);
+        self.rest().split(end).next().unwrap_or_default()
+    }
+}
+
+/// Where the text in `bytes` ends, before the zeros and the Ctrl-Z that disks and DOS leave behind it.
+fn text_length(bytes: &[u8]) -> usize {
+    let is_padding = |b: u8| matches!(b, b'\0' | b'\x1A');
+    let last = bytes.iter().rposition(|&b| !is_padding(b) && !is_blank(b) && !is_line_end(b));
+    let Some(last) = last else { return bytes.len() };
+    let padding = bytes[last..].iter().position(|&b| is_padding(b));
+    padding.map_or(bytes.len(), |p| last + p)
+}
+
+/// What a word that is no number may have been meant as, and what to do.
+fn hint(word: &[u8]) -> Option<&'static str> {
+    let has = |part: &[u8]| word.windows(part.len()).any(|w| w.eq_ignore_ascii_case(part));
+    let has_digit = word.iter().any(u8::is_ascii_digit);
+    let exponent_d = word.windows(2).any(|w| w[0].is_ascii_digit() && matches!(w[1], b'd' | b'D'));
+    Some(if has(b"#IND") || has(b"#INF") || has(b"#QNAN") || has(b"#SNAN") || has(b"nan(") {
+        "it stands for a number that is not finite, as some programs write it; repair it where it comes from"
+    } else if word.contains(&0) {
+        "zero bytes are no text: is the file binary, or damaged?"
+    } else if word.first() == Some(&b'\\') {
+        "a backslash continues a line only as the last character of it"
+    } else if word.contains(&b'#') {
+        "a comment needs a blank before its #"
+    } else if word.contains(&b',') && has_digit {
+        "write numbers with a decimal point, and blanks between them, not commas"
+    } else if !word.is_ascii() && has_digit {
+        "signs and blanks beside digits must be ASCII"
+    } else if exponent_d && has_digit {
+        "write exponents with e"
+    } else {
+        return None;
+    })
 }
 
 /// A decimal without exponent of at most 15 digits and its length, where a separator or the end follows; `None` for
@@ -208,7 +372,7 @@ pub(super) fn leading_digits(bytes: &[u8]) -> Option<(u64, usize)> {
 }
 
 /// A word of a file, fit for a message of one line.
-pub(super) fn quoted(word: &[u8]) -> String {
+pub(crate) fn quoted(word: &[u8]) -> String {
     const SHOWN: usize = 32;
     let text = String::from_utf8_lossy(&word[..word.len().min(SHOWN)]);
     let more = if word.len() > SHOWN { "…" } else { "" };
@@ -219,8 +383,17 @@ fn is_blank(b: u8) -> bool {
     matches!(b, b' ' | b'\t' | b'\x0B' | b'\x0C')
 }
 
+fn is_line_end(b: u8) -> bool {
+    matches!(b, b'\n' | b'\r')
+}
+
 fn is_separator(b: u8) -> bool {
-    is_blank(b) || matches!(b, b'\n' | b'\r' | b'#' | b'\\')
+    is_blank(b) || is_line_end(b) || b == b'\\'
+}
+
+/// Whether a line is continued here: at a backslash that is the last character of it or of the file.
+pub(super) fn continues_line(rest: &[u8]) -> bool {
+    matches!(rest, [b'\\'] | [b'\\', b'\n' | b'\r', ..])
 }
 
 /// Appends the shortest decimal that reads back equal, with an exponent where plain digits would be long.
@@ -295,14 +468,105 @@ mod tests {
         assert_eq!(told("x\ny", 1), format!("t, line 2: {ends}"));
         assert_eq!(told("x\n# y", 0), "t, line 2: the line ends where a number should be");
         assert_eq!(told("x\ny\u{7}z 3", 0), "t, line 2: \"y\\u{7}z\" is not a number");
-        assert_eq!(told("x\n\\", 0), "t, line 2: \"\\\\\" is not a number");
+        assert_eq!(told("x\n\\", 0), format!("t, line 2: \"\\\\\" is not a number: {}", hint(b"\\").unwrap()));
         assert_eq!(quoted(&[0xFF; 40]).chars().count(), 32 + 3);
+    }
+
+    #[test]
+    fn words_that_some_programs_write_for_numbers_are_refused_with_a_way_out() {
+        for (word, way_out) in [
+            ("-1.#IND", "not finite"),
+            ("1.#INF", "not finite"),
+            ("1.#QNAN000", "not finite"),
+            ("-nan(snan)", "not finite"),
+            ("NaN(ind)", "not finite"),
+            ("1.5#x", "a blank before its #"),
+            ("1,5", "decimal point"),
+            ("1.5,", "blanks between them"),
+            ("1.0D+05", "exponents with e"),
+            ("\u{2212}1", "must be ASCII"),
+            ("1\u{a0}2", "must be ASCII"),
+            ("0\0\0x", "zero bytes"),
+        ] {
+            for text in [word.to_string(), format!("{word} 1\n")] {
+                let mut s = scanner(&text);
+                assert_eq!(s.number(), None, "{text}");
+                let told = s.unexpected("a number").to_string();
+                assert!(told.contains("is not a number: ") && told.contains(way_out), "{told}");
+            }
+        }
+        assert_eq!(hint(b"red"), None);
+    }
+
+    #[test]
+    fn padding_and_the_end_of_dos_files_are_no_text() {
+        for end in ["\x1A", "\n\x1A\r\n", "\0\0\0", "\n\x1A\0\0\n"] {
+            let text = format!("1{end}");
+            let mut s = scanner(&text);
+            assert_eq!(s.number(), Some(1.0));
+            s.skip_space();
+            assert!(s.at_end(), "{text:?}");
+        }
+        assert_eq!(scanner("\0\0").rest(), b"\0\0");
+        assert_eq!(scanner("1\0\n2").rest(), b"1\0\n2");
+    }
+
+    #[test]
+    fn a_line_feed_and_a_return_are_one_end_where_the_first_line_has_them() {
+        let lines = |text: &str| {
+            let mut s = scanner(text);
+            s.skip_space();
+            while !s.at_end() {
+                s.token();
+                s.skip_space();
+            }
+            s.line()
+        };
+        assert_eq!(lines("a\n\rb\n\r\n\rc"), 4);
+        assert_eq!(lines("a\n\r\n\rb"), 3);
+        assert_eq!(lines("a\n\r\nb"), 3);
+        assert_eq!(lines("a\r\nb\r\n\r\nc"), 4);
+    }
+
+    #[test]
+    fn tokens_are_never_empty_before_the_end_of_a_line() {
+        for (text, token) in [("\\x 1", "\\x"), ("\\\n1", "\\"), ("a\\\n1", "a"), ("a\\b\\", "a\\b"), ("\\", "\\")] {
+            assert_eq!(scanner(text).peek_token(), token.as_bytes(), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn rows_have_a_line_each_where_the_first_has() {
+        let read = |text: &str| -> Result<u8> {
+            let mut s = scanner(text);
+            s.begin_rows();
+            for row in 0..3 {
+                s.begin_row();
+                s.point().ok_or_else(|| s.unexpected("a number"))?;
+                s.end_row(format_args!("row {row}"))?;
+            }
+            s.begin_rows();
+            s.begin_row();
+            s.unsigned().ok_or_else(|| s.unexpected("a count"))
+        };
+        let told = |text: &str| read(text).unwrap_err().to_string();
+        for text in ["0 0 0\n\n1 1 1 # x\n2 2 2\n7", "0 0 0 1 1 1\n2 2 2\n7", "0\n0\n0\n1 1\n1 2 2 2 7"] {
+            assert_eq!(read(text).unwrap(), 7, "{text}");
+        }
+        assert!(told("0 0 0\n1 1\n1 2 2\n7").starts_with("t, line 2: the line ends where a number should be"));
+        assert!(told("0 0 0\n1 1 1 1\n2 2 2\n").starts_with("t, line 2: \"1\" is one value too many for row 1"));
+        assert!(told("0 0\n1 1 1\n2 2 2\n7").starts_with("t, line 1: row 0 has fewer values on its line"));
+        let shared = told("0 0 0 .9 9 9\n1 1 1 .9 9 9\n");
+        assert!(shared.contains("(line 1 goes on after the first row"), "{shared}");
+        let miscounted = told("0 0 0\n1 1 1\n2 2 2\n-3 3 3\n");
+        assert!(miscounted.ends_with("correct the counts in the header)"), "{miscounted}");
     }
 
     #[test]
     fn whole_numbers_end_at_a_separator_and_fit() {
         assert_eq!(scanner("007 8").unsigned::<u64>(), Some(7));
-        assert_eq!(scanner("12#").unsigned::<u32>(), Some(12));
+        assert_eq!(scanner("12\\").unsigned::<u32>(), Some(12));
+        assert_eq!(scanner("12#").unsigned::<u32>(), None);
         assert_eq!(scanner("18446744073709551615").unsigned(), Some(u64::MAX));
         for text in ["", "-1", "+1", "1.0", "1a", "18446744073709551616"] {
             assert_eq!(scanner(text).unsigned::<u64>(), None, "{text}");
@@ -333,7 +597,7 @@ mod tests {
         #[test]
         fn numbers_are_those_of_the_standard_library(
             text in r"[+-]?[0-9]{0,18}(\.[0-9]{0,18})?([eE][+-]?[0-9]{1,3})?",
-            end in r"[ \t\r\n#\\]?",
+            end in r"[ \t\r\n\\]?",
         ) {
             let expected = text.parse::<f64>().ok();
             let mut s = Scanner::new(text.as_bytes(), Path::new("t"));

@@ -1,7 +1,9 @@
 //! The header of a PLY file: which elements follow, with which properties, and which of them a mesh keeps.
 
+use std::collections::HashSet;
 use std::path::Path;
 
+use super::super::magic::other_kind;
 use super::super::text::{Scanner, quoted};
 use crate::{Error, Result};
 
@@ -93,8 +95,14 @@ impl Scalar {
 
 impl Header {
     pub fn read(s: &mut Scanner, path: &Path) -> Result<Self> {
-        if s.token() != b"ply" || !s.at_line_end() {
-            return Err(Error::parse(path, Some(1), "not a PLY file: its first line is not \"ply\""));
+        if s.peek_token() != b"ply" {
+            let what = other_kind(s.rest()).unwrap_or("its first line is not \"ply\"");
+            return Err(Error::parse(path, Some(1), format!("not a PLY file: {what}")));
+        }
+        s.token();
+        s.skip_blanks();
+        if !s.at_line_end() {
+            return Err(s.unexpected("the end of the line"));
         }
         // Only then may `end_header` and a single '\r' be followed by data that start with the byte of '\n'.
         let lone_returns = matches!(s.rest(), [b'\r', next, ..] if *next != b'\n');
@@ -102,6 +110,7 @@ impl Header {
 
         let mut format = None;
         let mut elements: Vec<Element> = Vec::new();
+        let mut names = HashSet::new();
         loop {
             s.skip_blanks();
             match s.peek_token() {
@@ -110,7 +119,7 @@ impl Header {
                 b"format" => format = Some(read_format(s)?),
                 b"element" => {
                     let element = read_element(s)?;
-                    if elements.iter().any(|e| e.name == element.name) {
+                    if !names.insert(element.name.clone()) {
                         return Err(s.error(format!("a second element {}", element.name)));
                     }
                     elements.push(element);

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::super::text::Scanner;
 use super::header::Scalar;
-use crate::Error;
+use crate::{Error, Result};
 
 /// Values in file order. A method that gives `None` leaves the place for [`unexpected`](Values::unexpected).
 pub(super) trait Values {
@@ -15,8 +15,14 @@ pub(super) trait Values {
     /// The number of bytes not read yet.
     fn bytes_left(&self) -> usize;
 
-    /// Where the next value starts: its line in text, its byte otherwise.
+    /// Begins the rows of an element.
+    fn begin_rows(&mut self);
+
+    /// Where the next row starts: its line in text, its byte otherwise.
     fn place(&mut self) -> usize;
+
+    /// Ends a row, all of whose values have been read.
+    fn end_row(&mut self, row: impl Display) -> Result<()>;
 
     fn number(&mut self, scalar: Scalar) -> Option<f64>;
 
@@ -37,7 +43,6 @@ pub(super) trait Values {
 
 pub(super) struct Text<'a> {
     pub scanner: Scanner<'a>,
-    pub path: &'a Path,
 }
 
 impl Values for Text<'_> {
@@ -49,18 +54,25 @@ impl Values for Text<'_> {
         self.scanner.rest().len()
     }
 
+    fn begin_rows(&mut self) {
+        self.scanner.begin_rows();
+    }
+
     fn place(&mut self) -> usize {
-        self.scanner.skip_space();
-        self.scanner.line()
+        self.scanner.begin_row()
+    }
+
+    fn end_row(&mut self, row: impl Display) -> Result<()> {
+        self.scanner.end_row(row)
     }
 
     fn number(&mut self, _: Scalar) -> Option<f64> {
-        self.scanner.skip_space();
+        self.scanner.next_in_row();
         self.scanner.number()
     }
 
     fn unsigned<T: TryFrom<u64>>(&mut self, _: Scalar) -> Option<T> {
-        self.scanner.skip_space();
+        self.scanner.next_in_row();
         self.scanner.unsigned()
     }
 
@@ -81,7 +93,7 @@ impl Values for Text<'_> {
     }
 
     fn error(&self, place: usize, what: String) -> Error {
-        Error::parse(self.path, Some(place), what)
+        self.scanner.error_at(place, what)
     }
 }
 
@@ -122,8 +134,14 @@ impl Values for Binary<'_> {
         self.bytes.len() - self.at
     }
 
+    fn begin_rows(&mut self) {}
+
     fn place(&mut self) -> usize {
         self.at
+    }
+
+    fn end_row(&mut self, _: impl Display) -> Result<()> {
+        Ok(())
     }
 
     fn number(&mut self, scalar: Scalar) -> Option<f64> {
