@@ -69,6 +69,11 @@ impl Context {
                 folder.display()
             )));
         }
+        if let Some(folder) = check
+            && !folder.is_dir()
+        {
+            return Err(Error::Unknown(format!("{}: no such folder; --check names a report folder", folder.display())));
+        }
         let context = Context {
             root: root.to_path_buf(),
             models: models.map(Path::to_path_buf),
@@ -250,7 +255,7 @@ impl Context {
     /// The first difference and their number.
     pub fn verdict(&self) -> Result<()> {
         for difference in &self.differences {
-            eprintln!("differs: {difference}");
+            cli::say(format_args!("differs: {difference}"));
         }
         match self.differences.first() {
             None => Ok(()),

@@ -10,6 +10,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::{Faces, Mesh, obj, obj_normals, off, ply};
+use crate::memory::require;
 use crate::output::write_file;
 use crate::{Error, Result};
 
@@ -62,6 +63,17 @@ pub fn check_name(path: &Path) -> Result<()> {
     Format::of(path).map(|_| ())
 }
 
+/// Memory for each byte of a file while it is read, itself included; measured on the densest format, binary PLY.
+const BYTES: u64 = 3;
+
+/// The bytes of a file, if memory has room for them and for the mesh that they make.
+fn read_all(path: &Path) -> Result<Vec<u8>> {
+    let refused = |e| Error::io(path, "read", e);
+    let size = fs::metadata(path).map_err(refused)?.len();
+    require(BYTES * size, || format!("{}: the mesh", path.display()), "use a smaller one")?;
+    fs::read(path).map_err(refused)
+}
+
 /// Reads a mesh file, whose extension (`.obj`, `.off` or `.ply` in any case) names its format.
 ///
 /// # Errors
@@ -69,7 +81,7 @@ pub fn check_name(path: &Path) -> Result<()> {
 /// its format says.
 pub fn read(path: &Path) -> Result<Loaded> {
     let format = Format::of(path)?;
-    let bytes = fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let bytes = read_all(path)?;
     match format {
         Format::Obj => obj::read_bytes(&bytes, path),
         Format::Off => off::read_bytes(&bytes, path),
@@ -87,7 +99,7 @@ pub fn read_normals(path: &Path) -> Result<Option<Vec<DVec3>>> {
     let Format::Obj = Format::of(path)? else {
         return Ok(read(path)?.normals);
     };
-    let bytes = fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let bytes = read_all(path)?;
     let loaded = obj::read_bytes(&bytes, path)?;
     obj_normals::read(&bytes, path, loaded.mesh.len())
 }
