@@ -213,7 +213,11 @@ impl<'a> Rows<'a> {
         // A column and a value of M and of A each, and numbers for every row.
         let bytes = total * 20 + lengths.len() as u64 * 24;
         let what = || format!("the matrix with {total} entries");
-        require(bytes, what, "use a smaller mesh or one without very large faces, or a method without a stored matrix")?;
+        require(
+            bytes,
+            what,
+            "use a smaller mesh or one without very large faces, or a method without a stored matrix",
+        )?;
         let mut offsets = large(Vec::with_capacity(lengths.len() + 1));
         offsets.push(0u32);
         let mut end = 0u32;

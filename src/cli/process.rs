@@ -54,7 +54,8 @@ pub(super) fn start_threads(asked: Option<u16>, remark: impl Fn(String)) -> Resu
     let built = if workers.is_empty() {
         ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global()
     } else {
-        let hand_out = |part: ThreadBuilder| workers[part.index()].send(part).map_err(|_| std::io::ErrorKind::BrokenPipe.into());
+        let hand_out =
+            |part: ThreadBuilder| workers[part.index()].send(part).map_err(|_| std::io::ErrorKind::BrokenPipe.into());
         ThreadPoolBuilder::new().num_threads(workers.len()).spawn_handler(hand_out).build_global()
     };
     built.map_err(|e| Error::Computation(format!("cannot start threads: {e}")))?;

@@ -36,8 +36,7 @@ impl SecondOpinion {
         let fill = symbolic.len_val();
         let what = || format!("the factor with {fill} entries");
         // Its indices take as much as its values, and while it is found it is there twice.
-        require(fill as u64 * 32, what, "use an iterative method")
-            .map_err(|e| failed(name, Outcome::Breakdown, e))?;
+        require(fill as u64 * 32, what, "use an iterative method").map_err(|e| failed(name, Outcome::Breakdown, e))?;
         let order: Vec<u32> = match symbolic.perm() {
             Some(perm) => perm.arrays().0.to_vec(),
             None => (0..n as u32).collect(),
