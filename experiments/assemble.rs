@@ -9,7 +9,7 @@ use serde_json::json;
 use limitlab::Result;
 use limitlab::assemble::matrix_market;
 use limitlab::cli::{self, CommonFlags, MeshFlags};
-use limitlab::output::{Batch, create_dir};
+use limitlab::output::{Batch, check_target, create_dir};
 
 /// Writes A, M, H and P of the limit system A V = P, A = H·M, as Matrix Market files with 17 significant digits,
 /// in the vertex order of the mesh.
@@ -35,6 +35,9 @@ struct Arguments {
     common: CommonFlags,
 }
 
+/// What is written.
+const FILES: [&str; 5] = ["A.mtx", "M.mtx", "H.mtx", "P.mtx", "R.mtx"];
+
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     cli::exit(|| {
@@ -44,14 +47,17 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
+    create_dir(&arguments.out)?;
+    let path = |name: &str| arguments.out.join(name);
+    for name in FILES {
+        check_target(&path(name))?;
+    }
     let Some(input) = arguments.mesh.input(&arguments.input, &arguments.common)? else {
         return Ok(());
     };
     let system = input.system()?;
     let points = &input.mesh.positions;
     let right_hand_side = system.symmetric_right_hand_side(points);
-    create_dir(&arguments.out)?;
-    let path = |name: &str| arguments.out.join(name);
     let mut batch = Batch::default();
     batch.write(&path("A.mtx"), |out| matrix_market::write_general(&system.a, out))?;
     batch.write(&path("M.mtx"), |out| matrix_market::write_symmetric(&system.m, out))?;
@@ -70,7 +76,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         names.symmetric
     ));
     if arguments.json {
-        let files = ["A.mtx", "M.mtx", "H.mtx", "P.mtx", "R.mtx"].map(|n| path(n).display().to_string());
+        let files = FILES.map(|n| path(n).display().to_string());
         let object = input.json(json!({
             "entries": system.a.values().len(),
             "bandwidth": system.a.pattern().bandwidth(),

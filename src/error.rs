@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::memory::megabytes;
+
 /// What data or the machine can do to a computation. Broken contracts of the library panic instead.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -19,6 +21,16 @@ pub enum Error {
     /// A mesh that was read but cannot be used: defects, a scheme that refuses it, a boundary.
     #[error("{mesh}: {what}")]
     Mesh { mesh: String, what: String },
+    /// A computation that needs more memory than is available: found before the work.
+    #[error("{what} needs {} of memory, of which {} are available; {advice}", megabytes(*needed), megabytes(*available))]
+    Memory {
+        what: String,
+        /// Bytes.
+        needed: u64,
+        /// Bytes.
+        available: u64,
+        advice: &'static str,
+    },
     /// A computation that has no result to give.
     #[error("{0}")]
     Computation(String),

@@ -13,6 +13,7 @@ pub mod assemble;
 pub mod cli;
 pub mod error;
 pub mod interpolate;
+mod memory;
 pub mod mesh;
 pub mod output;
 mod pages;

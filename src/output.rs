@@ -8,8 +8,10 @@
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
+use std::mem;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::{Error, Result};
 
@@ -47,14 +49,44 @@ pub fn write_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<(
 pub fn check_target(path: &Path) -> Result<()> {
     let check = || match destination(path)? {
         Destination::Straight => Ok(()),
-        Destination::Rename { folder, .. } => Temporary::create(&folder).map(|_| ()),
+        Destination::Rename { folder, .. } => Temporary::create(&folder).map(drop),
     };
     check().map_err(|e| Error::io(path, "write", e))
 }
 
-/// Creates a folder and the folders above it; one that is there already is fine.
+/// Creates a folder and the folders above it, and makes sure that files can be written there; one that is there already
+/// is fine.
+///
+/// # Errors
+/// [`Error::Io`] naming the folder.
 pub fn create_dir(path: &Path) -> Result<()> {
-    fs::create_dir_all(path).map_err(|e| Error::io(path, "create the folder", e))
+    fs::create_dir_all(path).map_err(|e| Error::io(path, "create the folder", e))?;
+    Temporary::create(path).map(drop).map_err(|e| Error::io(path, "write in the folder", e))
+}
+
+/// Gives up all that is not complete, as a process does that is about to end: removes the temporary files, and lets
+/// nothing be written from now on. Returns the files that this process has completed, in order.
+pub(crate) fn abandon() -> Vec<PathBuf> {
+    let mut ledger = ledger();
+    for path in ledger.temporary.drain(..) {
+        // Nothing sensible is left to do if this fails too.
+        let _ = fs::remove_file(path);
+    }
+    let complete = mem::take(&mut ledger.complete);
+    mem::forget(ledger);
+    complete
+}
+
+/// What this process has put on the disk.
+struct Ledger {
+    temporary: Vec<PathBuf>,
+    complete: Vec<PathBuf>,
+}
+
+/// The one ledger. It is locked while a temporary file comes and while it goes, so that it always tells the truth.
+fn ledger() -> MutexGuard<'static, Ledger> {
+    static LEDGER: Mutex<Ledger> = Mutex::new(Ledger { temporary: Vec::new(), complete: Vec::new() });
+    LEDGER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Several files that appear together: each [`write`](Batch::write) fills one out of sight,
@@ -171,7 +203,6 @@ fn split(path: &Path) -> io::Result<(PathBuf, OsString)> {
 /// A file that is removed when dropped, unless it was renamed.
 struct Temporary {
     path: PathBuf,
-    renamed: bool,
 }
 
 impl Temporary {
@@ -180,28 +211,41 @@ impl Temporary {
         loop {
             let n = NEXT.fetch_add(1, Ordering::Relaxed);
             let path = folder.join(format!(".limitlab-{}-{n}.tmp", std::process::id()));
+            let mut ledger = ledger();
             match OpenOptions::new().write(true).create_new(true).open(&path) {
                 // Left by a process of the same number that was killed.
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
                 opened => {
                     let file = opened?;
-                    let renamed = false;
-                    return Ok((Temporary { path, renamed }, file));
+                    ledger.temporary.push(path.clone());
+                    return Ok((Temporary { path }, file));
                 }
             }
         }
     }
 
-    fn rename(mut self, target: &Path) -> io::Result<()> {
+    fn rename(self, target: &Path) -> io::Result<()> {
+        let mut ledger = ledger();
         fs::rename(&self.path, target)?;
-        self.renamed = true;
+        ledger.forget(&self.path);
+        if !ledger.complete.iter().any(|known| known == target) {
+            ledger.complete.push(target.to_path_buf());
+        }
         Ok(())
+    }
+}
+
+impl Ledger {
+    /// Strikes out a temporary file; whether it was there.
+    fn forget(&mut self, path: &Path) -> bool {
+        let place = self.temporary.iter().position(|known| known == path);
+        place.map(|k| self.temporary.swap_remove(k)).is_some()
     }
 }
 
 impl Drop for Temporary {
     fn drop(&mut self) {
-        if !self.renamed {
+        if ledger().forget(&self.path) {
             // Nothing sensible is left to do if this fails too.
             let _ = fs::remove_file(&self.path);
         }

@@ -16,8 +16,10 @@ use limitlab::Result;
 use limitlab::assemble::Scheme;
 use limitlab::cli::{self, CommonFlags, MeshFlags, StopFlags};
 use limitlab::error::Error;
+use limitlab::interpolate::surface::refinement;
 use limitlab::mesh::io;
 use limitlab::mesh::order::Order;
+use limitlab::output::check_target;
 use limitlab::solvers::Method;
 use limitlab::subdivide::Refinement;
 
@@ -197,10 +199,16 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
+    io::check_name(&arguments.output)?;
+    check_target(&arguments.output)?;
     let Some(input) = arguments.mesh.input(&arguments.input, &arguments.common)? else {
         return Ok(());
     };
-    io::check_name(&arguments.output)?;
+    let refinement = match arguments.method {
+        Choice::Keeping(scheme) => scheme,
+        _ => refinement(input.scheme),
+    };
+    refinement.check_size(&input.mesh, arguments.shape.subdivide.into()).map_err(|e| input.named(e))?;
     let wishes = Wishes::read(&arguments.shape, &input)?;
     let named = |e: Error| match e {
         Error::Computation(what) | Error::Mesh { what, .. } => Error::mesh(&input.name, what),

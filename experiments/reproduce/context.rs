@@ -78,6 +78,11 @@ impl Context {
                 folder.display()
             )));
         }
+        if let Some(folder) = check
+            && !folder.is_dir()
+        {
+            return Err(Error::Unknown(format!("{}: no such folder; --check names a report folder", folder.display())));
+        }
         let context = Context {
             root: root.to_path_buf(),
             models: models.map(Path::to_path_buf),
@@ -269,7 +274,7 @@ impl Context {
             "differences": self.differences,
         }))?;
         for difference in &self.differences {
-            eprintln!("differs: {difference}");
+            cli::say(format_args!("differs: {difference}"));
         }
         match self.differences.first() {
             None => Ok(()),

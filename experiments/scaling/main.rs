@@ -134,7 +134,6 @@ fn measure(arguments: &Arguments) -> Result<()> {
     for &scheme in &arguments.scheme.0 {
         panels.extend(of_scheme(arguments, scheme, bandwidth, &mut table)?);
     }
-    table.write(&arguments.out)?;
     if !panels.is_empty() {
         let rows = panels.len() as u32 / 2;
         let mut figure = Figure::row(panels);
@@ -316,6 +315,8 @@ fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut 
                     (1e9 * seconds / mesh.len() as f64).into(),
                     (memory as f64 / 1e6).into(),
                 ]);
+                // A run of hours may be stopped: what was measured is kept.
+                table.write(&arguments.out)?;
                 let at = (mesh.len() as f64, 1e9 * seconds / mesh.len() as f64);
                 let known = curves.iter_mut().find(|c| c.way == way && c.random == random);
                 match known {

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::system::FaceBlocks;
 use crate::error::{Error, Result};
+use crate::memory::require;
 use crate::mesh::incidence::{next_in, prev_in, split_rows};
 use crate::mesh::{Faces, Topology};
 use crate::pages::large;
@@ -170,7 +171,7 @@ impl<'a> Rows<'a> {
     /// All rows.
     ///
     /// # Errors
-    /// More than 2³² − 1 entries.
+    /// More than 2³² − 1 entries, or than memory has room for.
     pub(super) fn arrays(&self) -> Result<Arrays> {
         Ok(match self.fill(self.greatest_lengths())? {
             Ok(arrays) => arrays,
@@ -209,6 +210,14 @@ impl<'a> Rows<'a> {
                  without very large faces"
             )));
         }
+        // A column and a value of M and of A each, and numbers for every row.
+        let bytes = total * 20 + lengths.len() as u64 * 24;
+        let what = || format!("the matrix with {total} entries");
+        require(
+            bytes,
+            what,
+            "use a smaller mesh or one without very large faces, or a method without a stored matrix",
+        )?;
         let mut offsets = large(Vec::with_capacity(lengths.len() + 1));
         offsets.push(0u32);
         let mut end = 0u32;

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::CommonFlags;
 use crate::assemble::{LimitSystem, Scheme};
 use crate::error::{Error, Result};
-use crate::interpolate::automatic::{Renumbered, renumbered};
+use crate::interpolate::automatic::{Renumbered, renumbered, require_memory};
 use crate::mesh::io::{self, Loaded};
 use crate::mesh::noise::{Noise, add_noise};
 use crate::mesh::validate::{Boundary, Validation, validate};
@@ -96,6 +96,7 @@ impl MeshFlags {
         for remark in &loaded.remarks {
             common.remark(format_args!("{name}: {remark}"));
         }
+        require_memory(&loaded.mesh).map_err(|e| Error::mesh(name, e.to_string()))?;
         let start = Instant::now();
         if let Some(noise) = self.noise {
             add_noise(&mut loaded.mesh, noise.amplitude, noise.seed);
@@ -195,6 +196,11 @@ impl Input {
     /// # Errors
     /// As [`LimitSystem::new`], with the mesh's name.
     pub fn system(&self) -> Result<LimitSystem> {
-        LimitSystem::new(&self.mesh, self.topology(), self.scheme).map_err(|e| Error::mesh(&self.name, e.to_string()))
+        LimitSystem::new(&self.mesh, self.topology(), self.scheme).map_err(|e| self.named(e))
+    }
+
+    /// An error of a computation with the mesh's name.
+    pub fn named(&self, error: Error) -> Error {
+        Error::mesh(&self.name, error.to_string())
     }
 }

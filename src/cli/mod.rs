@@ -2,13 +2,14 @@
 
 pub mod constraints;
 mod input;
+mod process;
 mod progress;
 
 pub use input::{Input, MeshFlags, STAND_IN_NOISE};
+pub use process::{exit, say};
 pub use progress::Progress;
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -21,7 +22,7 @@ use crate::solvers::Stop;
 /// Flags of every program: threads and silence.
 #[derive(Args, Clone, Debug)]
 pub struct CommonFlags {
-    /// Number of threads; all of the machine's unless told
+    /// Number of threads, at most and unless told one a processor
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
     /// No remarks and no progress on standard error
@@ -30,24 +31,19 @@ pub struct CommonFlags {
 }
 
 impl CommonFlags {
-    /// Sets the number of threads of the whole process.
+    /// Prepares the process for work: signals, then threads.
     ///
     /// # Errors
-    /// If the threads cannot be started.
+    /// If threads were started before.
     pub fn apply(&self) -> Result<()> {
-        let Some(n) = self.threads else {
-            return Ok(());
-        };
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(n.into())
-            .build_global()
-            .map_err(|e| Error::Computation(format!("cannot start {n} threads: {e}")))
+        process::heed_signals();
+        process::start_threads(self.threads, |text| self.remark(text))
     }
 
     /// Tells the user something on standard error, unless asked to be quiet.
     pub fn remark(&self, text: impl std::fmt::Display) {
         if !self.quiet {
-            eprintln!("{text}");
+            say(text);
         }
     }
 }
@@ -146,19 +142,6 @@ where
             .map(|item| item.trim().parse().map_err(|e: T::Err| e.to_string()))
             .collect::<std::result::Result<_, _>>()
             .map(List)
-    }
-}
-
-/// Runs a program's body: exit status 0, or 1 with the one line `error: …` on standard error. Bad arguments end
-/// with 2 in clap, before.
-pub fn exit(body: impl FnOnce() -> Result<()>) -> ExitCode {
-    match body() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            let line = error.to_string().replace('\n', " ");
-            eprintln!("error: {line}");
-            ExitCode::FAILURE
-        }
     }
 }
 

@@ -24,6 +24,7 @@ use glam::DVec3;
 use crate::assemble::bounds::usual_lambda_min;
 use crate::assemble::{Operator, Scheme};
 use crate::error::Result;
+use crate::memory::require;
 use crate::mesh::curve::{along_curve, is_scattered};
 use crate::mesh::fronts::{in_fronts, in_kinds};
 use crate::mesh::order::Numbering;
@@ -58,7 +59,7 @@ pub struct Automatic {
 /// for boundaries where it is given.
 ///
 /// # Errors
-/// As [`Operator::new`].
+/// As [`require_memory`] and [`Operator::new`].
 ///
 /// ```
 /// use limitlab::assemble::Scheme;
@@ -73,6 +74,7 @@ pub struct Automatic {
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn control_points(mesh: &Mesh, topology: Option<&Topology>, scheme: Scheme, stop: &Stop) -> Result<Automatic> {
+    require_memory(mesh)?;
     let start = Instant::now();
     let Some(moved) = renumbered(mesh) else {
         return in_order(mesh, topology, scheme, stop);
@@ -81,6 +83,18 @@ pub fn control_points(mesh: &Mesh, topology: Option<&Topology>, scheme: Scheme, 
     let mut found = moved.control_points(None, scheme, stop)?;
     found.curve_seconds = seconds;
     Ok(found)
+}
+
+/// Refuses a mesh whose topology, operator and iterates memory has no room for. The numbers are measured.
+///
+/// # Errors
+/// [`Error::Memory`](crate::Error::Memory).
+pub fn require_memory(mesh: &Mesh) -> Result<()> {
+    let corners = mesh.faces.corners().len();
+    // Lists of neighbours, where faces are not all of one size.
+    let mixed = if mesh.faces.uniform_size().is_none() { 24 } else { 0 };
+    let bytes = 64 * mesh.len() as u64 + (32 + mixed) * corners as u64;
+    require(bytes, || format!("the work on {} vertices and {corners} corners", mesh.len()), "use a smaller mesh")
 }
 
 /// A mesh along a space-filling curve.

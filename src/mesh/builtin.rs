@@ -10,10 +10,14 @@ use super::generate::{dual, flip_edges, merge_faces, midpoint_split, quad_split,
 use super::incidence::next_in;
 use super::topology::Topology;
 use super::{Faces, Mesh};
+use crate::memory::require;
 use crate::{Error, Result};
 
 /// The largest built-in mesh in corners: 11 million vertices with triangles, 16 million with quads.
 const MAX_CORNERS: u64 = 1 << 26;
+
+/// Memory for each corner of a mesh while it is generated, at most; measured.
+const BYTES: u64 = 48;
 
 /// How to write each name, and what it is.
 pub const NAMES: [(&str, &str); 17] = [
@@ -70,17 +74,17 @@ pub fn builtin(name: &str) -> Result<Mesh> {
         "icosahedron" => request.plain(icosahedron),
         "dodecahedron" => request.plain(dodecahedron),
         "truncated-octahedron" => request.plain(truncated_octahedron),
-        "prism" => Ok(prism(request.number(3, MAX_CORNERS / 6)?)),
-        "bipyramid" => Ok(bipyramid(request.number(3, MAX_CORNERS / 6)?)),
-        "star" => Ok(star(request.number(3, MAX_CORNERS / 96)?)),
+        "prism" => Ok(prism(request.number(3, 6)?)),
+        "bipyramid" => Ok(bipyramid(request.number(3, 6)?)),
+        "star" => Ok(star(request.number(3, 96)?)),
         "torus" => request.grid(4).map(|(n, m)| torus(n, m)),
         "tri-torus" => request.grid(6).map(|(n, m)| tri_torus(n, m)),
-        "icosphere" => Ok(icosphere(request.number(0, levels(60))?)),
-        "quad-sphere" => Ok(quad_sphere(request.number(0, levels(24))?)),
-        "cubes" => Ok(cubes(request.number(1, MAX_CORNERS / 24)?)),
-        "irregular-tri" => request.number_and_seed(5, MAX_CORNERS / 6).map(|(n, seed)| irregular_tri(n, seed)),
+        "icosphere" => Ok(icosphere(request.levels(60)?)),
+        "quad-sphere" => Ok(quad_sphere(request.levels(24)?)),
+        "cubes" => Ok(cubes(request.number(1, 24)?)),
+        "irregular-tri" => request.number_and_seed(5, 6).map(|(n, seed)| irregular_tri(n, seed)),
         "irregular-quad" => {
-            let (n, seed) = request.number_and_seed(26, MAX_CORNERS / 4)?;
+            let (n, seed) = request.number_and_seed(26, 4)?;
             if n % 2 == 1 {
                 return Err(request.refuse("N must be even"));
             }
@@ -90,14 +94,9 @@ pub fn builtin(name: &str) -> Result<Mesh> {
             }
             Ok(mesh)
         }
-        "irregular-poly" => request.number_and_seed(5, MAX_CORNERS / 6).map(|(n, seed)| irregular_poly(n, seed)),
+        "irregular-poly" => request.number_and_seed(5, 6).map(|(n, seed)| irregular_poly(n, seed)),
         _ => unreachable!("every name listed has its arm"),
     }
-}
-
-/// How often a mesh of that many corners can be split in four.
-fn levels(corners: u64) -> u64 {
-    u64::from((MAX_CORNERS / corners).ilog(4))
 }
 
 /// A built-in mesh as it was asked for.
@@ -130,20 +129,38 @@ impl Request<'_> {
         self.parameters.ok_or_else(|| self.refuse("it needs its parameter"))
     }
 
-    fn number(&self, min: u64, max: u64) -> Result<usize> {
-        self.in_range(self.text()?, "K", min, max)
+    /// Refuses so many corners where memory has no room for them.
+    fn room(&self, corners: usize) -> Result<()> {
+        let what = || format!("the built-in mesh `{}` with {corners} corners", self.name);
+        require(corners as u64 * BYTES, what, "use a smaller one")
     }
 
-    fn number_and_seed(&self, min: u64, max: u64) -> Result<(usize, u64)> {
+    /// The number K of a mesh with so many corners for each.
+    fn number(&self, min: u64, corners: u64) -> Result<usize> {
+        let k = self.in_range(self.text()?, "K", min, MAX_CORNERS / corners)?;
+        self.room(k * corners as usize)?;
+        Ok(k)
+    }
+
+    /// How often a mesh of so many corners is split in four.
+    fn levels(&self, corners: u64) -> Result<usize> {
+        let k = self.in_range(self.text()?, "K", 0, u64::from((MAX_CORNERS / corners).ilog(4)))?;
+        self.room((corners as usize) << (2 * k))?;
+        Ok(k)
+    }
+
+    /// The number of vertices, so many corners for each, and the seed.
+    fn number_and_seed(&self, min: u64, corners: u64) -> Result<(usize, u64)> {
         let text = self.text()?;
         let (n, seed) = match text.split_once(':') {
             Some((n, seed)) => (n, Some(seed)),
             None => (text, None),
         };
-        let n = self.in_range(n, "N", min, max)?;
+        let n = self.in_range(n, "N", min, MAX_CORNERS / corners)?;
         let seed = seed
             .map_or(Ok(1), u64::from_str)
             .map_err(|_| self.refuse("SEED must be a whole number from 0 to 18446744073709551615"))?;
+        self.room(n * corners as usize)?;
         Ok((n, seed))
     }
 
@@ -156,6 +173,7 @@ impl Request<'_> {
         if n as u64 * m as u64 > max {
             return Err(self.refuse(&format!("N times M must not exceed {max}")));
         }
+        self.room(n * m * corners as usize)?;
         Ok((n, m))
     }
 }

@@ -8,17 +8,25 @@ use super::{Faces, Mesh, bounding_box};
 
 /// Whether vertices that faces bring together lie scattered through memory: of the vertices that a face does not
 /// share with the face before it, fewer than a quarter are within 128 places of one of that face's. Looks
-/// at 65 536 faces at the most.
+/// at 65 536 faces at the most; O(C log C) in their corners C.
 pub fn is_scattered(faces: &Faces) -> bool {
     const NEAR: u32 = 128;
     const NEAR_SHARE: f64 = 0.25;
     const SAMPLE: usize = 1 << 16;
     let (mut fresh, mut near) = (0u32, 0u32);
+    let mut before = Vec::new();
     for f in (1..faces.len()).step_by(faces.len() / SAMPLE + 1) {
-        let before = faces.face(f - 1);
-        for &v in faces.face(f).iter().filter(|v| !before.contains(v)) {
+        before.clear();
+        before.extend_from_slice(faces.face(f - 1));
+        before.sort_unstable();
+        for &v in faces.face(f) {
+            let above = before.partition_point(|&w| w < v);
+            if before.get(above) == Some(&v) {
+                continue;
+            }
             fresh += 1;
-            near += u32::from(before.iter().any(|&w| v.abs_diff(w) <= NEAR));
+            let neighbours = &before[above.saturating_sub(1)..before.len().min(above + 1)];
+            near += u32::from(neighbours.iter().any(|&w| v.abs_diff(w) <= NEAR));
         }
     }
     f64::from(near) < NEAR_SHARE * f64::from(fresh)

@@ -10,6 +10,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::{Faces, Mesh, obj, obj_normals, off, ply};
+use crate::memory::require;
 use crate::output::write_file;
 use crate::{Error, Result};
 
@@ -35,6 +36,9 @@ pub struct Lines {
     pub faces: Vec<u32>,
 }
 
+/// Memory for each byte of a file while it is read, itself included; measured on the densest format, binary PLY.
+const BYTES: u64 = 3;
+
 #[derive(Clone, Copy)]
 enum Format {
     Obj,
@@ -55,7 +59,7 @@ impl Format {
         }
     }
 
-    /// Reads a file, all of it only if its first bytes can be of this format.
+    /// Reads a file, all of it only if its first bytes can be of this format and memory has room for the mesh.
     fn read_file(self, path: &Path) -> Result<Vec<u8>> {
         const HEAD: u64 = 1 << 16;
         let refused = |e| Error::io(path, "read", e);
@@ -71,6 +75,8 @@ impl Format {
                 Format::Off => off::check_head(&bytes[..lines], path),
                 Format::Ply => ply::check_head(&bytes[..lines], path),
             }?;
+            let size = file.metadata().map_err(refused)?.len();
+            require(BYTES * size, || format!("{}: the mesh", path.display()), "use a smaller one")?;
             file.read_to_end(&mut bytes).map_err(refused)?;
         }
         Ok(bytes)

@@ -44,6 +44,7 @@ use std::str::FromStr;
 
 use glam::DVec3;
 
+use crate::memory::require;
 use crate::mesh::{Mesh, Topology};
 use crate::{Error, Result};
 
@@ -127,14 +128,46 @@ impl Refinement {
         }
     }
 
+    /// Refuses, before the work, `levels` steps whose meshes have more corners than 32-bit indices name, or for which
+    /// memory has no room. O(levels).
+    ///
+    /// # Errors
+    /// [`Error::Computation`] or [`Error::Memory`] with the numbers of faces and vertices.
+    pub fn check_size(self, mesh: &Mesh, levels: usize) -> Result<()> {
+        let count = |n: usize| n as u64;
+        let (mut vertices, mut faces, mut corners) =
+            (count(mesh.len()), count(mesh.faces.len()), count(mesh.faces.corners().len()));
+        for level in 1..=levels {
+            let edges = corners / 2;
+            // Before a step the coarse mesh and its topology are there, after it the fine mesh.
+            let coarse = 24 * vertices + 24 * corners;
+            (vertices, faces, corners) = match self {
+                Refinement::CatmullClark => (vertices + edges + faces, corners, 4 * corners),
+                Refinement::Loop | Refinement::Butterfly => (vertices + edges, 4 * faces, 4 * corners),
+                Refinement::DooSabin => (corners, faces + edges + vertices, 4 * corners),
+                Refinement::Sqrt3 | Refinement::LabsikGreiner => (vertices + faces, 3 * faces, 3 * corners),
+            };
+            let what = || format!("level {level} of {levels} with {faces} faces and {vertices} vertices");
+            if u32::try_from(corners).is_err() {
+                return Err(Error::Computation(format!(
+                    "{} would have {corners} corners, more than 32-bit indices reach: refine fewer levels",
+                    what()
+                )));
+            }
+            require(coarse + 24 * vertices + 4 * faces + 4 * corners, what, "refine fewer levels")?;
+        }
+        Ok(())
+    }
+
     /// `levels` steps; none gives a copy. The topology of each level comes from that of the level before.
     ///
     /// # Errors
-    /// As [`refine`](Self::refine).
+    /// As [`check_size`](Self::check_size) and [`refine`](Self::refine).
     ///
     /// # Panics
     /// If a face names a vertex that is not there (the validator reports such faces before).
     pub fn refine_n(self, mesh: &Mesh, levels: usize) -> Result<Mesh> {
+        self.check_size(mesh, levels)?;
         let mut topology = Topology::new(&mesh.faces, mesh.len());
         let mut coarse = None;
         for level in 1..=levels {

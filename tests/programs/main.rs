@@ -6,6 +6,8 @@ mod common;
 mod bad_input;
 mod contract;
 mod metadata;
+#[cfg(target_os = "linux")]
+mod process;
 mod results;
 
 use std::fs;
@@ -21,6 +23,7 @@ pub const COMPARE: &str = env!("CARGO_BIN_EXE_compare-solvers");
 pub const SWEEP: &str = env!("CARGO_BIN_EXE_sweep-omega");
 pub const REPRODUCE: &str = env!("CARGO_BIN_EXE_reproduce");
 pub const SPLITTING: &str = env!("CARGO_BIN_EXE_splitting");
+pub const SPECTRUM: &str = env!("CARGO_BIN_EXE_spectrum");
 
 /// The programs that take meshes.
 pub const ON_MESHES: [&str; 4] = [ASSEMBLE, INTERPOLATE, COMPARE, SWEEP];

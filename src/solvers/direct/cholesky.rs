@@ -12,6 +12,7 @@ use glam::DVec3;
 
 use super::{Factorization, failed};
 use crate::assemble::Csr;
+use crate::memory::require;
 use crate::solvers::iteration::{Failure, Outcome};
 
 /// Which of the two factorizations.
@@ -50,12 +51,15 @@ impl Cholesky {
             Kind::Llt => "Cholesky",
             Kind::Ldlt => "LDLᵀ",
         };
-        let broken = |why: &dyn std::fmt::Debug| failed(name, Outcome::Breakdown, why);
+        let broken = |why: &dyn std::fmt::Display| failed(name, Outcome::Breakdown, why);
         let pattern = faer_pattern(m);
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Upper, SymmetricOrdering::Amd, Default::default())
             .map_err(|e| broken(&e))?;
         let matrix = SparseColMatRef::new(pattern, m.values());
-        let mut values = vec![0.0; symbolic.len_val()];
+        let fill = symbolic.len_val();
+        let what = || format!("the factor with {fill} entries");
+        require(fill as u64 * 8, what, "use an iterative method").map_err(|e| broken(&e))?;
+        let mut values = vec![0.0; fill];
         match kind {
             Kind::Llt => {
                 let need = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());

@@ -2,8 +2,8 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SparseColMatRef;
-use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::lu::{LuRef, LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};
+use faer::sparse::linalg::{LuError, SupernodalThreshold};
 use faer::{Conj, Mat, Par};
 use glam::DVec3;
 
@@ -28,7 +28,7 @@ impl SparseLu {
     /// [`Outcome::Singular`] if A is structurally singular, [`Outcome::Breakdown`] when memory or 32-bit indices
     /// do not suffice.
     pub fn new(system: &LimitSystem) -> Result<Self, Failure> {
-        let broken = |why: &dyn std::fmt::Debug| failed("LU", Outcome::Breakdown, why);
+        let broken = |why: &dyn std::fmt::Display| failed("LU", Outcome::Breakdown, why);
         // Column j of A holds h_i m_ij: row j of M, weighted by the column's H.
         let m = &system.m;
         let values: Vec<f64> =
@@ -50,7 +50,10 @@ impl SparseLu {
                 MemStack::new(&mut memory),
                 Default::default(),
             )
-            .map_err(|e| failed("LU", Outcome::Singular, e))?;
+            .map_err(|e| match e {
+                LuError::SymbolicSingular { .. } => failed("LU", Outcome::Singular, e),
+                LuError::Generic(e) => broken(&e),
+            })?;
         let scratch =
             MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(3, Par::Seq)).map_err(|e| broken(&e))?;
         Ok(SparseLu { symbolic, numeric, right_hand_sides: Mat::zeros(m.len(), 3), scratch })

@@ -116,6 +116,6 @@ impl<S: System, F: Factorization> Iterate for Direct<'_, S, F> {
 }
 
 /// A factorization that could not be made.
-fn failed(method: &str, outcome: Outcome, why: impl std::fmt::Debug) -> Failure {
-    Failure { outcome, detail: format!("{method}: {why:?}") }
+fn failed(method: &str, outcome: Outcome, why: impl std::fmt::Display) -> Failure {
+    Failure { outcome, detail: format!("{method}: {why}") }
 }

@@ -11,6 +11,7 @@ use nalgebra_sparse::factorization::CscCholesky;
 use super::cholesky::faer_pattern;
 use super::{Factorization, failed};
 use crate::assemble::Csr;
+use crate::memory::require;
 use crate::solvers::iteration::{Failure, Outcome};
 
 /// M factored by nalgebra-sparse.
@@ -32,6 +33,10 @@ impl SecondOpinion {
         let symbolic =
             factorize_symbolic_cholesky(faer_pattern(m), Side::Upper, SymmetricOrdering::Amd, Default::default())
                 .map_err(|e| failed(name, Outcome::Breakdown, e))?;
+        let fill = symbolic.len_val();
+        let what = || format!("the factor with {fill} entries");
+        // Its indices take as much as its values, and while it is found it is there twice.
+        require(fill as u64 * 32, what, "use an iterative method").map_err(|e| failed(name, Outcome::Breakdown, e))?;
         let order: Vec<u32> = match symbolic.perm() {
             Some(perm) => perm.arrays().0.to_vec(),
             None => (0..n as u32).collect(),

@@ -1,0 +1,80 @@
+//! The memory that a computation needs, held against what is available, before the work begins.
+
+use std::hint::black_box;
+
+use sysinfo::System;
+
+use crate::error::{Error, Result};
+
+/// Less than this is not looked at, since to look takes longer than the work.
+const SMALL: u64 = 16 << 20;
+
+/// Passes if `bytes` of memory are available: as the system and the control group of the process tell, in one piece of
+/// addresses (`ulimit -v`). `what` names what needs them, as the subject of a sentence; `advice` is what to do.
+///
+/// # Errors
+/// [`Error::Memory`] with both numbers.
+pub(crate) fn require(bytes: u64, what: impl FnOnce() -> String, advice: &'static str) -> Result<()> {
+    if bytes < SMALL {
+        return Ok(());
+    }
+    let available = physical().min(addresses(bytes));
+    if bytes <= available {
+        return Ok(());
+    }
+    Err(Error::Memory { what: what(), needed: bytes, available, advice })
+}
+
+/// The memory that the system can give without taking it from another process; all of it where that is not known.
+fn physical() -> u64 {
+    let mut system = System::new();
+    system.refresh_memory();
+    if system.total_memory() == 0 {
+        return u64::MAX;
+    }
+    let free = system.available_memory() + system.free_swap();
+    // What files occupy of a group's memory makes way.
+    let of_group = system.cgroup_limits().map(|group| group.total_memory.saturating_sub(group.rss) + group.free_swap);
+    of_group.map_or(free, |group| free.min(group))
+}
+
+/// The largest piece of addresses that the process is given, up to `wanted` bytes, to a hundredth. Nothing is touched.
+fn addresses(wanted: u64) -> u64 {
+    let given = |bytes: u64| {
+        let mut piece = Vec::<u8>::new();
+        usize::try_from(bytes).is_ok_and(|bytes| piece.try_reserve_exact(bytes).is_ok() && black_box(&piece).is_empty())
+    };
+    if given(wanted) {
+        return wanted;
+    }
+    let (mut least, mut most) = (0, wanted);
+    while most - least > wanted / 100 {
+        let middle = least + (most - least) / 2;
+        if given(middle) {
+            least = middle;
+        } else {
+            most = middle;
+        }
+    }
+    least
+}
+
+/// A number of bytes with its unit.
+pub(crate) fn megabytes(bytes: u64) -> String {
+    if bytes < 10_000_000_000 { format!("{} MB", bytes / 1_000_000) } else { format!("{} GB", bytes / 1_000_000_000) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_machine_has_is_refused_with_both_numbers() {
+        require(SMALL - 1, || unreachable!(), "").unwrap();
+        require(SMALL, || "a small thing".into(), "").unwrap();
+        let error = require(1 << 60, || "the matrix".into(), "take a smaller mesh").unwrap_err();
+        let text = error.to_string();
+        assert!(text.starts_with("the matrix needs 1152921504 GB of memory, of which "), "{text}");
+        assert!(text.ends_with(" are available; take a smaller mesh"), "{text}");
+    }
+}
