@@ -48,7 +48,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     };
     let system = input.system()?;
-    let points = &input.mesh.positions;
+    let points = &*input.given_points();
     let right_hand_side = system.symmetric_right_hand_side(points);
     create_dir(&arguments.out)?;
     let path = |name: &str| arguments.out.join(name);
