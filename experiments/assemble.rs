@@ -76,7 +76,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             "bandwidth": system.a.pattern().bandwidth(),
             "files": files,
         }));
-        cli::print(&format!("{object:#}"))?;
+        cli::print_json(&object)?;
     }
     Ok(())
 }

@@ -45,9 +45,10 @@ pub struct Control {
 pub fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
     let mut control = solved(arguments, input, wishes)?;
     let frame = &input.frame;
-    if !frame.is_identity() {
-        let rounded: Vec<DVec3> = control.points.iter().map(|p| frame.there(frame.back(*p))).collect();
-        control.errors = limit_errors(input, wishes.interpolated.as_deref(), &rounded)?;
+    let rounded = |p: &DVec3| frame.there(frame.back(*p));
+    if !frame.is_identity() && control.points.iter().any(|p| rounded(p) != *p) {
+        let written: Vec<DVec3> = control.points.iter().map(rounded).collect();
+        control.errors = limit_errors(input, wishes.interpolated.as_deref(), &written)?;
     }
     Ok(control)
 }

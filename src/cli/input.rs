@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::{CommonFlags, StopFlags};
 use crate::assemble::{LimitSystem, Scheme};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, short};
 use crate::interpolate::automatic::{Renumbered, renumbered};
 use crate::mesh::frame::Frame;
 use crate::mesh::io::{self, Loaded};
@@ -58,6 +58,11 @@ pub struct Input {
 
 /// The noise that built-in meshes carry where they stand in for real ones.
 pub const STAND_IN_NOISE: Noise = Noise { amplitude: 0.1, seed: 1 };
+
+/// The size of a length in words.
+fn one_digit(x: f64) -> String {
+    short(format!("{x:.0e}").parse().unwrap_or(x))
+}
 
 /// Endings that mark a MESH argument as a file.
 const ENDINGS: [&str; 3] = ["obj", "off", "ply"];
@@ -107,8 +112,7 @@ impl MeshFlags {
         let start = Instant::now();
         let (report, renumbered) = self.report(&loaded);
         if self.defects {
-            let json = serde_json::to_string_pretty(&report).map_err(|e| Error::Computation(format!("{name}: {e}")))?;
-            super::print(&json)?;
+            super::print_json(&report)?;
             return Ok(None);
         }
         for remark in &report.remarks {
@@ -227,22 +231,18 @@ impl Input {
         self.frame.back(lo).abs().max(self.frame.back(hi).abs()).max_element()
     }
 
-    /// What the last digit of the largest coordinate is worth, in mesh units: nothing is written more exactly.
-    pub fn last_digit(&self) -> f64 {
-        let largest = self.largest_coordinate();
-        largest - largest.next_down()
-    }
-
-    /// What to know of a tolerance, in mesh units, that the digits of the coordinates cannot hold.
+    /// What to know of a tolerance, in mesh units, that the digits of the coordinates cannot hold, though it can be
+    /// reached in the frame.
     pub fn remark_on_rounding(&self, tolerance: f64) -> Option<String> {
+        let largest = self.largest_coordinate();
+        let digit = largest - largest.next_down();
         // Control points may have a coordinate twice as large as the points.
-        let digit = self.last_digit();
-        (tolerance < 2.0 * digit).then(|| {
+        (!self.frame.is_identity() && tolerance < 2.0 * digit).then(|| {
             format!(
-                "the points lie at {:.0e} ± {:.0e}: their last digit is {digit:.1e}, the tolerance {tolerance:.1e}; \
-                 results are as near as these digits allow, or move the points to the origin",
-                self.largest_coordinate(),
-                0.5 * self.frame.scale() * self.mesh.diagonal()
+                "the points lie at {} ± {}: their last digit is {digit:.1e}, the tolerance {tolerance:.1e}; results are \
+                 as near as these digits allow",
+                one_digit(largest),
+                one_digit(0.5 * self.frame.scale() * self.mesh.diagonal())
             )
         })
     }

@@ -2,9 +2,11 @@
 
 pub mod constraints;
 mod input;
+mod json;
 mod progress;
 
 pub use input::{Input, MeshFlags, STAND_IN_NOISE};
+pub use json::print_json;
 pub use progress::Progress;
 
 use std::path::PathBuf;
@@ -187,7 +189,7 @@ pub fn finish(mut results: Vec<Value>, output: &OutputFlags, common: &CommonFlag
         1 => results.remove(0),
         _ => json!({ "results": results }),
     };
-    print(&format!("{object:#}"))
+    print_json(&object)
 }
 
 /// A number for JSON: `null` if it is not finite.
