@@ -56,7 +56,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     };
     let system = input.system()?;
-    let points = &input.mesh.positions;
+    let points = &*input.given_points();
     let right_hand_side = system.symmetric_right_hand_side(points);
     let mut batch = Batch::default();
     batch.write(&path("A.mtx"), |out| matrix_market::write_general(&system.a, out))?;
@@ -82,7 +82,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             "bandwidth": system.a.pattern().bandwidth(),
             "files": files,
         }));
-        cli::print(&format!("{object:#}"))?;
+        cli::print_json(&object)?;
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use limitlab::analysis::spectrum::spectrum;
 use limitlab::cli::{self, CommonFlags, Input, List, MeshFlags, OutputFlags, Progress, StopFlags, number};
 use limitlab::mesh::order::Order;
 use limitlab::report::{Column, Figure, LinePlot, Scale, Series, Table};
-use limitlab::solvers::Method;
+use limitlab::solvers::{Method, Stop};
 
 /// Runs every method on the same system from the same start V = P, and prints iterations, errors, observed and
 /// predicted rate, and the seconds of set-up and solve apart.
@@ -56,8 +56,9 @@ fn run(arguments: &Arguments) -> Result<()> {
         let Some(input) = arguments.mesh.input(name, &arguments.common)? else {
             continue;
         };
-        let rows = compare(&input, arguments)?;
-        let table = table(&input, arguments, &rows);
+        let stop = input.stop(&arguments.stop)?;
+        let rows = compare(&input, arguments, &stop)?;
+        let table = table(&input, stop.tolerance * input.frame.scale(), &rows);
         let stem = input.stem("compare-solvers");
         table.write(&arguments.output.out)?;
         plot(&input, &rows).render()?.save(&arguments.output.out.join(format!("{stem}.png")))?;
@@ -69,7 +70,8 @@ fn run(arguments: &Arguments) -> Result<()> {
     cli::finish(results, &arguments.output, &arguments.common)
 }
 
-fn compare(input: &Input, arguments: &Arguments) -> Result<Vec<Row>> {
+/// The rows, their errors in mesh units.
+fn compare(input: &Input, arguments: &Arguments, stop: &Stop) -> Result<Vec<Row>> {
     let system = input.system()?;
     let order = arguments.order.order(&input.mesh, &input.topology().incidence);
     let methods = match &arguments.method {
@@ -79,18 +81,22 @@ fn compare(input: &Input, arguments: &Arguments) -> Result<Vec<Row>> {
     let spectrum = spectrum(&system)?;
     let lines = comparison::entries(&system, &spectrum, &methods, Some(&order), &arguments.order.to_string())?;
     let progress = Progress::new(&input.name, lines.len(), arguments.common.quiet);
-    comparison::compare(
+    let mut rows = comparison::compare(
         &system,
         &spectrum,
         &input.mesh.positions,
         &lines,
-        &arguments.stop.stop(&input.mesh),
+        stop,
         input.mesh.diagonal(),
         &mut || progress.step(),
-    )
+    )?;
+    for errors in rows.iter_mut().flat_map(|row| &mut row.solution.report.history) {
+        *errors = *errors * input.frame.scale();
+    }
+    Ok(rows)
 }
 
-fn table(input: &Input, arguments: &Arguments, rows: &[Row]) -> Table {
+fn table(input: &Input, tolerance: f64, rows: &[Row]) -> Table {
     let mut table = Table::new(
         input.stem("compare-solvers"),
         format!("All methods on {} under {}", input.label, input.scheme),
@@ -108,13 +114,11 @@ fn table(input: &Input, arguments: &Arguments, rows: &[Row]) -> Table {
             Column::time("seconds_solve"),
         ],
     );
-    let stop = arguments.stop.stop(&input.mesh);
     table.note(format!(
-        "{} vertices, {} faces; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:e} (mesh units). Rates are factors \
+        "{} vertices, {} faces; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {tolerance:e} (mesh units). Rates are factors \
          per iteration; `fill` counts the stored entries of the factors, where the library tells.",
         input.mesh.len(),
-        input.mesh.faces.len(),
-        stop.tolerance
+        input.mesh.faces.len()
     ));
     for row in rows {
         let report = &row.solution.report;

@@ -82,7 +82,8 @@ struct Findings {
     sweeps: Vec<(Method, f64, SpectralRadius)>,
     verdict: Singularity,
     promise: Promise,
-    counts: Counts,
+    /// `None` where all points coincide.
+    counts: Option<Counts>,
     data: [Option<Extremes>; 2],
     modes: Vec<Mode>,
     certificates: [Option<Certificate>; 4],
@@ -156,8 +157,13 @@ fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
     let progress = Progress::new(&input.name, 5, arguments.common.quiet);
     let verdict = Singularity::detect(&input.mesh, input.topology(), input.scheme);
     let promise = Promise::new(&operator.bounds());
-    let tolerance = arguments.stop.stop(&input.mesh).tolerance;
-    let counts = promise.counts(&operator, &input.mesh.positions, tolerance);
+    let counts = match input.stop(&arguments.stop) {
+        Ok(stop) => Some(promise.counts(&operator, &input.mesh.positions, stop.tolerance)),
+        Err(error) => {
+            arguments.common.remark(format_args!("no iterations are promised: {error}"));
+            None
+        }
+    };
     let full = match &system {
         Some(system) if arguments.full => Some(dense::full_eigenvalues(system).map_err(with_name)?),
         _ => None,
@@ -277,13 +283,16 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
         found.spectrum().jacobi.critical_omega(),
         found.promise.safe_omega_pia
     ));
-    table.note(format!(
-        "Iterations that suffice by proof for this tolerance from V = P: PIA {}, W-PIA {}, Thall {}, Chebyshev {}.",
-        promised(found.counts.pia),
-        promised(found.counts.w_pia),
-        promised(found.counts.thall),
-        promised(found.counts.chebyshev)
-    ));
+    table.note(match &found.counts {
+        Some(counts) => format!(
+            "Iterations that suffice by proof for this tolerance from V = P: PIA {}, W-PIA {}, Thall {}, Chebyshev {}.",
+            promised(counts.pia),
+            promised(counts.w_pia),
+            promised(counts.thall),
+            promised(counts.chebyshev)
+        ),
+        None => "All points coincide: no tolerance is relative to their extent, and no iterations are promised.".into(),
+    });
     let b = &found.bounds;
     let e = &found.ends;
     let data = |k: usize, low: bool| found.data[k].map(|d| if low { d.min } else { d.max });
@@ -387,6 +396,7 @@ fn json(input: &Input, found: &Findings) -> Value {
     let e = &found.ends;
     let Spectrum { a, jacobi } = found.spectrum();
     let multiplicity = |e: Estimate| e.multiplicity.map(|m| json!({ "count": m.count, "within": m.within }));
+    let promised = |count: fn(&Counts) -> f64| found.counts.as_ref().map(|c| number(count(c)));
     let mut rho = Map::new();
     for (method, _, value) in found.radii() {
         rho.insert(method.into(), number(value));
@@ -427,10 +437,10 @@ fn json(input: &Input, found: &Findings) -> Value {
         "critical_omega_jacobi": number(jacobi.critical_omega()),
         "safe_omega_jacobi": number(found.promise.safe_omega_jacobi),
         "promised_iterations": {
-            "pia": number(found.counts.pia),
-            "w-pia": number(found.counts.w_pia),
-            "thall": number(found.counts.thall),
-            "chebyshev": number(found.counts.chebyshev),
+            "pia": promised(|c| c.pia),
+            "w-pia": promised(|c| c.w_pia),
+            "thall": promised(|c| c.thall),
+            "chebyshev": promised(|c| c.chebyshev),
         },
         "singular": found.verdict.is_singular(),
         "kernel_dimension": found.verdict.kernel_dimension(),

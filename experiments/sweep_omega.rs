@@ -11,9 +11,8 @@ use serde_json::{Map, Value, json};
 use limitlab::Result;
 use limitlab::analysis::sweep::{Sweep, rounding_floor, sweep};
 use limitlab::cli::{self, CommonFlags, Grid, Input, List, MeshFlags, OutputFlags, Progress, StopFlags, number};
-use limitlab::error::Error;
 use limitlab::mesh::order::Order;
-use limitlab::solvers::Method;
+use limitlab::solvers::{Method, Stop};
 
 /// Sweeps the damping ω of Jacobi, PIA and SOR: iterations to the tolerance and the measured rate, with the
 /// predicted spectral radius ρ(ω), the critical and the optimal ω beside them.
@@ -24,7 +23,7 @@ struct Arguments {
     #[arg(value_name = "MESH")]
     meshes: Vec<String>,
     /// Methods to sweep: jacobi, pia, sor
-    #[arg(long, value_name = "NAME,…", default_value = "jacobi,pia,sor")]
+    #[arg(long, value_name = "NAME,…", default_value = "jacobi,pia,sor", value_parser = methods)]
     method: List<Method>,
     /// Values of ω from A to B, both included; unless told, 0.05 to the first value beyond each method's threshold
     #[arg(long, value_name = "A:B:STEP")]
@@ -44,15 +43,20 @@ struct Arguments {
 
 /// What `sweep-omega` runs on without arguments.
 const BUILT_IN: [&str; 4] = ["torus:32x32", "quad-sphere:4", "icosphere:3", "irregular-quad:1000"];
+
+/// The methods that have an ω to sweep, as a `value_parser`.
+fn methods(text: &str) -> std::result::Result<List<Method>, String> {
+    let list: List<Method> = text.parse()?;
+    match list.0.iter().find(|m| !matches!(m, Method::Jacobi | Method::Pia | Method::Sor)) {
+        None => Ok(list),
+        Some(method) => Err(format!("{method} has no ω to sweep; choose among jacobi, pia and sor")),
+    }
+}
+
 fn main() -> ExitCode {
     let mut arguments = Arguments::parse();
     cli::exit(|| {
         arguments.common.apply()?;
-        for method in &arguments.method.0 {
-            if !matches!(method, Method::Jacobi | Method::Pia | Method::Sor) {
-                return Err(Error::Unknown(format!("{method} has no ω to sweep; choose among jacobi, pia and sor")));
-            }
-        }
         if arguments.meshes.is_empty() {
             arguments.meshes = BUILT_IN.map(String::from).to_vec();
             arguments.mesh.default_noise();
@@ -68,7 +72,8 @@ fn run(arguments: &Arguments) -> Result<()> {
         let Some(input) = arguments.mesh.input(name, &arguments.common)? else {
             continue;
         };
-        let sweep = sweep_one(&input, arguments)?;
+        let stop = input.stop(&arguments.stop)?;
+        let sweep = sweep_one(&input, arguments, &stop)?;
         let table = common::table(
             input.stem("sweep-omega"),
             format!("ω sweep on {} under {}", input.label, input.scheme),
@@ -76,7 +81,7 @@ fn run(arguments: &Arguments) -> Result<()> {
                 "{} vertices, {} faces; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:.3e} (mesh units).",
                 input.mesh.len(),
                 input.mesh.faces.len(),
-                arguments.stop.stop(&input.mesh).tolerance
+                stop.tolerance * input.frame.scale()
             ),
             &sweep,
         );
@@ -93,7 +98,8 @@ fn run(arguments: &Arguments) -> Result<()> {
     cli::finish(results, &arguments.output, &arguments.common)
 }
 
-fn sweep_one(input: &Input, arguments: &Arguments) -> Result<Sweep> {
+/// The sweep, its errors in mesh units.
+fn sweep_one(input: &Input, arguments: &Arguments, stop: &Stop) -> Result<Sweep> {
     let system = input.system()?;
     let order = arguments.order.order(&input.mesh, &input.topology().incidence);
     let grids: Vec<(Method, Vec<f64>)> = arguments
@@ -107,15 +113,19 @@ fn sweep_one(input: &Input, arguments: &Arguments) -> Result<Sweep> {
         .collect();
     let runs = grids.iter().map(|(_, g)| g.len()).sum();
     let progress = Progress::new(&input.name, runs, arguments.common.quiet);
-    sweep(
+    let mut found = sweep(
         &system,
         &input.mesh.positions,
         &grids,
         Some(&order),
-        &arguments.stop.stop(&input.mesh),
+        stop,
         rounding_floor(input.mesh.diagonal()),
         &|| progress.step(),
-    )
+    )?;
+    for row in &mut found.rows {
+        row.errors = row.errors * input.frame.scale();
+    }
+    Ok(found)
 }
 
 fn json(input: &Input, arguments: &Arguments, sweep: &Sweep) -> Value {

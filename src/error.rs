@@ -59,6 +59,32 @@ impl Error {
     }
 }
 
+/// A number in a message: its shortest digits, with an exponent where they would be many.
+pub fn short(x: f64) -> String {
+    let plain = x == 0.0 || !x.is_finite() || (1e-5..1e15).contains(&x.abs());
+    if plain { x.to_string() } else { format!("{x:e}") }
+}
+
 fn at_line(line: Option<usize>) -> String {
     line.map_or_else(String::new, |l| format!(", line {l}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_exact() {
+        for (x, text) in [
+            (0.0, "0"),
+            (0.05, "0.05"),
+            (-1250.0, "-1250"),
+            (1e300, "1e300"),
+            (-1e-13, "-1e-13"),
+            (f64::MAX, "1.7976931348623157e308"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(short(x), text);
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use limitlab::analysis::sweep::Sweep;
 use limitlab::cli::Grid;
+use limitlab::error::short;
 use limitlab::report::{Column, Figure, LinePlot, Marker, Rule, Scale, Series, Table, palette};
 use limitlab::solvers::{Method, Outcome};
 
@@ -51,14 +52,14 @@ pub fn table(id: String, title: String, about: String, sweep: &Sweep) -> Table {
             );
         }
         if let Some(best) = sweep.best(t.method) {
-            text += &format!("; best on the grid: ω = {} with {} iterations", best.omega, best.iterations);
+            text += &format!("; best on the grid: ω = {} with {} iterations", short(best.omega), best.iterations);
         }
         table.note(text + ".");
     }
     for row in &sweep.rows {
         table.push(vec![
             row.method.name().into(),
-            row.omega.to_string().into(),
+            short(row.omega).into(),
             row.outcome.name().into(),
             row.iterations.into(),
             row.predicted_rho.into(),

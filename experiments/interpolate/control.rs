@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use limitlab::Result;
+use limitlab::analysis::advice::Failed;
 use limitlab::analysis::comparison::{SOR_OMEGA, automatic, standard_setup};
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::Operator;
@@ -13,12 +14,10 @@ use limitlab::error::Error;
 use limitlab::interpolate::automatic::control_points;
 use limitlab::interpolate::subset::Restriction;
 use limitlab::interpolate::zheng_cai::{self, PhaseOne, Sweep};
-use limitlab::mesh::Mesh;
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::order::Order;
 use limitlab::solvers::gauss_seidel::by_colours;
-use limitlab::solvers::{Errors, Method, Outcome, Report, Solution, Step, run_watched};
-use limitlab::subdivide::doo_sabin::{Rule, limit_positions};
+use limitlab::solvers::{Errors, Method, Outcome, Report, Solution, Step, Stop, run_watched};
 
 use super::wishes::Wishes;
 use super::{Arguments, Choice};
@@ -42,27 +41,37 @@ pub struct Control {
     pub seconds: Seconds,
 }
 
+/// The control points, and the errors of what will be left of them in the digits of the file.
 pub fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
+    let mut control = solved(arguments, input, wishes)?;
+    let frame = &input.frame;
+    let rounded = |p: &DVec3| frame.there(frame.back(*p));
+    if !frame.is_identity() && control.points.iter().any(|p| rounded(p) != *p) {
+        let written: Vec<DVec3> = control.points.iter().map(rounded).collect();
+        control.errors = limit_errors(input, wishes.interpolated.as_deref(), &written)?;
+    }
+    Ok(control)
+}
+
+fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
     if arguments.method == Choice::TwoPhase {
         return two_phase(arguments, input, wishes);
     }
-    if input.mesh.diagonal() == 0.0 && arguments.stop.tol_absolute.is_none() {
-        return Err(Error::mesh(
-            &input.name,
-            "all points coincide, so no tolerance can be relative to their extent: give --tol-absolute",
-        ));
+    let stop = input.stop(&arguments.stop)?;
+    if let Some(remark) = input.remark_on_rounding(input.frame.scale() * stop.tolerance) {
+        arguments.common.remark(format_args!("{}: {remark}", input.name));
     }
     if let (Choice::Solver(method @ (Method::GaussSeidel | Method::Sor)), Order::Multicolour, None) =
         (arguments.method, arguments.order, &wishes.interpolated)
     {
-        return by_colour(arguments, input, method);
+        return by_colour(arguments, input, wishes, method, &stop);
     }
     let mut chosen = match arguments.method {
         Choice::Solver(method) => Some(method),
         _ => None,
     };
     if arguments.method == Choice::Auto && wishes.interpolated.is_none() {
-        if let Some(control) = fastest(arguments, input)? {
+        if let Some(control) = fastest(arguments, input, wishes, &stop)? {
             return Ok(control);
         }
         // A factorization tells a nearly singular matrix, on which iterations may make no progress for long, from a
@@ -81,7 +90,6 @@ pub fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Re
     let start = Instant::now();
     let order = arguments.order.order(&input.mesh, &input.topology().incidence);
     let order = part.as_ref().map_or_else(|| order.clone(), |p| p.order(&order));
-    let stop = arguments.stop.stop(&input.mesh);
     let progress = Progress::toward("solving", arguments.common.quiet);
     let solve = |method: Method| -> Result<Solution> {
         let setup = standard_setup(solved, method, Some(&order), &|| spectrum(solved))?;
@@ -92,6 +100,7 @@ pub fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Re
             let digits = |e: f64| (e / stop.tolerance).ln();
             progress.part(1.0 - digits(error) / digits(*start.get_or_insert(error)));
             let iteration = step.iteration;
+            let error = input.frame.scale() * error;
             progress.message(format!("{method}, iteration {iteration}: max error {error:.2e}"));
             ControlFlow::Continue(())
         };
@@ -108,7 +117,7 @@ pub fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Re
         solution = solve(method)?;
     }
     drop(progress);
-    check(input, method, &solution.report, stop.tolerance)?;
+    check(arguments, input, wishes, method, &solution.report, &stop)?;
     Ok(Control {
         method: method.name(),
         points: solution.points,
@@ -126,20 +135,22 @@ fn no_progress(outcome: Outcome) -> bool {
     matches!(outcome, Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown)
 }
 
-/// All vertices, by the library's choice of order, operator and method; `None` if that makes no progress.
-fn fastest(arguments: &Arguments, input: &Input) -> Result<Option<Control>> {
-    let stop = arguments.stop.stop(&input.mesh);
+/// All vertices, by the library's choice of order, operator and method; `None` if that makes no progress, and a
+/// solution may exist all the same.
+fn fastest(arguments: &Arguments, input: &Input, wishes: &Wishes, stop: &Stop) -> Result<Option<Control>> {
     let progress = Progress::open("solving", arguments.common.quiet);
     let found = match input.renumbered() {
-        Some((moved, topology)) => moved.control_points(Some(topology), input.scheme, &stop),
-        None => control_points(&input.mesh, Some(input.topology()), input.scheme, &stop),
+        Some((moved, topology)) => moved.control_points(Some(topology), input.scheme, stop),
+        None => control_points(&input.mesh, Some(input.topology()), input.scheme, stop),
     }
     .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
     drop(progress);
-    if no_progress(found.report.outcome) {
+    if no_progress(found.report.outcome)
+        && failed(arguments, input, wishes, &found.report, stop).unreachable().is_none()
+    {
         return Ok(None);
     }
-    check(input, found.method, &found.report, stop.tolerance)?;
+    check(arguments, input, wishes, found.method, &found.report, stop)?;
     Ok(Some(Control {
         method: found.method.name(),
         points: found.points,
@@ -156,9 +167,8 @@ fn fastest(arguments: &Arguments, input: &Input) -> Result<Option<Control>> {
 }
 
 /// All vertices, by sweeps that relax those of one colour at once, without a stored matrix.
-fn by_colour(arguments: &Arguments, input: &Input, method: Method) -> Result<Control> {
+fn by_colour(arguments: &Arguments, input: &Input, wishes: &Wishes, method: Method, stop: &Stop) -> Result<Control> {
     let start = Instant::now();
-    let stop = arguments.stop.stop(&input.mesh);
     let progress = Progress::open("solving", arguments.common.quiet);
     let (mesh, topology) = (&input.mesh, input.topology());
     let numbering = in_colours(&mesh.faces, &topology.incidence);
@@ -168,9 +178,9 @@ fn by_colour(arguments: &Arguments, input: &Input, method: Method) -> Result<Con
     let start = Instant::now();
     let omega = if method == Method::Sor { SOR_OMEGA } else { 1.0 };
     let points = numbering.there(&mesh.positions);
-    let (control, report) = by_colours(&operator, &points, omega, &stop);
+    let (control, report) = by_colours(&operator, &points, omega, stop);
     drop(progress);
-    check(input, method, &report, stop.tolerance)?;
+    check(arguments, input, wishes, method, &report, stop)?;
     Ok(Control {
         method: method.name(),
         points: numbering.back(&control),
@@ -196,7 +206,7 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
     let found = zheng_cai::auxiliary(mesh, topology, marks, &phase)?;
     Ok(Control {
         method: "two-phase",
-        errors: auxiliary_errors(input, marks, &found.mesh)?,
+        errors: limit_errors(input, marks, &found.mesh.positions)?,
         points: found.mesh.positions,
         iterations: found.updates.len(),
         status: if found.passed { "converged" } else { "max-iterations" },
@@ -205,44 +215,51 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
     })
 }
 
-/// How far the limit points of an auxiliary mesh are from those interpolated.
-fn auxiliary_errors(input: &Input, marks: Option<&[bool]>, auxiliary: &Mesh) -> Result<Errors> {
-    let limits = limit_positions(Rule::ZhengCai, auxiliary, input.topology())?;
-    let pairs = input.mesh.positions.iter().zip(&limits).enumerate();
-    let distances: Vec<f64> =
-        pairs.filter(|(v, _)| marks.is_none_or(|m| m[*v])).map(|(_, (p, q))| p.distance(*q)).collect();
+/// How far the limit points of control points are from those interpolated.
+fn limit_errors(input: &Input, marks: Option<&[bool]>, control: &[DVec3]) -> Result<Errors> {
+    let operator = Operator::new(&input.mesh.faces, input.topology(), input.scheme)
+        .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
+    let points = input.mesh.positions.iter().enumerate().filter(|(v, _)| marks.is_none_or(|m| m[*v]));
+    let distances: Vec<f64> = points.map(|(v, p)| p.distance(operator.row(v, control))).collect();
     Ok(Errors {
         max: distances.iter().copied().fold(0.0, f64::max),
         mean: distances.iter().sum::<f64>() / distances.len() as f64,
     })
 }
 
-/// A run that did not converge gives no control mesh.
-fn check(input: &Input, method: Method, report: &Report, tolerance: f64) -> Result<()> {
-    let what = match report.outcome {
-        Outcome::Converged => return Ok(()),
-        Outcome::Singular => {
-            "the matrix is singular (valences 3 and a bipartite graph?); the points decide whether a control mesh \
-             exists: try --method pia"
-        }
-        Outcome::Diverged => "the iteration diverged; try --method auto",
-        Outcome::MaxIterations => "the iterations ran out; raise --max-iter, or try --method auto",
-        Outcome::Stagnated => {
-            "the error no longer shrinks: raise --tol if it is below rounding; else the matrix is nearly singular, or no \
-             control mesh exists: --method ldlt tells which"
-        }
-        Outcome::Breakdown | Outcome::Stopped => "the method broke down; try another --method",
+fn failed(arguments: &Arguments, input: &Input, wishes: &Wishes, report: &Report, stop: &Stop) -> Failed {
+    let asked = match arguments.method {
+        Choice::Solver(method) => Some(method),
+        _ => None,
     };
+    let system = (&input.mesh, input.topology(), input.scheme);
+    Failed::new(system, wishes.interpolated.as_deref(), asked, report, stop)
+}
+
+/// A run that did not converge gives no control mesh.
+fn check(
+    arguments: &Arguments,
+    input: &Input,
+    wishes: &Wishes,
+    method: Method,
+    report: &Report,
+    stop: &Stop,
+) -> Result<()> {
+    if report.outcome == Outcome::Converged {
+        return Ok(());
+    }
+    let unit = input.frame.scale();
     let detail = report.detail.as_ref().map_or_else(String::new, |d| format!(" [{d}]"));
     Err(Error::mesh(
         &input.name,
         format!(
-            "{method} under {} ended as {} after {} iterations with max error {:.3e} against {tolerance:.3e}{detail}; \
-             {what}",
+            "{method} under {} ended as {} after {} iterations with max error {:.3e} against {:.3e}{detail}; {}",
             input.scheme,
             report.outcome,
             report.iterations,
-            report.last().max
+            unit * report.last().max,
+            unit * stop.tolerance,
+            failed(arguments, input, wishes, report, stop).advice(unit)
         ),
     ))
 }

@@ -24,7 +24,7 @@ use limitlab::solvers::Method;
 use limitlab::subdivide::Refinement;
 
 use control::control_mesh;
-use surfaces::{fairest, keeping, refine, require_finite, unified};
+use surfaces::{fairest, keeping, leave, refine, require_finite, unified};
 use tell::tell;
 use wishes::Wishes;
 
@@ -223,6 +223,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             refine(arguments, &input, &wishes, control).map_err(named)?
         }
     };
+    leave(&input.frame, &mut result);
     require_finite(&input, &result.surface)?;
 
     let start = Instant::now();

@@ -9,6 +9,7 @@ use limitlab::interpolate::halstead::{self, Energies, Fairness, Weights, fit};
 use limitlab::interpolate::lin_luo;
 use limitlab::interpolate::normals::Rotation;
 use limitlab::interpolate::surface::{Request, Surface, surface};
+use limitlab::mesh::frame::Frame;
 use limitlab::mesh::{Mesh, Topology};
 use limitlab::solvers::Errors;
 use limitlab::subdivide::Refinement;
@@ -143,6 +144,19 @@ fn unsolved(method: &'static str, input: &Input, surface: Surface, start: Instan
             subdivide: start.elapsed().as_secs_f64(),
             ..Seconds::default()
         },
+    }
+}
+
+/// Takes what was computed in the frame of the input to mesh units.
+pub fn leave(frame: &Frame, finished: &mut Finished) {
+    let unit = frame.scale();
+    frame.leave(&mut finished.surface.mesh.positions);
+    finished.errors = finished.errors * unit;
+    finished.tolerance *= unit;
+    if let Some(energies) = &mut finished.fairness {
+        // Integrals of squares.
+        energies.thin_plate *= unit * unit;
+        energies.membrane *= unit * unit;
     }
 }
 

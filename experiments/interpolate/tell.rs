@@ -82,5 +82,5 @@ pub fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Fini
     if let Choice::Keeping(scheme) = arguments.method {
         object["scheme"] = json!(scheme.name());
     }
-    cli::print(&format!("{object:#}"))
+    cli::print_json(&object)
 }

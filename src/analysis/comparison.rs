@@ -141,13 +141,13 @@ fn parameter(variant: &str, setup: Setup, order_name: &str) -> String {
     let order = format!("{order_name} order");
     let mut words = match setup {
         Setup::Jacobi { omega } | Setup::Pia { omega } | Setup::PcgSsor { omega } => {
-            vec![format!("ω={}", short(omega))]
+            vec![format!("ω={}", four_digits(omega))]
         }
         Setup::Sor { omega: 1.0, .. } => vec![order],
         Setup::Sor { omega, .. } | Setup::Ssor { omega, .. } => {
-            vec![format!("ω={}", short(omega)), order]
+            vec![format!("ω={}", four_digits(omega)), order]
         }
-        Setup::Chebyshev { spectrum: (min, max) } => vec![format!("λ ∈ [{}, {}]", short(min), short(max))],
+        Setup::Chebyshev { spectrum: (min, max) } => vec![format!("λ ∈ [{}, {}]", four_digits(min), four_digits(max))],
         _ => Vec::new(),
     };
     if !variant.is_empty() {
@@ -157,7 +157,7 @@ fn parameter(variant: &str, setup: Setup, order_name: &str) -> String {
 }
 
 /// Four significant digits without trailing zeros.
-fn short(x: f64) -> String {
+fn four_digits(x: f64) -> String {
     let text = format!("{x:.*}", (3 - x.abs().log10().floor() as i32).clamp(0, 12) as usize);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }

@@ -93,6 +93,9 @@ pub fn spectral_radius(system: &LimitSystem, mut step: impl FnMut(&mut [DVec3]))
             x[first + axis][axis] = 1.0;
         }
         step(&mut x);
+        if !x.iter().all(|v| v.is_finite()) {
+            return Ok(f64::INFINITY);
+        }
         for (i, v) in x.iter().enumerate() {
             for axis in 0..3.min(n - first) {
                 dense[(i, first + axis)] = v[axis];

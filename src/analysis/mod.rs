@@ -1,6 +1,7 @@
 //! Why a method converges, stalls or fails: spectra, predicted and observed rates, ω sweeps.
 //! This room knows no plotting.
 
+pub mod advice;
 pub mod bracket;
 pub mod certificate;
 pub mod comparison;

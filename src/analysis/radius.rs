@@ -71,7 +71,11 @@ pub fn spectral_radius(system: &LimitSystem, mut step: impl FnMut(&mut [DVec3]))
     normalize(&mut x);
     for _ in 0..WARM_UP {
         step(&mut x);
-        if normalize(&mut x) <= f64::MIN_POSITIVE {
+        let length = normalize(&mut x);
+        if !length.is_finite() {
+            return Ok(exact(f64::INFINITY, WARM_UP));
+        }
+        if length <= f64::MIN_POSITIVE {
             return Ok(exact(0.0, WARM_UP));
         }
     }

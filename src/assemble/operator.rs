@@ -57,7 +57,7 @@ impl Operator {
     /// # Panics
     /// If the numbering is of another number of vertices.
     pub fn in_order(faces: &Faces, topology: &Topology, scheme: Scheme, numbering: Option<&Numbering>) -> Result<Self> {
-        check_boundary(topology, scheme)?;
+        check_boundary(faces, topology, scheme)?;
         let open = (topology.boundary_edges() > 0).then_some(topology);
         Self::build(faces, (&topology.incidence, open), topology.is_closed(), scheme, numbering)
     }
@@ -85,7 +85,7 @@ impl Operator {
         scheme: Scheme,
         numbering: Option<&Numbering>,
     ) -> Result<Self> {
-        check_faces(faces, scheme)?;
+        check_faces(faces, scheme, sides.1.is_some())?;
         let source = Source::new(faces, sides, scheme, numbering);
         let kinds = source.kinds();
         let greatest = source.valences.iter().copied().max().unwrap_or(0);

@@ -56,8 +56,8 @@ impl LimitSystem {
     /// # Ok::<(), limitlab::Error>(())
     /// ```
     pub fn new(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Result<Self> {
-        check_faces(&mesh.faces, scheme)?;
-        check_boundary(topology, scheme)?;
+        check_faces(&mesh.faces, scheme, topology.boundary_edges() > 0)?;
+        check_boundary(&mesh.faces, topology, scheme)?;
         let mut system = Self::with_masks(mesh, topology, &scheme)?;
         if topology.is_closed() {
             system.bounds = SpectralBounds::closed(
@@ -113,25 +113,26 @@ impl LimitSystem {
     }
 }
 
-/// Refuses faces that `scheme` is not defined on.
-pub(super) fn check_faces(faces: &Faces, scheme: Scheme) -> Result<()> {
+/// Refuses faces that `scheme` is not defined on. On an `open` mesh no other scheme would do.
+pub(super) fn check_faces(faces: &Faces, scheme: Scheme, open: bool) -> Result<()> {
     if let Some(f) = scheme.first_unsuitable_face(faces) {
         return Err(Error::Computation(format!(
-            "face {f} has {} corners, and the scheme {scheme} is defined on triangles only; triangulate the \
-             mesh or use --scheme catmull-clark, nasri or zheng-cai",
-            faces.face(f).len()
+            "face {f} has {} corners, and the scheme {scheme} is defined on triangles only; triangulate the mesh{}",
+            faces.face(f).len(),
+            if open { "" } else { " or use --scheme catmull-clark, nasri or zheng-cai" }
         )));
     }
     Ok(())
 }
 
 /// Refuses boundaries that `scheme` is not defined on.
-pub(super) fn check_boundary(topology: &Topology, scheme: Scheme) -> Result<()> {
+pub(super) fn check_boundary(faces: &Faces, topology: &Topology, scheme: Scheme) -> Result<()> {
     if topology.boundary_edges() > 0 && !scheme.edges_only() {
+        let triangles = faces.uniform_size() == Some(3);
         return Err(Error::Computation(format!(
-            "{} boundary edges, and the masks of {scheme} need whole faces around every vertex; close the \
-             holes, or use --boundary as-interior with --scheme loop or sqrt3 on triangles",
-            topology.boundary_edges()
+            "{} boundary edges, and the masks of {scheme} need whole faces around every vertex; close the holes{}",
+            topology.boundary_edges(),
+            if triangles { ", or use --boundary as-interior with --scheme loop or sqrt3" } else { "" }
         )));
     }
     Ok(())

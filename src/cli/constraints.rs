@@ -36,7 +36,10 @@ pub fn vertex_marks(text: &str, vertices: usize) -> Result<Vec<bool>> {
             });
             let (from, to) = range
                 .ok_or_else(|| refuse("is neither a vertex, a range A..B nor a file: vertices are numbered from 0"))?;
-            if from > to || to >= vertices {
+            if from > to {
+                return Err(refuse(&format!("is a reversed range: write {to}..{from}")));
+            }
+            if to >= vertices {
                 return Err(refuse(&format!("names a vertex that the mesh lacks: it has {vertices}, numbered from 0")));
             }
             marks[from..=to].fill(true);
@@ -148,7 +151,7 @@ mod tests {
         let refused = |text: &str| vertex_marks(text, 10).unwrap_err().to_string();
         assert!(refused("3,x").starts_with("--vertices: \"x\" is neither"));
         assert!(refused("5..10").contains("the mesh lacks: it has 10"));
-        assert!(refused("5..4").contains("lacks"));
+        assert!(refused("5..4").contains("\"5..4\" is a reversed range: write 4..5"));
         assert!(refused(file("1 2#3\n").path().to_str().unwrap()).contains(", line 1: \"2#3\""));
         let bad = file("1\n2 ten\n");
         assert!(refused(bad.path().to_str().unwrap()).contains(", line 2: \"ten\""));

@@ -1,20 +1,24 @@
 //! MESH arguments: files or built-in names, noise, scheme, validation.
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::OnceLock;
 use std::time::Instant;
 
 use clap::Args;
+use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::CommonFlags;
+use super::{CommonFlags, StopFlags};
 use crate::assemble::{LimitSystem, Scheme};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, short};
 use crate::interpolate::automatic::{Renumbered, renumbered, require_memory};
+use crate::mesh::frame::Frame;
 use crate::mesh::io::{self, Loaded};
 use crate::mesh::noise::{Noise, add_noise};
 use crate::mesh::validate::{Boundary, Validation, validate};
-use crate::mesh::{Mesh, Topology, builtin};
+use crate::mesh::{Mesh, Topology, bounding_box, builtin};
+use crate::solvers::Stop;
 
 /// How a mesh is read and prepared.
 #[derive(Args, Clone, Debug)]
@@ -39,7 +43,10 @@ pub struct Input {
     pub name: String,
     /// The name, with the noise if there is any: for tables and plots.
     pub label: String,
+    /// Its positions are given in [`frame`](Self::frame).
     pub mesh: Mesh,
+    /// Where the file's own points lie: all lengths of this mesh times [`Frame::scale`] are in mesh units.
+    pub frame: Frame,
     topology: OnceLock<Topology>,
     renumbered: Option<(Renumbered, Topology)>,
     pub scheme: Scheme,
@@ -51,6 +58,11 @@ pub struct Input {
 
 /// The noise that built-in meshes carry where they stand in for real ones.
 pub const STAND_IN_NOISE: Noise = Noise { amplitude: 0.1, seed: 1 };
+
+/// The size of a length in words.
+fn one_digit(x: f64) -> String {
+    short(format!("{x:.0e}").parse().unwrap_or(x))
+}
 
 /// Endings that mark a MESH argument as a file.
 const ENDINGS: [&str; 3] = ["obj", "off", "ply"];
@@ -84,38 +96,44 @@ impl MeshFlags {
         })
     }
 
-    /// Loads, moves and validates one mesh, and settles the scheme. `None` if `--defects` was asked for: the report
-    /// has been printed.
+    /// Loads and validates one mesh, moves its points, and settles their frame and the scheme. `None` if `--defects`
+    /// was asked for: the report has been printed. It tells of the points as they were given.
     ///
     /// # Errors
-    /// As [`load`](Self::load); a mesh with defects, with their counts and first places.
+    /// As [`load`](Self::load); a mesh with defects, with their counts and first places; noise, or sizes side by side,
+    /// that doubles cannot hold.
     pub fn input(&self, name: &str, common: &CommonFlags) -> Result<Option<Input>> {
         let start = Instant::now();
-        let mut loaded = self.load(name)?;
+        let loaded = self.load(name)?;
         let read_seconds = start.elapsed().as_secs_f64();
         for remark in &loaded.remarks {
             common.remark(format_args!("{name}: {remark}"));
         }
         require_memory(&loaded.mesh).map_err(|e| Error::mesh(name, e.to_string()))?;
         let start = Instant::now();
-        if let Some(noise) = self.noise {
-            add_noise(&mut loaded.mesh, noise.amplitude, noise.seed);
-        }
         let (report, renumbered) = self.report(&loaded);
         if self.defects {
-            let json = serde_json::to_string_pretty(&report).map_err(|e| Error::Computation(format!("{name}: {e}")))?;
-            super::print(&json)?;
+            super::print_json(&report)?;
             return Ok(None);
         }
         for remark in &report.remarks {
             common.remark(format_args!("{name}: {remark}"));
         }
         let found = report.into_topology(name)?;
+        let Loaded { mut mesh, lines, .. } = loaded;
+        let frame = self.place(&mut mesh).map_err(|(v, what)| {
+            let line = lines.as_ref().map_or_else(String::new, |l| format!(", line {}", l.vertices[v]));
+            Error::mesh(name, format!("vertex {v}{line}: {what}"))
+        })?;
         let (topology, renumbered) = match renumbered {
-            Some(renumbered) => (OnceLock::new(), Some((renumbered, found))),
+            Some(mut renumbered) => {
+                if self.noise.is_some() || !frame.is_identity() {
+                    renumbered.mesh.positions = renumbered.numbering.there(&mesh.positions);
+                }
+                (OnceLock::new(), Some((renumbered, found)))
+            }
             None => (OnceLock::from(found), None),
         };
-        let mesh = loaded.mesh;
         let scheme = self.scheme.unwrap_or_else(|| {
             let scheme = Scheme::default_for(&mesh.faces);
             common.remark(format_args!("{name}: scheme {scheme} (choose with --scheme)"));
@@ -129,12 +147,30 @@ impl MeshFlags {
             name: name.to_owned(),
             label,
             mesh,
+            frame,
             topology,
             renumbered,
             scheme,
             read_seconds,
             check_seconds: start.elapsed().as_secs_f64(),
         }))
+    }
+
+    /// Adds the noise to the points of a valid mesh, and takes them to their frame; or a vertex, and what is wrong there.
+    fn place(&self, mesh: &mut Mesh) -> std::result::Result<Frame, (usize, String)> {
+        if let Some(noise) = self.noise {
+            add_noise(mesh, noise.amplitude, noise.seed);
+            if let Some(v) = mesh.positions.iter().position(|p| !p.is_finite()) {
+                return Err((v, format!("--noise {noise} moves it beyond the largest double: choose a smaller one")));
+            }
+        }
+        let frame = Frame::of(&mesh.positions).map_err(|v| {
+            let what = "a coordinate is more than 10^300 times smaller than the largest of the mesh, and doubles cannot \
+                        hold both: correct it, or set it to 0";
+            (v, what.to_owned())
+        })?;
+        frame.enter(&mut mesh.positions);
+        Ok(frame)
     }
 
     /// The validator's report on a loaded mesh, or on this mesh renumbered.
@@ -162,6 +198,54 @@ impl Input {
     /// The mesh along a space-filling curve and the topology of that, where the file is scattered.
     pub fn renumbered(&self) -> Option<(&Renumbered, &Topology)> {
         self.renumbered.as_ref().map(|(mesh, topology)| (mesh, topology))
+    }
+
+    /// When iterations on this mesh stop; the tolerance is one in its frame.
+    ///
+    /// # Errors
+    /// A relative tolerance where all points coincide.
+    pub fn stop(&self, flags: &StopFlags) -> Result<Stop> {
+        let extent = self.mesh.diagonal();
+        let tolerance = match flags.tol_absolute {
+            Some(tolerance) => (tolerance / self.frame.scale()).min(f64::MAX),
+            None if extent > 0.0 => flags.tol * extent,
+            None => {
+                let what = "all points coincide, so no tolerance can be relative to their extent: give --tol-absolute";
+                return Err(Error::mesh(&self.name, what));
+            }
+        };
+        Ok(Stop { tolerance, max_iterations: flags.max_iter })
+    }
+
+    /// The points as they were given, with their noise: in mesh units.
+    pub fn given_points(&self) -> Cow<'_, [DVec3]> {
+        let mut points = Cow::Borrowed(self.mesh.positions.as_slice());
+        if !self.frame.is_identity() {
+            self.frame.leave(points.to_mut());
+        }
+        points
+    }
+
+    /// The largest coordinate of the given points, in mesh units.
+    fn largest_coordinate(&self) -> f64 {
+        let (lo, hi) = bounding_box(&self.mesh.positions).unwrap_or_default();
+        self.frame.back(lo).abs().max(self.frame.back(hi).abs()).max_element()
+    }
+
+    /// What to know of a tolerance, in mesh units, that the digits of the coordinates cannot hold, though it can be
+    /// reached in the frame.
+    pub fn remark_on_rounding(&self, tolerance: f64) -> Option<String> {
+        let largest = self.largest_coordinate();
+        let digit = largest - largest.next_down();
+        // Control points may have a coordinate twice as large as the points.
+        (!self.frame.is_identity() && tolerance < 2.0 * digit).then(|| {
+            format!(
+                "the points lie at {} ± {}: their last digit is {digit:.1e}, the tolerance {tolerance:.1e}; results are \
+                 as near as these digits allow",
+                one_digit(largest),
+                one_digit(0.5 * self.frame.scale() * self.mesh.diagonal())
+            )
+        })
     }
 
     /// A stem for file names: the program's `prefix`, the mesh's own name without folder and ending, the scheme.

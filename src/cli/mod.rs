@@ -2,10 +2,12 @@
 
 pub mod constraints;
 mod input;
+mod json;
 mod process;
 mod progress;
 
 pub use input::{Input, MeshFlags, STAND_IN_NOISE};
+pub use json::print_json;
 pub use process::{exit, say};
 pub use progress::Progress;
 
@@ -15,9 +17,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
-use crate::mesh::Mesh;
 use crate::report::Table;
-use crate::solvers::Stop;
 
 /// Flags of every program: threads and silence.
 #[derive(Args, Clone, Debug)]
@@ -60,13 +60,6 @@ pub struct StopFlags {
     /// Iterations at most
     #[arg(long, value_name = "K", default_value_t = 10_000)]
     pub max_iter: usize,
-}
-
-impl StopFlags {
-    /// The rule for one mesh.
-    pub fn stop(&self, mesh: &Mesh) -> Stop {
-        Stop { tolerance: self.tol_absolute.unwrap_or(self.tol * mesh.diagonal()), max_iterations: self.max_iter }
-    }
 }
 
 /// Where results go.
@@ -122,9 +115,14 @@ impl std::str::FromStr for Grid {
         if !(step > 0.0 && from <= to && from > 0.0 && steps < MOST_POINTS) {
             return Err("a grid A:B:STEP needs 0 < A ≤ B, a positive STEP and fewer than 100000 points".into());
         }
-        // Rounded to what was typed: 0.05 + 15·0.05 is 0.8.
-        Ok(Grid((0..=steps as usize).map(|k| ((from + k as f64 * step) * 1e12).round() / 1e12).collect()))
+        let at = |k: usize| if k == 0 { from } else { fifteen_digits(from + k as f64 * step) };
+        Ok(Grid((0..=steps as usize).map(at).collect()))
     }
+}
+
+/// What was meant by a sum of numbers that were typed: 0.05 + 15·0.05 is 0.8.
+fn fifteen_digits(x: f64) -> f64 {
+    format!("{x:.14e}").parse().unwrap_or(x)
 }
 
 /// A comma-separated list, as a `value_parser`.
@@ -175,7 +173,7 @@ pub fn finish(mut results: Vec<Value>, output: &OutputFlags, common: &CommonFlag
         1 => results.remove(0),
         _ => json!({ "results": results }),
     };
-    print(&format!("{object:#}"))
+    print_json(&object)
 }
 
 /// What a program of several tables prints on standard output: each in Markdown as soon as it is there, or with `--json`
@@ -222,7 +220,7 @@ impl Printer {
             return Ok(());
         }
         fields["tables"] = self.tables.into();
-        print(&format!("{fields:#}"))
+        print_json(&fields)
     }
 }
 
@@ -240,6 +238,13 @@ mod tests {
         let grid: Grid = "0.05:1.2:0.05".parse().expect("a grid");
         assert_eq!(grid.0.len(), 24);
         assert_eq!((grid.0[0], grid.0[15], grid.0[23]), (0.05, 0.8, 1.2));
+        for (text, points) in [
+            ("1e-13:3e-13:1e-13", [1e-13, 2e-13, 3e-13]),
+            ("1e-300:3e-300:1e-300", [1e-300, 2e-300, 3e-300]),
+            ("1e297:3e297:1e297", [1e297, 2e297, 3e297]),
+        ] {
+            assert_eq!(text.parse::<Grid>().expect("a grid").0, points, "{text}");
+        }
         assert_eq!("0.5:0.5:1".parse::<Grid>().expect("one point").0, [0.5]);
         for bad in ["", "1", "1:2", "1:2:0", "2:1:0.1", "a:b:c", "0:1:0.1", "1:2:1e-9", "1:nan:1"] {
             assert!(bad.parse::<Grid>().is_err(), "{bad}");

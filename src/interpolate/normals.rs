@@ -10,6 +10,8 @@ use std::f64::consts::PI;
 use glam::{DQuat, DVec3};
 
 use super::thall::angle;
+use crate::error::short;
+use crate::mesh::frame::direction;
 use crate::mesh::{Mesh, Topology};
 use crate::subdivide::Refinement;
 use crate::{Error, Result};
@@ -53,16 +55,12 @@ const OPPOSITE: f64 = PI - 1e-6;
 pub fn unit_normals(normals: &[Option<DVec3>]) -> Result<Vec<Option<DVec3>>> {
     let unit = |(v, normal): (usize, &Option<DVec3>)| match *normal {
         None => Ok(None),
-        Some(n) => match n.try_normalize() {
-            Some(unit) if n.is_finite() => Ok(Some(unit)),
-            _ => Err(Error::mesh(
-                "normals",
-                format!(
-                    "vertex {v}: ({}, {}, {}) has no direction: give a finite vector other than zero, or none",
-                    n.x, n.y, n.z
-                ),
-            )),
-        },
+        Some(n) => direction(n).map(Some).ok_or_else(|| {
+            let [x, y, z] = n.to_array().map(short);
+            let what =
+                format!("vertex {v}: ({x}, {y}, {z}) has no direction: give a finite vector other than zero, or none");
+            Error::mesh("normals", what)
+        }),
     };
     normals.iter().enumerate().map(unit).collect()
 }

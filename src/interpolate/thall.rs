@@ -6,6 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::Result;
+use crate::mesh::frame::of_order_one;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Mesh, Topology, generate};
 use crate::solvers::iteration::{Errors, Failure, Iterate};
@@ -171,6 +172,7 @@ pub(super) fn angle(a: DVec3, b: DVec3) -> f64 {
     if a == DVec3::ZERO || b == DVec3::ZERO {
         return std::f64::consts::PI;
     }
+    let (a, b) = (of_order_one(a), of_order_one(b));
     a.cross(b).length().atan2(a.dot(b))
 }
 

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::normals::unit_normals;
 use super::subset::nothing;
+use crate::error::short;
 use crate::mesh::{Mesh, Topology};
 use crate::subdivide::Refinement;
 use crate::subdivide::doo_sabin::{Rule, refine_by};
@@ -80,7 +81,10 @@ impl Constraints<'_> {
                 continue;
             };
             if !(s > 0.0 && s.is_finite()) {
-                return refuse(v, format!("the shape handle {s} is no positive number: 1 leaves the shape as it is"));
+                return refuse(
+                    v,
+                    format!("the shape handle {} is no positive number: 1 leaves the shape as it is", short(s)),
+                );
             }
             if free && s != 1.0 {
                 return refuse(v, "a shape handle is given where no point is interpolated: interpolate the vertex, or leave the handle at 1".into());

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::frame::magnitude;
 use super::validate::counted;
 use super::{Faces, Mesh};
 use crate::pages::large;
@@ -143,18 +144,33 @@ fn mix(word: u64) -> u64 {
 fn zero_area_faces(mesh: &Mesh) -> Vec<u32> {
     // Each product of differences carries a relative error of at most 4 units in the last place.
     const ROUNDING: f64 = 8.0 * f64::EPSILON;
+    // Of a face whose corner k lies at `at(k)` from the first. What is not a number is for a closer look.
+    let vanishes = |size: usize, at: &dyn Fn(usize) -> DVec3| {
+        let (mut area, mut scale) = (DVec3::ZERO, 0.0);
+        for k in 2..size {
+            let (a, b) = (at(k - 1), at(k));
+            area += a.cross(b);
+            scale += a.length() * b.length();
+        }
+        area.length().is_nan() || area.length() <= ROUNDING * scale
+    };
     (0..mesh.faces.len() as u32)
         .into_par_iter()
         .filter(|&f| {
             let face = mesh.faces.face(f as usize);
-            let at = |k: usize| mesh.positions[face[k] as usize] - mesh.positions[face[0] as usize];
-            let (mut area, mut scale) = (DVec3::ZERO, 0.0);
-            for k in 2..face.len() {
-                let (a, b) = (at(k - 1), at(k));
-                area += a.cross(b);
-                scale += a.length() * b.length();
+            let corner = |k: usize| mesh.positions[face[k] as usize];
+            if !vanishes(face.len(), &|k| corner(k) - corner(0)) {
+                return false;
             }
-            area.length() <= ROUNDING * scale
+            // Products of lengths may have left the range of doubles: the same at order one.
+            let largest = |vectors: &mut dyn Iterator<Item = DVec3>| {
+                magnitude(vectors.fold(DVec3::ZERO, |m, v| m.max(v.abs())).max_element())
+            };
+            let unit = largest(&mut (0..face.len()).map(corner));
+            let mut sides: Vec<DVec3> = (0..face.len()).map(|k| corner(k) / unit - corner(0) / unit).collect();
+            let unit = largest(&mut sides.iter().copied());
+            sides.iter_mut().for_each(|side| *side /= unit);
+            vanishes(face.len(), &|k| sides[k])
         })
         .collect()
 }
@@ -191,7 +207,11 @@ mod tests {
         ];
         let faces =
             Faces::from_lists(vec![vec![0, 1, 2], vec![0, 1, 3], vec![3, 3, 1], vec![0, 1, 3, 2], vec![0, 1, 4]]);
-        let flat = zero_area_faces(&Mesh::new(positions, faces));
-        assert_eq!(flat, [0, 2]);
+        let mesh = Mesh::new(positions, faces);
+        assert_eq!(zero_area_faces(&mesh), [0, 2]);
+        for size in [2f64.powi(-900), 2f64.powi(-560), 2f64.powi(560), 2f64.powi(1020)] {
+            let positions = mesh.positions.iter().map(|p| size * *p).collect();
+            assert_eq!(zero_area_faces(&Mesh::new(positions, mesh.faces.clone())), [0, 2], "{size:e}");
+        }
     }
 }

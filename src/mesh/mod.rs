@@ -8,6 +8,7 @@ mod cuthill_mckee;
 mod defect;
 mod degenerate;
 pub(crate) mod edge_numbers;
+pub mod frame;
 pub mod fronts;
 pub mod generate;
 pub mod incidence;
@@ -214,7 +215,7 @@ impl Mesh {
     /// The diagonal of the axis-parallel bounding box: the length L that relative tolerances refer to. Points
     /// that are not finite do not count; 0 for no points.
     pub fn diagonal(&self) -> f64 {
-        bounding_box(&self.positions).map_or(0.0, |(lo, hi)| (hi - lo).length())
+        bounding_box(&self.positions).map_or(0.0, |(lo, hi)| frame::distance(lo, hi))
     }
 }
 

@@ -9,8 +9,10 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::Mesh;
+use super::frame::distance;
 use super::incidence::next_in;
 use super::topology::Topology;
+use crate::error::short;
 use crate::{Error, Result};
 
 /// A Gaussian displacement of all vertices: `--noise A[:SEED]`, seed 1 unless told.
@@ -36,7 +38,7 @@ impl FromStr for Noise {
 
 impl fmt::Display for Noise {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}", self.amplitude, self.seed)
+        write!(f, "{}:{}", short(self.amplitude), self.seed)
     }
 }
 
@@ -51,7 +53,7 @@ pub fn mean_edge_length(mesh: &Mesh) -> f64 {
     for c in topology.edge_sides() {
         let range = faces.range(topology.incidence.face_of(c));
         let [a, b] = [c, next_in(&range, c)].map(|c| mesh.positions[faces.corners()[c as usize] as usize]);
-        sum += a.distance(b);
+        sum += distance(a, b);
         count += 1;
     }
     if count == 0 { 0.0 } else { sum / f64::from(count) }
@@ -91,6 +93,12 @@ mod tests {
         assert!((mean_edge_length(&mesh) - expected).abs() < 4.0 * f64::EPSILON);
         assert_eq!(mean_edge_length(&builtin::cube()), 2.0);
         assert_eq!(mean_edge_length(&Mesh::new(vec![DVec3::X], Faces::default())), 0.0);
+        for size in [2f64.powi(-700), 2f64.powi(700)] {
+            let mut cube = builtin::cube();
+            cube.positions.iter_mut().for_each(|p| *p *= size);
+            assert_eq!(mean_edge_length(&cube), 2.0 * size);
+            assert_eq!(cube.diagonal(), size * builtin::cube().diagonal());
+        }
     }
 
     #[test]
@@ -146,7 +154,8 @@ mod tests {
         assert_eq!(read("0.1").unwrap(), noise(0.1, 1));
         assert_eq!(read("1e-3:99").unwrap(), noise(1e-3, 99));
         assert_eq!(read("0").unwrap(), noise(0.0, 1));
-        for n in [noise(0.1, 1), noise(0.25, u64::MAX)] {
+        for n in [noise(0.1, 1), noise(0.25, u64::MAX), noise(1e160, 2)] {
+            assert!(n.to_string().len() < 30, "{n}");
             assert_eq!(read(&n.to_string()).unwrap(), n);
         }
         for bad in ["", "-0.1", "nan", "inf", "0.1:", "0.1:x", "0.1:1:2", "0.1:-1", ":3"] {

@@ -64,6 +64,8 @@ pub struct Counts {
     /// The number of edges at a vertex, isolated vertices aside; 0 and 0 for a mesh without faces.
     pub min_valence: usize,
     pub max_valence: usize,
+    /// Corners of the largest face.
+    pub max_face_size: usize,
 }
 
 /// How to mend an orientation that is not consistent.
@@ -169,11 +171,14 @@ impl Validation {
             DefectKind::NonManifoldVertex => "split such a vertex into one for each umbrella of faces".into(),
             DefectKind::IsolatedVertex => "remove vertices that no face uses".into(),
             DefectKind::LowValence => "give such vertices three edges or more, or remove them".into(),
-            DefectKind::BoundaryEdge if self.totals().contains_key(&DefectKind::LowValence) => {
-                "close the holes or stitch the faces".into()
-            }
             DefectKind::BoundaryEdge => {
-                "close the holes or stitch the faces, or use --boundary as-interior with --scheme loop or sqrt3".into()
+                let only_triangles = self.counts.as_ref().is_some_and(|c| c.max_face_size == 3);
+                let as_interior = only_triangles && !self.totals().contains_key(&DefectKind::LowValence);
+                let close = "close the holes or stitch the faces";
+                match as_interior {
+                    true => format!("{close}, or use --boundary as-interior with --scheme loop or sqrt3"),
+                    false => close.into(),
+                }
             }
         }
     }
@@ -351,6 +356,7 @@ fn examine_topology(mesh: &Mesh, boundary: Boundary, report: &mut Validation) {
         boundary_loops,
         min_valence,
         max_valence,
+        max_face_size: faces.iter().map(<[u32]>::len).max().unwrap_or(0),
     });
     report.topology = Some(topology);
 }

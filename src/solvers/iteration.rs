@@ -14,6 +14,15 @@ pub struct Errors {
     pub mean: f64,
 }
 
+/// The errors in another unit of length.
+impl std::ops::Mul<f64> for Errors {
+    type Output = Errors;
+
+    fn mul(self, unit: f64) -> Errors {
+        Errors { max: unit * self.max, mean: unit * self.mean }
+    }
+}
+
 /// When to stop: at the first iterate with maximum error ≤ `tolerance` (absolute, in mesh units), or after
 /// `max_iterations` updates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,9 +32,14 @@ pub struct Stop {
 }
 
 impl Stop {
+    /// Whether an error is within the tolerance. One that is not finite holds nothing.
+    fn is_met(&self, error: f64) -> bool {
+        error <= self.tolerance && self.tolerance.is_finite()
+    }
+
     /// How a run ends that has got to an error after so many iterations, if it does whatever the method is.
     pub(super) fn verdict(&self, error: f64, iterations: usize) -> Option<Outcome> {
-        if error <= self.tolerance {
+        if self.is_met(error) {
             Some(Outcome::Converged)
         } else if !error.is_finite() {
             Some(Outcome::Diverged)
@@ -151,17 +165,17 @@ pub const PROGRESS: f64 = 1e-8;
 /// iterate and may stop the run.
 pub fn solve(method: &mut dyn Iterate, stop: &Stop, watch: &mut dyn FnMut(&Step) -> ControlFlow<()>) -> Report {
     let mut history: Vec<Errors> = Vec::new();
-    let mut rules = Rules::default();
+    let mut rules = Rules::new(method.points());
     loop {
         let mut errors = method.errors();
         let iteration = history.len();
-        if errors.max <= stop.tolerance || iteration >= stop.max_iterations {
+        if stop.is_met(errors.max) || iteration >= stop.max_iterations {
             errors = method.confirm(errors);
         }
         history.push(errors);
         let step = Step { iteration, errors, points: method.points() };
         let told = watch(&step);
-        let ended = if errors.max <= stop.tolerance {
+        let ended = if stop.is_met(errors.max) {
             Some(Outcome::Converged)
         } else if let Some(outcome) = rules.judge(errors.max) {
             Some(outcome)
@@ -186,6 +200,8 @@ pub fn solve(method: &mut dyn Iterate, stop: &Stop, watch: &mut dyn FnMut(&Step)
 /// The state of the rules for divergence and stagnation.
 #[derive(Clone, Copy, Debug, Default)]
 struct Rules {
+    /// Of the data: no error can be told below, and what stays near it does not grow.
+    rounding: f64,
     start: Option<f64>,
     previous: f64,
     smallest: f64,
@@ -194,12 +210,18 @@ struct Rules {
 }
 
 impl Rules {
+    /// For a run that starts at its data.
+    fn new(points: &[DVec3]) -> Self {
+        let largest = points.iter().fold(0.0f64, |m, p| m.max(p.abs().max_element()));
+        Rules { rounding: f64::EPSILON * largest, ..Rules::default() }
+    }
+
     fn judge(&mut self, error: f64) -> Option<Outcome> {
         if !error.is_finite() {
             return Some(Outcome::Diverged);
         }
         let Some(start) = self.start else {
-            *self = Rules { start: Some(error), previous: error, smallest: error, ..Rules::default() };
+            *self = Rules { start: Some(error), previous: error, smallest: error, ..*self };
             return None;
         };
         self.rises = if error > self.previous { self.rises + 1 } else { 0 };
@@ -210,8 +232,8 @@ impl Rules {
             self.since_progress += 1;
         }
         self.smallest = self.smallest.min(error);
-        let floor = self.smallest.max(NOISE * start);
-        if error > BLOW_UP * start || (error > GROWTH * floor && self.rises >= RISES) {
+        let floor = self.smallest.max(NOISE * start).max(self.rounding);
+        if error > BLOW_UP * start.max(self.rounding) || (error > GROWTH * floor && self.rises >= RISES) {
             Some(Outcome::Diverged)
         } else if self.since_progress >= PATIENCE && self.rises < RISES {
             Some(Outcome::Stagnated)
@@ -229,6 +251,7 @@ mod tests {
     struct Script<'a> {
         errors: &'a dyn Fn(usize) -> f64,
         k: usize,
+        points: &'a [DVec3],
     }
 
     impl Iterate for Script<'_> {
@@ -241,13 +264,17 @@ mod tests {
             Ok(())
         }
         fn points(&self) -> &[DVec3] {
-            &[]
+            self.points
         }
     }
 
     fn run(errors: &dyn Fn(usize) -> f64, tolerance: f64) -> Report {
+        run_on(&[], errors, tolerance)
+    }
+
+    fn run_on(points: &[DVec3], errors: &dyn Fn(usize) -> f64, tolerance: f64) -> Report {
         let stop = Stop { tolerance, max_iterations: 5000 };
-        solve(&mut Script { errors, k: 0 }, &stop, &mut |_| ControlFlow::Continue(()))
+        solve(&mut Script { errors, k: 0, points }, &stop, &mut |_| ControlFlow::Continue(()))
     }
 
     #[test]
@@ -292,6 +319,23 @@ mod tests {
     }
 
     #[test]
+    fn growth_within_the_rounding_of_the_data_is_stagnation() {
+        // An error that falls below the last digit of coordinates of 5·10⁵, by a recurrence, and climbs back to it.
+        let errors = |k: usize| (1e-2 * 0.01f64.powi(k as i32)).max(1e-20 * 3f64.powi(k.min(23) as i32));
+        assert_eq!(run(&errors, 1e-30).outcome, Outcome::Diverged);
+        assert_eq!(run_on(&[DVec3::X * 5e5], &errors, 1e-30).outcome, Outcome::Stagnated);
+        let report = run_on(&[DVec3::X * 5e5], &|k| 1.25f64.powi(k as i32), 1e-3);
+        assert_eq!((report.outcome, report.iterations), (Outcome::Diverged, 31));
+    }
+
+    #[test]
+    fn what_is_not_finite_never_converges() {
+        assert_eq!(run(&|_| f64::INFINITY, f64::INFINITY).outcome, Outcome::Diverged);
+        assert_ne!(run(&|_| 1.0, f64::INFINITY).outcome, Outcome::Converged);
+        assert_eq!(run(&|_| f64::NAN, 1.0).outcome, Outcome::Diverged);
+    }
+
+    #[test]
     fn slow_convergence_is_no_stagnation() {
         let report = run(&|k| (-1e-6 * k as f64).exp(), 1e-9);
         assert_eq!(report.outcome, Outcome::MaxIterations);
@@ -314,7 +358,7 @@ mod tests {
         let mut seen = Vec::new();
         let stop = Stop { tolerance: 0.0, max_iterations: 50 };
         let errors = |k: usize| 1.0 / (k + 1) as f64;
-        let report = solve(&mut Script { errors: &errors, k: 0 }, &stop, &mut |step| {
+        let report = solve(&mut Script { errors: &errors, k: 0, points: &[] }, &stop, &mut |step| {
             seen.push(step.iteration);
             if step.iteration == 4 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });

@@ -120,7 +120,11 @@ impl Tally {
     /// Counts the difference vector `e` of one vertex into the error norms.
     #[inline]
     pub fn error(&mut self, e: DVec3) {
-        let squared = e.length_squared();
+        let mut squared = e.length_squared();
+        if squared < f64::MIN_POSITIVE && e != DVec3::ZERO {
+            // What is left of the square may be nothing; the error is not told too small.
+            squared = f64::MIN_POSITIVE;
+        }
         if squared > self.max_squared {
             self.max_squared = squared;
         }

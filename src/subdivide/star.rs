@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use crate::mesh::frame::magnitude;
 use crate::mesh::topology::NONE;
 use crate::mesh::{Incidence, Mesh, Topology};
 use crate::{Error, Result};
@@ -266,9 +267,12 @@ impl Tangents {
     /// vector where the tangents are parallel up to rounding, so that no tangent plane is defined (a star in
     /// one line or point, valence 2).
     pub fn normal(&self) -> DVec3 {
-        let cross = self.cosine.cross(self.sine);
+        // A small star on a large mesh: its reach to the fourth power may vanish.
+        let unit = magnitude(self.reach);
+        let cross = (self.cosine / unit).cross(self.sine / unit);
         let length = cross.length();
-        if length > DEGENERATE * self.reach * self.reach { cross / length } else { DVec3::ZERO }
+        let reach = self.reach / unit;
+        if length > DEGENERATE * reach * reach { cross / length } else { DVec3::ZERO }
     }
 }
 

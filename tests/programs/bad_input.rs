@@ -189,7 +189,7 @@ fn absurd_counts_ask_for_no_memory() {
 fn runs_that_do_not_converge_leave_no_control_mesh() {
     let folder = tempdir().unwrap();
     for (mesh, more, reason) in [
-        ("cube", &["--noise", "0.1"][..], "ldlt under catmull-clark ended as singular"),
+        ("cube", &["--noise", "0.1"][..], "a part that no control mesh reaches"),
         ("cube", &["--noise", "0.1", "--method", "pia"], "stagnated"),
         ("cube", &["--noise", "0.1", "--method", "cholesky"], "singular"),
         ("cube", &["--method", "lu"], "singular"),
@@ -212,6 +212,155 @@ fn runs_that_do_not_converge_leave_no_control_mesh() {
     // The cube's own points have a control mesh, which iterations find.
     let output = run(INTERPOLATE, folder.path(), ["cube", "-o", "v.obj", "--method", "pia", "--quiet"]);
     assert_done(&output, "pia on the cube");
+}
+
+/// An octahedron, as the text of an OBJ file.
+fn octahedron(to: impl Fn(f64) -> f64) -> String {
+    let points =
+        [[1.1, 0.1, 0.0], [0.0, 0.9, 0.1], [0.1, 0.0, 1.2], [-0.9, 0.1, 0.0], [0.0, -1.1, 0.1], [0.0, 0.1, -0.8]];
+    let rows = points.map(|p| format!("v {:?} {:?} {:?}\n", to(p[0]), to(p[1]), to(p[2])));
+    rows.concat() + "f 1 2 3\nf 2 4 3\nf 4 5 3\nf 5 1 3\nf 2 1 6\nf 4 2 6\nf 5 4 6\nf 1 5 6\n"
+}
+
+#[test]
+fn noise_comes_after_validation() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("x.obj"), octahedron(|x| x).replace("f 1 5 6", "f 1 5 9")).unwrap();
+    fs::write(folder.path().join("x.off"), "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n").unwrap();
+    for (mesh, noise, place) in [("x.obj", "0.1", "line 14"), ("x.obj", "0", "line 14"), ("x.off", "0.1", "line 6")] {
+        let line = assert_all_refuse(&folder, mesh, &["--noise", noise]);
+        assert!(line.contains("out of range") && line.contains(place), "{line}");
+    }
+    let output = run_on(SPECTRUM, folder.path(), "x.obj", &["--noise", "0.1"]);
+    assert!(assert_refused(&output, "spectrum").contains("line 14"));
+    let output = run_on(ASSEMBLE, folder.path(), "x.obj", &["--noise", "0.1", "--defects"]);
+    assert_eq!(json(&output)["totals"]["index-out-of-range"], 1);
+    // Beyond the largest double.
+    fs::write(folder.path().join("x.obj"), octahedron(|x| x * 1e300)).unwrap();
+    let line = assert_all_refuse(&folder, "x.obj", &["--noise", "1e20"]);
+    assert!(line.contains("vertex 0, line 1") && line.contains("--noise 1e20:1"), "{line}");
+}
+
+#[test]
+fn sizes_that_doubles_cannot_hold_together_name_the_vertex() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("x.obj"), octahedron(|x| if x == 1.2 { 1e-200 } else { x * 1e200 })).unwrap();
+    let line = assert_all_refuse(&folder, "x.obj", &[]);
+    assert!(line.contains("vertex 2, line 3"), "{line}");
+}
+
+#[test]
+fn points_that_coincide_need_an_absolute_tolerance() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("x.obj"), octahedron(|_| 3.0)).unwrap();
+    for program in [INTERPOLATE, COMPARE, SWEEP] {
+        let line = assert_refused(&run_on(program, folder.path(), "x.obj", &[]), program);
+        assert!(line.contains("all points coincide") && line.contains("--tol-absolute"), "{line}");
+        assert_done(&run_on(program, folder.path(), "x.obj", &["--tol-absolute", "1e-9"]), program);
+    }
+    // The matrix has its spectrum all the same.
+    let output = run_on(SPECTRUM, folder.path(), "x.obj", &["--json"]);
+    assert_done(&output, "spectrum");
+    assert!(json(&output)["lambda_min"].as_f64().unwrap() > 0.1);
+    assert!(json(&output)["promised_iterations"]["pia"].is_null());
+}
+
+/// Whoever follows the advice of a failed run arrives at a control mesh.
+#[test]
+fn advice_helps_and_never_names_what_failed() {
+    let folder = tempdir().unwrap();
+    let words = |line: &str| -> Vec<String> {
+        let advice = line.rsplit("; ").next().unwrap();
+        advice.split([' ', ',']).map(|w| w.trim_matches('.').to_owned()).collect()
+    };
+    let mut runs: Vec<Vec<&str>> = ["lu", "cholesky", "ldlt", "pia", "jacobi", "gauss-seidel", "cg", "pcg-ic0", "auto"]
+        .iter()
+        .map(|method| vec!["cube", "--noise", "0.1", "--method", method])
+        .collect();
+    runs.extend(["lu", "cholesky", "ldlt", "pcg-ic0"].map(|method| vec!["cube", "--method", method]));
+    for method in ["pia", "cg", "lu", "auto"] {
+        runs.push(vec!["icosphere:1", "--tol", "1e-30", "--method", method]);
+    }
+    for arguments in runs {
+        let all = [&arguments[..], &["-o", "v.obj", "--quiet"]].concat();
+        let line = assert_refused(&run(INTERPOLATE, folder.path(), all), "a run that fails");
+        let words = words(&line);
+        let failed = arguments.last().unwrap();
+        let flags: Vec<&[String]> = words.windows(2).filter(|w| w[0].starts_with("--")).collect();
+        assert!(!flags.is_empty() && flags.iter().all(|w| w[1] != *failed), "{line}");
+        // Each alternative: a flag, and those that go with it.
+        for alternative in words.split(|w| w == "or") {
+            let pairs: Vec<&[String]> = alternative.windows(2).filter(|w| w[0].starts_with("--")).collect();
+            let mut command: Vec<&str> = arguments.clone();
+            for pair in &pairs {
+                if let Some(at) =
+                    command.iter().position(|a| *a == pair[0] || (*a == "--tol" && pair[0] == "--tol-absolute"))
+                {
+                    command.drain(at..at + 2);
+                }
+                command.extend([pair[0].as_str(), pair[1].as_str()]);
+            }
+            command.extend(["-o", "v.obj", "--quiet"]);
+            assert_done(&run(INTERPOLATE, folder.path(), &command), &format!("{command:?} after {line}"));
+        }
+    }
+}
+
+#[test]
+fn methods_without_omega_are_bad_arguments_of_a_sweep() {
+    let folder = tempdir().unwrap();
+    let output = run(SWEEP, folder.path(), ["octahedron", "--method", "pia,cg", "--out", "result"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("cg has no ω to sweep; choose among jacobi, pia and sor"));
+}
+
+#[test]
+fn omega_may_have_any_size() {
+    let folder = tempdir().unwrap();
+    for (grid, values) in [("1e-13:3e-13:1e-13", vec![1e-13, 2e-13, 3e-13]), ("1e297:1e297:1", vec![1e297])] {
+        for mesh in ["octahedron", "icosphere:3"] {
+            let arguments = [mesh, "--omega", grid, "--max-iter", "3", "--json", "--quiet", "--out", "result"];
+            let output = run(SWEEP, folder.path(), arguments);
+            assert_done(&output, grid);
+            let report = json(&output);
+            let rows = report["rows"].as_array().unwrap();
+            let omegas: Vec<f64> = rows.iter().map(|r| r["omega"].as_f64().unwrap()).collect();
+            assert_eq!(omegas, [values.clone(), values.clone(), values.clone()].concat(), "{grid} on {mesh}");
+            assert!(rows.iter().all(|r| r["status"] != "converged"));
+        }
+    }
+}
+
+#[test]
+fn normals_without_direction_are_told_shortly() {
+    let folder = tempdir().unwrap();
+    let refuse = |normal: &str| {
+        fs::write(folder.path().join("n.txt"), format!("0 {normal}\n")).unwrap();
+        run(
+            INTERPOLATE,
+            folder.path(),
+            ["icosahedron", "--normals", "n.txt", "--subdivide", "2", "-o", "v.obj", "--quiet"],
+        )
+    };
+    let line = assert_refused(&refuse("1e-300 nan 0"), "no number");
+    assert!(line.contains("vertex 0: (1e-300, NaN, 0) has no direction"), "{line}");
+    for normal in ["1e300 1e300 1e300", "1e-200 0 1e-200", "0 1e-310 0"] {
+        assert_done(&refuse(normal), normal);
+    }
+}
+
+#[test]
+fn hints_about_a_boundary_fit_the_mesh() {
+    let folder = tempdir().unwrap();
+    let mut quads = built_in("torus:4x5");
+    quads.faces = limitlab::mesh::Faces::from_lists(quads.faces.iter().skip(1));
+    io::write(&folder.path().join("x.obj"), &quads, None).unwrap();
+    let line = assert_all_refuse(&folder, "x.obj", &[]);
+    assert!(line.contains("close the holes") && !line.contains("--boundary"), "{line}");
+    for scheme in ["catmull-clark", "loop"] {
+        let line = assert_all_refuse(&folder, "x.obj", &["--boundary", "as-interior", "--scheme", scheme]);
+        assert!(!line.contains("--scheme") && !line.contains("--boundary"), "{line}");
+    }
 }
 
 #[test]

@@ -22,6 +22,7 @@ pub const INTERPOLATE: &str = env!("CARGO_BIN_EXE_interpolate");
 pub const COMPARE: &str = env!("CARGO_BIN_EXE_compare-solvers");
 pub const SWEEP: &str = env!("CARGO_BIN_EXE_sweep-omega");
 pub const REPRODUCE: &str = env!("CARGO_BIN_EXE_reproduce");
+pub const SPECTRUM: &str = env!("CARGO_BIN_EXE_spectrum");
 pub const SPLITTING: &str = env!("CARGO_BIN_EXE_splitting");
 pub const SPECTRUM: &str = env!("CARGO_BIN_EXE_spectrum");
 
@@ -38,7 +39,7 @@ pub fn run_on(program: &str, folder: &Path, mesh: &str, more: &[&str]) -> Output
     let mut arguments = vec![mesh, "--quiet"];
     match program {
         INTERPOLATE => arguments.extend(["-o", "result.obj"]),
-        ASSEMBLE => arguments.extend(["--out", "result"]),
+        ASSEMBLE | SPECTRUM => arguments.extend(["--out", "result"]),
         COMPARE => arguments.extend(["--out", "result", "--method", "pia"]),
         SWEEP => arguments.extend(["--out", "result", "--method", "pia", "--omega", "1:1:1"]),
         _ => unreachable!("not a program on meshes"),

@@ -8,6 +8,7 @@ use limitlab::mesh::curve::is_scattered;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, Topology, io};
+use limitlab::solvers::Method;
 use nalgebra_sparse::CsrMatrix;
 use sprs::io::read_matrix_market;
 use tempfile::tempdir;
@@ -187,6 +188,81 @@ fn a_nearly_singular_system_is_solved_by_the_automatic_choice() {
     let control = io::read(&folder.path().join("v.obj")).unwrap().mesh;
     let error = residual(Scheme::CatmullClark, &mesh, &control);
     assert!(error <= 1.001e-10 * mesh.diagonal(), "{error:e}");
+}
+
+/// A is linear: points 2ᵏ times as large have control points, errors and surfaces 2ᵏ times as large, to the last bit.
+#[test]
+fn powers_of_two_change_nothing_but_the_unit() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("n.txt"), "0 1e300 1e300 1e300\n3 -1e-310 0 1e-310\n").unwrap();
+    let base = noisy("icosphere:1");
+    let solve = |power: i32, more: &[&str]| {
+        let unit = 2f64.powi(power);
+        let mut mesh = base.clone();
+        mesh.positions.iter_mut().for_each(|p| *p *= unit);
+        io::write(&folder.path().join("p.obj"), &mesh, None).unwrap();
+        let arguments = [&["p.obj", "-o", "v.obj", "--json", "--quiet"], more].concat();
+        let output = run(INTERPOLATE, folder.path(), &arguments);
+        assert_done(&output, &format!("2^{power} {more:?}"));
+        let report = json(&output);
+        let number = |name: &str| report[name].as_f64().unwrap() / unit;
+        let mut written = io::read(&folder.path().join("v.obj")).unwrap().mesh;
+        written.positions.iter_mut().for_each(|p| *p /= unit);
+        (written, report["iterations"].as_u64(), number("max_error"), number("mean_error"), number("tolerance"))
+    };
+    for more in [
+        &[][..],
+        &["--method", "lu"],
+        &["--method", "cg"],
+        &["--method", "sor", "--order", "multicolour"],
+        &["--vertices", "0..9", "--limit"],
+        &["--subdivide", "2", "--normals", "n.txt", "--write-normals"],
+        &["--method", "two-phase", "--subdivide", "1"],
+        &["--method", "halstead", "--scheme", "catmull-clark"],
+        &["--alpha", "0.5", "--subdivide", "1"],
+        &["--scheme", "nasri", "--subdivide", "1"],
+    ] {
+        let plain = solve(0, more);
+        for power in [-900, -530, 40, 512, 1000] {
+            assert!(solve(power, more) == plain, "2^{power} {more:?}");
+        }
+    }
+}
+
+/// Rows of A sum to 1: far from the origin, every method finds what it finds at the origin, to the last digit of the
+/// coordinates there.
+#[test]
+fn offsets_cost_the_digits_of_the_coordinates_and_no_more() {
+    let folder = tempdir().unwrap();
+    for offset in [DVec3::splat(1e7), DVec3::new(1e7, 0.0, -5.4e6), DVec3::Z * 1e12] {
+        let mut mesh = noisy("icosphere:1");
+        mesh.positions.iter_mut().for_each(|p| *p += offset);
+        io::write(&folder.path().join("p.obj"), &mesh, None).unwrap();
+        mesh.positions.iter_mut().for_each(|p| *p -= offset);
+        io::write(&folder.path().join("q.obj"), &mesh, None).unwrap();
+        let digit = offset.abs().max_element() * f64::EPSILON;
+        let methods = Method::ALL.map(Method::name).map(|m| vec!["--method", m]);
+        let more =
+            [vec![], vec!["--subdivide", "2", "--limit"], vec!["--vertices", "3..20"], vec!["--method", "two-phase"]];
+        for more in methods.into_iter().chain(more) {
+            let solve = |name: &str| {
+                let arguments = [&[name, "-o", "v.obj", "--json"], &more[..]].concat();
+                let output = run(INTERPOLATE, folder.path(), &arguments);
+                assert_done(&output, &format!("{name} {offset} {more:?}"));
+                (io::read(&folder.path().join("v.obj")).unwrap().mesh.positions, output)
+            };
+            let (near, at_origin) = solve("q.obj");
+            let (far, output) = solve("p.obj");
+            let moved: Vec<DVec3> = far.iter().map(|p| *p - offset).collect();
+            assert!(distance(&moved, &near) < 2.0 * digit + 1e-9, "{offset} {more:?}");
+            let error = |output: &Output| json(output)["max_error"].as_f64().unwrap();
+            assert!(error(&output) <= error(&at_origin) + 2.0 * digit, "{offset} {more:?}");
+            if more.is_empty() {
+                let told = text(&output.stderr);
+                assert!(told.contains("their last digit is") && told.contains("the tolerance 3."), "{told}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -2,7 +2,9 @@
 
 use glam::DVec3;
 use limitlab::assemble::{LimitSystem, Masks, Scheme};
-use limitlab::solvers::{Outcome, Setup, Stop};
+use limitlab::interpolate::automatic::control_points;
+use limitlab::mesh::Mesh;
+use limitlab::solvers::{Outcome, Setup, Stop, run};
 
 use crate::common::meshes::*;
 use crate::setups::*;
@@ -134,6 +136,41 @@ fn the_smallest_mesh_is_solved_by_every_method() {
             let stop = Stop { tolerance: 1e-12, max_iterations: 1000 };
             let report = checked(&system, &mesh.positions, setup, &stop).report;
             assert_eq!(report.outcome, Outcome::Converged, "{name}, {scheme}");
+        }
+    }
+}
+
+/// Squares of such lengths vanish or overflow: whatever a run tells, it is not that the start solves the system.
+#[test]
+fn lengths_whose_squares_are_lost_never_converge() {
+    let mesh = noisy("icosphere:1");
+    let system = system(&mesh, Scheme::Loop);
+    let order = reversed(mesh.len());
+    for unit in [1e-300, 1e-170, 1e-160, 1e155, 1e300] {
+        let points: Vec<DVec3> = mesh.positions.iter().map(|p| unit * *p).collect();
+        let stop = Stop { tolerance: 1e-10 * unit, max_iterations: 300 };
+        for (name, setup) in all(&system, &order) {
+            let report = run(&system, &points, setup, &stop).report;
+            let told = report.history.iter().all(|e| !(e.max <= stop.tolerance));
+            assert!(report.outcome != Outcome::Converged && told, "{name} at {unit:e}: {report:?}");
+        }
+        let found = control_points(&Mesh::new(points, mesh.faces.clone()), None, Scheme::Loop, &stop).unwrap();
+        assert_ne!(found.report.outcome, Outcome::Converged, "{unit:e}");
+    }
+}
+
+/// At coordinates of 5·10⁵ errors of 10⁻⁹ are rounding: what wiggles there does not grow.
+#[test]
+fn rounding_far_from_the_origin_is_no_divergence() {
+    for name in ["icosphere:1", "irregular-tri:80", "prism:7"] {
+        let mesh = noisy(name);
+        let system = system(&mesh, Scheme::CatmullClark);
+        let points: Vec<DVec3> = mesh.positions.iter().map(|p| *p + DVec3::splat(5e5)).collect();
+        let stop = Stop { tolerance: 1e-14, max_iterations: 2000 };
+        let order = reversed(mesh.len());
+        for (method, setup) in all(&system, &order) {
+            let report = run(&system, &points, setup, &stop).report;
+            assert_ne!(report.outcome, Outcome::Diverged, "{method} on {name}: {:e}", report.last().max);
         }
     }
 }

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::energy::{Energies, Fairness, Weights};
 use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
+use crate::error::short;
 use crate::interpolate::normals::unit_normals;
 use crate::interpolate::zheng_cai::Constraints;
 use crate::mesh::incidence::{next_in, prev_in};
@@ -61,7 +62,8 @@ pub fn fit(fairness: &Fairness, points: &[DVec3], wishes: &Constraints, weights:
         return Err(Error::Computation(format!(
             "the fairness weights {} (thin plate) and {} (membrane) must be finite, none negative, and the second \
              positive",
-            weights.thin_plate, weights.membrane
+            short(weights.thin_plate),
+            short(weights.membrane)
         )));
     }
     assert!(points.len() < fairness.fine.len(), "the given points, not the fine ones");

@@ -99,6 +99,11 @@ fn an_open_mesh_is_refused_or_treated_as_interior() {
     let report = refuse(&open);
     assert_eq!(kinds(&report), [(DefectKind::BoundaryEdge, 3)]);
     assert!(report.summary_line().contains("--boundary as-interior"));
+    // Which works on triangles only.
+    let mut open_cube = builtin::torus(4, 5);
+    open_cube.faces = Faces::from_lists(open_cube.faces.iter().skip(1));
+    let line = refuse(&open_cube).summary_line();
+    assert!(line.contains("4 boundary edges") && !line.contains("as-interior"), "{line}");
     let report = validate(&open, None, Boundary::AsInterior);
     assert!(report.is_valid());
     assert_eq!(report.remarks, ["3 boundary edges in 1 loop: boundary vertices are treated as interior"]);
