@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::input::has_mesh_ending;
 use crate::error::{Error, Result};
 use crate::mesh::io;
+use crate::mesh::text::quoted;
 
 /// Reads `LIST|FILE` of vertices: numbers and ranges `A..B` (both ends included), separated by commas or white
 /// space; in a file `#` starts a comment. One mark a vertex comes back.
@@ -27,7 +28,8 @@ pub fn vertex_marks(text: &str, vertices: usize) -> Result<Vec<bool>> {
             let (from, to) = item.split_once("..").unwrap_or((item, item));
             let (Ok(from), Ok(to)) = (from.parse::<usize>(), to.parse::<usize>()) else {
                 return Err(refuse(format!(
-                    "`{item}` is neither a vertex, a range A..B nor a file: vertices are numbered from 0"
+                    "{} is neither a vertex, a range A..B nor a file: vertices are numbered from 0",
+                    quoted(item.as_bytes())
                 )));
             };
             if from > to || to >= vertices {
@@ -94,7 +96,7 @@ fn rows<const K: usize>(path: &Path, vertices: usize, form: &str) -> Result<Vec<
             item.map(|value| *x = value).is_some()
         });
         let (Ok(vertex), true, None) = (vertex.parse::<usize>(), complete, items.next()) else {
-            return refuse(format!("`{}` is not of the form `{form}`", line.trim()));
+            return refuse(format!("{} is not of the form `{form}`", quoted(line.trim().as_bytes())));
         };
         let Some(place) = rows.get_mut(vertex) else {
             return refuse(format!("vertex {vertex} is not in the mesh: it has {vertices}, numbered from 0"));
@@ -134,11 +136,11 @@ mod tests {
         let listed = file("# chosen\n0 3..5 # a range\n\n9\n");
         assert_eq!(marked(listed.path().to_str().unwrap()), [0, 3, 4, 5, 9]);
         let refused = |text: &str| vertex_marks(text, 10).unwrap_err().to_string();
-        assert!(refused("3,x").starts_with("--vertices: `x` is neither"));
+        assert!(refused("3,x").starts_with("--vertices: \"x\" is neither"));
         assert!(refused("5..10").contains("the mesh lacks: it has 10"));
         assert!(refused("5..4").contains("lacks"));
         let bad = file("1\n2 ten\n");
-        assert!(refused(bad.path().to_str().unwrap()).contains(", line 2: `ten`"));
+        assert!(refused(bad.path().to_str().unwrap()).contains(", line 2: \"ten\" is neither"));
     }
 
     #[test]
@@ -147,9 +149,10 @@ mod tests {
         let found = normals(good.path(), 3).unwrap();
         assert_eq!(found, [Some(DVec3::new(1e-3, 2.0, -3.0)), None, Some(DVec3::Z)]);
         for (text, what) in [
-            ("0 1 2\n", ", line 1: `0 1 2` is not of the form"),
-            ("0 1 2 3 4\n", ", line 1: `0 1 2 3 4` is not of the form"),
-            ("\n-1 1 2 3\n", ", line 2: `-1 1 2 3` is not of the form"),
+            ("0 1 2\n", ", line 1: \"0 1 2\" is not of the form"),
+            ("0 1 2 3 4\n", ", line 1: \"0 1 2 3 4\" is not of the form"),
+            ("\n-1 1 2 3\n", ", line 2: \"-1 1 2 3\" is not of the form"),
+            ("0 1\u{1b}[2J 3\n", ", line 1: \"0 1\\u{1b}[2J 3\" is not of the form"),
             ("0 0 0 1\n3 1 2 3\n", ", line 2: vertex 3 is not in the mesh"),
             ("1 0 0 1\n1 0 0 2\n", ", line 2: vertex 1 is given twice"),
         ] {

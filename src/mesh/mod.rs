@@ -18,7 +18,7 @@ mod obj_normals;
 pub mod off;
 pub mod order;
 pub mod ply;
-mod text;
+pub(crate) mod text;
 pub mod topology;
 pub mod validate;
 

@@ -208,7 +208,7 @@ pub(super) fn leading_digits(bytes: &[u8]) -> Option<(u64, usize)> {
 }
 
 /// A word of a file, fit for a message of one line.
-pub(super) fn quoted(word: &[u8]) -> String {
+pub(crate) fn quoted(word: &[u8]) -> String {
     const SHOWN: usize = 32;
     let text = String::from_utf8_lossy(&word[..word.len().min(SHOWN)]);
     let more = if word.len() > SHOWN { "…" } else { "" };
