@@ -31,7 +31,7 @@ fn flags() {
     replay("flags", 60, |data| flags::check(data, programs));
 }
 
-/// Checks the committed inputs of a target and then `mutants` of them. The last line printed names the input that failed.
+/// Checks the committed inputs of a target and then `mutants` of them. The last line printed names what failed.
 fn replay(target: &str, mutants: u64, check: impl Fn(&[u8])) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(target);
     let mut paths: Vec<_> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();

@@ -65,7 +65,8 @@ fn mesh(format: &Format, bytes: &[u8]) {
         _ => normals,
     };
     assert!(normals.as_ref().is_none_or(|n| n.len() == mesh.len()));
-    if finite && normals.iter().flatten().all(|n| n.is_finite()) {
+    // An OBJ file without vertices is taken for something else.
+    if !mesh.is_empty() && finite && normals.iter().flatten().all(|n| n.is_finite()) {
         writes_and_reads_back(&mesh, normals.as_deref());
     }
 }

@@ -1,5 +1,5 @@
-//! Any polygon mesh through everything that is computed from connectivity: the validator against a second opinion, files,
-//! refinement, and for every scheme the explicit matrix, the matrix-free operator and the solvers against formulas.
+//! Any polygon mesh through everything that is computed from connectivity: the validator against a second opinion,
+//! files, refinement, and for every scheme the explicit matrix, the matrix-free operator and the solvers against formulas.
 
 mod draft;
 mod refinement;
