@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use limitlab::Result;
 use limitlab::assemble::{LimitSystem, Scheme};
-use limitlab::cli::{Printer, STAND_IN_NOISE};
+use limitlab::cli::{self, Printer, STAND_IN_NOISE};
 use limitlab::error::Error;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::validate::{Boundary, validate};

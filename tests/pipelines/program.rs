@@ -214,7 +214,7 @@ fn failures_say_what_is_wrong_and_write_nothing() {
         ("icosahedron --alpha 1".into(), "--subdivide"),
         ("cube --method labsik-greiner --subdivide 2".into(), "face 0 has 4 corners"),
         ("icosahedron --vertices 12".into(), "`12` names a vertex that the mesh lacks"),
-        ("icosahedron --vertices none.txt".into(), "`none.txt` is neither"),
+        ("icosahedron --vertices none.txt".into(), "\"none.txt\" is neither"),
         (format!("icosahedron --normals {twice} --subdivide 2"), "line 2: vertex 4 is given twice"),
         (format!("icosahedron --normals {zero} --subdivide 2"), "vertex 4"),
         ("icosahedron --normals nowhere.txt --subdivide 2".into(), "nowhere.txt: cannot read"),

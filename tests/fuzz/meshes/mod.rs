@@ -1,0 +1,92 @@
+//! Any polygon mesh through everything that is computed from connectivity: the validator against a second opinion,
+//! files, refinement, and for every scheme the explicit matrix, the matrix-free operator and the solvers against formulas.
+
+mod draft;
+mod refinement;
+mod systems;
+
+use std::sync::LazyLock;
+
+use arbitrary::{Result, Unstructured};
+use glam::DVec3;
+use limitlab::assemble::Scheme;
+use limitlab::mesh::validate::{Boundary, validate};
+use limitlab::mesh::{Mesh, Topology};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::formats::writes_and_reads_back;
+use crate::surface::Surface;
+use draft::Draft;
+
+/// A mesh, and what else a run is told.
+struct Case {
+    mesh: Mesh,
+    /// Relative to the bounding box's diagonal.
+    tolerance: f64,
+    /// Of a renumbering.
+    seed: u64,
+    /// Whether to go on with a mesh of thousands of vertices.
+    refine: bool,
+}
+
+impl Case {
+    fn decode(u: &mut Unstructured) -> Result<Case> {
+        let tolerance = 0.1f64.powi(u.int_in_range(2..=10)?);
+        let seed = u.arbitrary::<u8>()?.into();
+        let refine = u.ratio(1, 16)?;
+        let place: u8 = u.int_in_range(0..=7)?;
+        let exponent = u.int_in_range(-30..=30)?;
+        let mut mesh = Draft::decode(u)?.mesh();
+        for p in &mut mesh.positions {
+            *p = match place {
+                // Many points coincide, faces have no area.
+                0 => p.round(),
+                1 => *p + DVec3::new(100.0, -1000.0, 0.0),
+                // Not far from the range of single precision, in which corrections are computed.
+                2 => *p * 2f64.powi(exponent),
+                _ => *p,
+            };
+        }
+        Ok(Case { mesh, tolerance, seed, refine })
+    }
+}
+
+pub fn check(data: &[u8]) {
+    let Ok(case) = Case::decode(&mut Unstructured::new(data)) else { return };
+    let mesh = &case.mesh;
+    let surface = Surface::of(mesh);
+    let report = validate(mesh, None, Boundary::Refuse);
+    assert_eq!(report.is_valid(), surface.is_closed(), "{surface:?}: {}", report.summary_line());
+    match surface {
+        Surface::Defective => {}
+        Surface::Doubled => {
+            let topology = Topology::new(&mesh.faces, mesh.len());
+            suitable(mesh).for_each(|scheme| systems::matrices_agree(mesh, &topology, scheme));
+        }
+        Surface::Closed { euler } => {
+            writes_and_reads_back(mesh, None);
+            let topology = report.into_topology("the mesh").unwrap();
+            refinement::keeps_surfaces(mesh, &topology, euler);
+            for scheme in suitable(mesh) {
+                systems::matrices_agree(mesh, &topology, scheme);
+                systems::solutions_agree(&case, &topology, scheme);
+            }
+            if case.refine && mesh.diagonal() > 0.0 {
+                refinement::large(&case, &topology);
+            }
+        }
+    }
+}
+
+fn suitable(mesh: &Mesh) -> impl Iterator<Item = Scheme> {
+    Scheme::ALL.into_iter().filter(|scheme| scheme.first_unsuitable_face(&mesh.faces).is_none())
+}
+
+/// The same work on one thread and on two, with the same result to the last bit.
+fn on_any_threads<T: PartialEq + Send>(work: impl Fn() -> T + Sync) -> T {
+    static POOLS: LazyLock<[ThreadPool; 2]> =
+        LazyLock::new(|| [1, 2].map(|n| ThreadPoolBuilder::new().num_threads(n).build().unwrap()));
+    let [one, two] = POOLS.each_ref().map(|pool| pool.install(&work));
+    assert!(one == two, "the number of threads matters");
+    one
+}

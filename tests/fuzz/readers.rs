@@ -1,0 +1,119 @@
+//! Any bytes through the readers: of the three mesh formats, of normals in OBJ files, of lists of vertices, normals and
+//! numbers. What is refused is refused in one line; what is read can be written, and reads back equal.
+
+use std::fmt::Debug;
+use std::io::Write;
+use std::path::Path;
+
+use limitlab::Result;
+use limitlab::cli::constraints;
+use limitlab::mesh::io::Loaded;
+use limitlab::mesh::validate::{Boundary, validate};
+use tempfile::NamedTempFile;
+
+use crate::formats::{FORMATS, Format, writes_and_reads_back};
+use crate::surface::Surface;
+
+/// Vertices of the mesh that lists are about.
+const VERTICES: usize = 12;
+/// Corners up to which the second opinion is asked for.
+const SMALL: usize = 10_000;
+
+/// The first byte chooses the reader, the others are the file.
+pub fn check(data: &[u8]) {
+    let Some((&kind, bytes)) = data.split_first() else { return };
+    match kind % 6 {
+        3 => vertices(bytes),
+        4 => normals(bytes),
+        5 => numbers(bytes),
+        format => mesh(&FORMATS[format as usize], bytes),
+    }
+}
+
+/// What was read, unless the reader refused it as it should.
+fn accepted<T>(result: Result<T>) -> Option<T> {
+    result.map_err(|e| one_line(&e.to_string())).ok()
+}
+
+/// Also no carriage returns and escape sequences, with which a file could rewrite the terminal.
+fn one_line(text: &str) {
+    assert!(!text.is_empty() && !text.contains(char::is_control), "not one line: {text:?}");
+}
+
+fn mesh(format: &Format, bytes: &[u8]) {
+    let path = Path::new("x.mesh");
+    let Some(Loaded { mesh, lines, normals, remarks, .. }) = accepted((format.read)(bytes, path)) else { return };
+    assert!(lines.iter().all(|l| l.vertices.len() == mesh.len() && l.faces.len() == mesh.faces.len()));
+    remarks.iter().for_each(|remark| one_line(remark));
+    let finite = mesh.positions.iter().all(|p| p.is_finite());
+    let lines = lines.as_ref().map(|l| (&l.vertices[..], &l.faces[..]));
+    for boundary in [Boundary::Refuse, Boundary::AsInterior] {
+        let report = validate(&mesh, lines, boundary);
+        one_line(&report.summary_line());
+        report.remarks.iter().for_each(|remark| one_line(remark));
+        assert!(serde_json::to_value(&report).is_ok());
+        if boundary == Boundary::Refuse && mesh.faces.corners().len() <= SMALL {
+            assert_eq!(report.is_valid(), finite && Surface::of(&mesh).is_closed(), "{}", report.summary_line());
+        }
+    }
+    // An OBJ file has its normals at the corners.
+    let normals = match format.ending {
+        ".obj" => {
+            let file = file(bytes, format.ending);
+            accepted(limitlab::mesh::io::read_normals(file.path())).flatten()
+        }
+        _ => normals,
+    };
+    assert!(normals.as_ref().is_none_or(|n| n.len() == mesh.len()));
+    // An OBJ file without vertices is taken for something else.
+    if !mesh.is_empty() && finite && normals.iter().flatten().all(|n| n.is_finite()) {
+        writes_and_reads_back(&mesh, normals.as_deref());
+    }
+}
+
+fn file(bytes: &[u8], ending: &str) -> NamedTempFile {
+    let mut file = tempfile::Builder::new().suffix(ending).tempfile().unwrap();
+    file.write_all(bytes).unwrap();
+    file
+}
+
+fn vertices(bytes: &[u8]) {
+    let listed = file(bytes, ".txt");
+    let from_file = accepted(constraints::vertex_marks(listed.path().to_str().unwrap(), VERTICES));
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        assert!(from_file.is_none());
+        return;
+    };
+    assert_eq!(accepted(constraints::vertex_marks(text, VERTICES)), from_file);
+    let Some(marks) = from_file else { return };
+    let chosen: Vec<String> = (0..VERTICES).filter(|&v| marks[v]).map(|v| v.to_string()).collect();
+    assert_eq!(constraints::vertex_marks(&chosen.join(","), VERTICES).unwrap(), marks);
+}
+
+fn normals(bytes: &[u8]) {
+    let read = |bytes: &[u8]| constraints::normals(file(bytes, ".txt").path(), VERTICES);
+    rows_read_back(accepted(read(bytes)), |n| format!("{:?} {:?} {:?}", n.x, n.y, n.z), |text| read(text.as_bytes()));
+}
+
+fn numbers(bytes: &[u8]) {
+    // Vertices without a number get one that no file holds.
+    let read = |bytes: &[u8]| {
+        let file = file(bytes, ".txt");
+        let numbers = constraints::numbers(file.path().to_str().unwrap(), VERTICES, f64::NEG_INFINITY)?;
+        Ok(numbers.into_iter().map(|x| (x != f64::NEG_INFINITY).then_some(x)).collect())
+    };
+    rows_read_back(accepted(read(bytes)), |x| format!("{x:?}"), |text| read(text.as_bytes()));
+}
+
+/// Lines `vertex …` of what was read give the same again; equal by their text, so that NaN is.
+fn rows_read_back<T: Debug>(
+    rows: Option<Vec<Option<T>>>,
+    row: impl Fn(&T) -> String,
+    read: impl Fn(&str) -> Result<Vec<Option<T>>>,
+) {
+    let Some(rows) = rows else { return };
+    assert_eq!(rows.len(), VERTICES);
+    let lines = rows.iter().enumerate().filter_map(|(v, value)| Some(format!("{v} {}\n", row(value.as_ref()?))));
+    let back = read(&lines.collect::<String>()).unwrap();
+    assert_eq!(format!("{back:?}"), format!("{rows:?}"));
+}
