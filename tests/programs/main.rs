@@ -24,7 +24,6 @@ pub const SWEEP: &str = env!("CARGO_BIN_EXE_sweep-omega");
 pub const REPRODUCE: &str = env!("CARGO_BIN_EXE_reproduce");
 pub const SPECTRUM: &str = env!("CARGO_BIN_EXE_spectrum");
 pub const SPLITTING: &str = env!("CARGO_BIN_EXE_splitting");
-pub const SPECTRUM: &str = env!("CARGO_BIN_EXE_spectrum");
 
 /// The programs that take meshes.
 pub const ON_MESHES: [&str; 4] = [ASSEMBLE, INTERPOLATE, COMPARE, SWEEP];
