@@ -271,6 +271,9 @@ mod tests {
             assert_eq!(loaded.name, path.display().to_string());
             assert!(loaded.remarks.is_empty(), "{:?}", loaded.remarks);
         }
+        for name in ["/dev/stdout", "/dev/fd/63"] {
+            check_name(Path::new(name)).unwrap();
+        }
         for name in ["a.stl", "obj", ".off", ""] {
             let path = folder.path().join(name);
             for error in [write(&path, &mesh, None).err(), read(&path).err()] {

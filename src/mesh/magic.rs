@@ -24,7 +24,7 @@ const KNOWN: [(&[u8], &str); 20] = [
     (b"{", "it is JSON: convert the mesh in it to .obj, .off or .ply"),
 ];
 
-const UTF_16: &str = "it is text in UTF-16: save it as UTF-8 or ASCII";
+const UTF_16: &str = "it is text in UTF-16 or UTF-32: save it as UTF-8 or ASCII";
 
 /// Says what `bytes` are, and what to do, if their start is that of another kind of file.
 pub(crate) fn other_kind(bytes: &[u8]) -> Option<&'static str> {

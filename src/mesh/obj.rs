@@ -57,7 +57,7 @@ const NAMES: [&[u8]; 6] = [b"g", b"o", b"usemtl", b"mtllib", b"usemap", b"maplib
 /// Reads the bytes of an OBJ file; `path` is for messages.
 ///
 /// Corners may be `v`, `v/vt`, `v//vn`, `v/vt/vn`, and negative to count back from the last vertex read so far; a
-/// backslash continues a line of numbers, and is part of a name, as in Windows paths. One remark names with counts what
+/// backslash continues a statement of numbers, but no name, for Windows paths may end with it. One remark names with counts what
 /// the mesh does not keep: all other statements, weights and colours after coordinates. Another tells if the last line has no end, for an OBJ file announces no
 /// counts by which a cut could be noticed.
 ///
@@ -78,7 +78,7 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     let mut builder = Builder::new(Some(Lines::default()));
     let mut dropped = [0usize; DROPPED.len()];
     let (mut weighted, mut unequal, mut coloured) = (0usize, 0usize, 0usize);
-    let mut name_with_backslash = None;
+    let mut not_continued = None;
     let mut unknown: Option<(usize, Error)> = None;
     loop {
         s.skip_space();
@@ -126,7 +126,7 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
                     },
                 }
                 if skip_statement(&mut s, keyword) {
-                    name_with_backslash.get_or_insert(line);
+                    not_continued.get_or_insert(line);
                 }
             }
         }
@@ -160,9 +160,9 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     if let Some((count, first)) = unknown {
         remarks.push(format!("{count} unknown statements passed over, the first at {first}"));
     }
-    if let Some(line) = name_with_backslash {
+    if let Some(line) = not_continued {
         remarks.push(format!(
-            "a backslash ends the name on line {line}: it is read as part of the name and does not continue the line"
+            "a backslash ends line {line}, whose statement is not one of numbers: the next line is read for itself"
         ));
     }
     if s.ends_within_a_line() {
@@ -213,17 +213,18 @@ pub(super) fn skip_blanks(s: &mut Scanner) {
     }
 }
 
-/// Skips what is left of a statement: its line, and those that continue it. Only numbers are continued; whether a
-/// backslash ends a name instead is given back.
+/// Skips what is left of a statement: its line, and those that continue it. Only statements of numbers are continued;
+/// whether a backslash ends another one is given back.
 pub(super) fn skip_statement(s: &mut Scanner, keyword: &[u8]) -> bool {
-    let is_name = NAMES.contains(&keyword);
+    let is_known = matches!(keyword, b"v" | b"f") || kind_of(keyword).is_some();
+    let continues = is_known && !NAMES.contains(&keyword);
     loop {
         let start = s.rest();
         s.skip_to_line_end();
         let line = &start[..start.len() - s.rest().len()];
         s.skip_line_break();
         let has_backslash = line.last() == Some(&b'\\');
-        if is_name || !has_backslash {
+        if !continues || !has_backslash {
             return has_backslash;
         }
     }
@@ -381,10 +382,14 @@ mod tests {
 
     #[test]
     fn a_backslash_that_ends_a_name_takes_no_line() {
-        for statement in ["usemtl Wood\\Dark\\", "mtllib C:\\a\\", "g left\\", "o x\\"] {
+        for statement in ["usemtl Wood\\Dark\\", "mtllib C:\\a\\", "g left\\", "o x\\", "blob \\"] {
             let loaded = parse(&format!("{TRIANGLE}{statement}\nf 1 2 3\n")).unwrap();
             assert_eq!(loaded.mesh.faces.len(), 1);
-            assert!(loaded.remarks[1].starts_with("a backslash ends the name on line 4"), "{:?}", loaded.remarks);
+            assert!(
+                loaded.remarks.len() == 2 && loaded.remarks[1].starts_with("a backslash ends line 4"),
+                "{:?}",
+                loaded.remarks
+            );
         }
         let loaded = parse("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 \\\r\n3\\").unwrap();
         assert_eq!(loaded.mesh.faces.face(0), [0, 1, 2]);
@@ -399,7 +404,7 @@ mod tests {
         }
         let utf_16: Vec<u8> = TRIANGLE.encode_utf16().flat_map(u16::to_le_bytes).collect();
         let text = read_bytes(&utf_16, Path::new("a.obj")).unwrap_err().to_string();
-        assert_eq!(text, "a.obj: not an OBJ file: it is text in UTF-16: save it as UTF-8 or ASCII");
+        assert_eq!(text, "a.obj: not an OBJ file: it is text in UTF-16 or UTF-32: save it as UTF-8 or ASCII");
     }
 
     #[test]

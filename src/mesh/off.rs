@@ -73,7 +73,9 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     let normals = header.normals.then(|| normals.decide(&header));
 
     let mut coloured = 0;
-    s.begin_rows();
+    if faces > 0 {
+        s.begin_rows();
+    }
     for f in 0..faces {
         let line = s.begin_row();
         let size: u64 =
@@ -450,6 +452,7 @@ mod tests {
             ("4 1 0\n0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n", "vertex 0 of 4 has fewer values on its line", ""),
             ("3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n3 2 1 0\n", "face 0 of 2 has fewer values on its line", ""),
             ("3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 2 1\n", "the line ends where a corner", ""),
+            ("2 0 0\n0 0 0\n1 0 0\n0 1 0\n", "data after the last", "faces: correct the counts in the header"),
             ("2 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "face 0 has 0 corners", "correct the counts in the header)"),
             ("2 1 0\n0 0 0 1 .5 0\n1 0 0 1 .5 0\n3 0 1 2\n", "face 0 has 1 corner,", announced),
         ] {

@@ -65,7 +65,7 @@ fn read_elements<V: Values>(elements: &[Element], mut values: V, lines: Option<L
     let mut normals = Vec::new();
     for element in elements {
         // Each row takes room in the file, so that the end of the file ends an absurd count.
-        if !element.properties.is_empty() {
+        if !element.properties.is_empty() && element.count > 0 {
             read_rows(element, &mut values, &mut builder, &mut normals)?;
         }
     }
