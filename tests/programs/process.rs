@@ -66,9 +66,9 @@ fn sizes_known_before_are_refused_with_the_numbers() {
         let line = limited(800_000, program, &arguments);
         assert!(line.contains("matrix with 500") && line.contains(" MB of memory"), "{line}");
     }
-    for (levels, size) in [(12, "32-bit indices"), (9, "MB of memory")] {
-        let line = limited(800_000, INTERPOLATE, &format!("icosahedron --subdivide {levels} -o a.obj"));
-        assert!(line.contains("faces") && line.contains(size), "{line}");
+    for (mesh, size) in [("icosphere:2", "32-bit indices"), ("icosahedron", "GB of memory")] {
+        let line = limited(800_000, INTERPOLATE, &format!("{mesh} --subdivide 12 -o a.obj"));
+        assert!(line.contains("after 12 refinements") && line.contains("faces") && line.contains(size), "{line}");
     }
     let line = limited(300_000, INTERPOLATE, "torus:1000x5000 -o a.obj");
     assert!(line.contains("20000000 corners") && line.contains("MB of memory"), "{line}");
