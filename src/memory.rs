@@ -8,6 +8,8 @@ use crate::error::{Error, Result};
 
 /// Less than this is not looked at, since to look takes longer than the work.
 const SMALL: u64 = 16 << 20;
+/// What a process takes beside the arrays that are counted: buffers, small arrays, what its allocator leaves unused.
+const BESIDE: u64 = 16 << 20;
 
 /// Passes if `bytes` of memory are available: as the system and the control group of the process tell, in one piece of
 /// addresses (`ulimit -v`). `what` names what needs them, as the subject of a sentence; `advice` is what to do.
@@ -18,11 +20,20 @@ pub(crate) fn require(bytes: u64, what: impl FnOnce() -> String, advice: &'stati
     if bytes < SMALL {
         return Ok(());
     }
-    let available = physical().min(addresses(bytes));
-    if bytes <= available {
+    let needed = bytes + BESIDE;
+    let available = physical().min(addresses(needed));
+    if needed <= available {
         return Ok(());
     }
-    Err(Error::Memory { what: what(), needed: bytes, available, advice })
+    Err(Error::Memory { what: what(), needed, available, advice })
+}
+
+/// Passes if a small computation finds room: that is looked at once, by the program.
+///
+/// # Errors
+/// As [`require`].
+pub(crate) fn require_small() -> Result<()> {
+    require(SMALL, || "the program".into(), "raise the limit (ulimit -v)")
 }
 
 /// The memory that the system can give without taking it from another process; all of it where that is not known.

@@ -10,6 +10,7 @@ use std::thread;
 use rayon::{ThreadBuilder, ThreadPoolBuilder};
 
 use crate::error::{Error, Result};
+use crate::memory::require_small;
 
 /// Runs a program's body: exit status 0, or 1 with the one line `error: …` on standard error. Bad arguments end
 /// with 2 in clap, before.
@@ -33,7 +34,7 @@ pub fn say(text: impl Display) {
 /// that it gives do the work; where it refuses all, the main thread does. Results do not depend on it.
 ///
 /// # Errors
-/// If threads were started before.
+/// If threads were started before; if memory is short already.
 pub(super) fn start_threads(asked: Option<u16>, remark: impl Fn(String)) -> Result<()> {
     let processors = thread::available_parallelism().map_or(1, usize::from);
     let wanted = asked.map_or(processors, usize::from).min(processors);
@@ -61,7 +62,7 @@ pub(super) fn start_threads(asked: Option<u16>, remark: impl Fn(String)) -> Resu
     built.map_err(|e| Error::Computation(format!("cannot start threads: {e}")))?;
     // An allocator may set addresses aside for every thread that comes to it: now, so that what is available is known.
     rayon::broadcast(|_| drop(black_box(vec![0u8; 64])));
-    Ok(())
+    require_small()
 }
 
 /// From now on SIGHUP, SIGINT and SIGTERM remove temporary files and say which files are complete, before they end the

@@ -137,7 +137,8 @@ impl Refinement {
         let count = |n: usize| n as u64;
         let (mut vertices, mut faces, mut corners) =
             (count(mesh.len()), count(mesh.faces.len()), count(mesh.faces.corners().len()));
-        for level in 1..=levels {
+        let mut bytes = 0u64;
+        for _ in 0..levels {
             let edges = corners / 2;
             // Before a step the coarse mesh and its topology are there, after it the fine mesh.
             let coarse = 24 * vertices + 24 * corners;
@@ -147,15 +148,19 @@ impl Refinement {
                 Refinement::DooSabin => (corners, faces + edges + vertices, 4 * corners),
                 Refinement::Sqrt3 | Refinement::LabsikGreiner => (vertices + faces, 3 * faces, 3 * corners),
             };
-            let what = || format!("level {level} of {levels} with {faces} faces and {vertices} vertices");
-            if u32::try_from(corners).is_err() {
-                return Err(Error::Computation(format!(
-                    "{} would have {corners} corners, more than 32-bit indices reach: refine fewer levels",
-                    what()
-                )));
+            bytes = coarse + 24 * vertices + 4 * faces + 4 * corners;
+            if corners > u64::from(u32::MAX) {
+                break;
             }
-            require(coarse + 24 * vertices + 4 * faces + 4 * corners, what, "refine fewer levels")?;
         }
+        let what = || format!("the surface after {levels} refinements with {faces} faces and {vertices} vertices");
+        if corners > u64::from(u32::MAX) {
+            return Err(Error::Computation(format!(
+                "a surface after {levels} refinements has {faces} faces or more, which 32-bit indices do not reach: \
+                 refine fewer levels"
+            )));
+        }
+        require(bytes, what, "refine fewer levels")?;
         Ok(())
     }
 

@@ -50,7 +50,7 @@ fn sizes_known_before_are_refused_with_the_numbers() {
     let folder = tempdir().unwrap();
     let limited = |kilobytes: usize, program: &str, arguments: &str| {
         let start = Instant::now();
-        let line = format!("ulimit -v {kilobytes}; \"$0\" {arguments} --quiet");
+        let line = format!("ulimit -v {kilobytes}; \"$0\" {arguments} --quiet --threads 2");
         let refused = assert_refused(&shell(folder.path(), program, &line), &line);
         assert!(start.elapsed() < Duration::from_secs(60), "{line}");
         refused
@@ -66,9 +66,9 @@ fn sizes_known_before_are_refused_with_the_numbers() {
         let line = limited(800_000, program, &arguments);
         assert!(line.contains("matrix with 500") && line.contains(" MB of memory"), "{line}");
     }
-    for (levels, size) in [(12, "32-bit indices"), (9, "MB of memory")] {
-        let line = limited(800_000, INTERPOLATE, &format!("icosahedron --subdivide {levels} -o a.obj"));
-        assert!(line.contains("faces") && line.contains(size), "{line}");
+    for (mesh, size) in [("icosphere:2", "32-bit indices"), ("icosahedron", "GB of memory")] {
+        let line = limited(800_000, INTERPOLATE, &format!("{mesh} --subdivide 12 -o a.obj"));
+        assert!(line.contains("after 12 refinements") && line.contains("faces") && line.contains(size), "{line}");
     }
     let line = limited(300_000, INTERPOLATE, "torus:1000x5000 -o a.obj");
     assert!(line.contains("20000000 corners") && line.contains("MB of memory"), "{line}");
@@ -80,7 +80,7 @@ fn short_memory_is_one_line_of_error() {
     let folder = tempdir().unwrap();
     for kilobytes in [60_000, 90_000, 120_000, 160_000] {
         for mesh in ["irregular-quad:200000", "irregular-poly:200000"] {
-            let line = format!("ulimit -v {kilobytes}; \"$0\" {mesh} -o a.ply --quiet");
+            let line = format!("ulimit -v {kilobytes}; \"$0\" {mesh} -o a.ply --quiet --threads 2");
             assert_done_or_refused(&shell(folder.path(), INTERPOLATE, &line), &line);
         }
     }
