@@ -32,7 +32,7 @@ use rayon::prelude::*;
 pub use incidence::Incidence;
 pub use topology::Topology;
 
-/// Faces of one task.
+/// Faces or points of one task.
 const CHUNK: usize = 1 << 16;
 
 /// A polygon mesh: one position a vertex, faces of any size as vertex indices in counter-clockwise order
@@ -221,10 +221,8 @@ impl Mesh {
 
 /// The corners of the smallest axis-parallel box around all finite points.
 pub fn bounding_box(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
-    points.iter().filter(|p| p.is_finite()).fold(None, |bounds, &p| match bounds {
-        None => Some((p, p)),
-        Some((lo, hi)) => Some((p.min(lo), p.max(hi))),
-    })
+    let finite = points.par_iter().with_min_len(CHUNK).filter(|p| p.is_finite());
+    finite.map(|&p| (p, p)).reduce_with(|(lo, hi), (least, most)| (lo.min(least), hi.max(most)))
 }
 
 #[cfg(test)]
