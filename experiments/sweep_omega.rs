@@ -3,7 +3,10 @@
 #[path = "common/sweep.rs"]
 mod common;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use clap::Parser;
 use serde_json::{Map, Value, json};
@@ -73,19 +76,23 @@ fn run(arguments: &Arguments) -> Result<()> {
             continue;
         };
         let stop = input.stop(&arguments.stop)?;
-        let sweep = sweep_one(&input, arguments, &stop)?;
-        let table = common::table(
-            input.stem("sweep-omega"),
-            format!("ω sweep on {} under {}", input.label, input.scheme),
-            format!(
-                "{} vertices, {} faces; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:.3e} (mesh units).",
-                input.mesh.len(),
-                input.mesh.faces.len(),
-                stop.tolerance * input.frame.scale()
-            ),
-            &sweep,
-        );
-        table.write(&arguments.output.out)?;
+        let table = |sweep: &Sweep| {
+            common::table(
+                input.stem("sweep-omega"),
+                format!("ω sweep on {} under {}", input.label, input.scheme),
+                format!(
+                    "{} vertices, {} faces; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:.3e} (mesh units).",
+                    input.mesh.len(),
+                    input.mesh.faces.len(),
+                    stop.tolerance * input.frame.scale()
+                ),
+                sweep,
+            )
+        };
+        let write = |sweep: &Sweep| table(sweep).write(&arguments.output.out);
+        let sweep = sweep_one(&input, arguments, &stop, &write)?;
+        write(&sweep)?;
+        let table = table(&sweep);
         let title = format!("{} under {}", input.label, input.scheme);
         common::plot(title, &arguments.method.0, &sweep)
             .render()?
@@ -98,8 +105,16 @@ fn run(arguments: &Arguments) -> Result<()> {
     cli::finish(results, &arguments.output, &arguments.common)
 }
 
-/// The sweep, its errors in mesh units.
-fn sweep_one(input: &Input, arguments: &Arguments, stop: &Stop) -> Result<Sweep> {
+/// Between two times that the rows which are there are written.
+const PAUSE: Duration = Duration::from_secs(2);
+
+/// The sweep, its errors in mesh units. What there is of a long one is written now and then, so that it may be stopped.
+fn sweep_one(
+    input: &Input,
+    arguments: &Arguments,
+    stop: &Stop,
+    write: &(dyn Fn(&Sweep) -> Result<Vec<PathBuf>> + Sync),
+) -> Result<Sweep> {
     let system = input.system()?;
     let order = arguments.order.order(&input.mesh, &input.topology().incidence);
     let grids: Vec<(Method, Vec<f64>)> = arguments
@@ -113,19 +128,31 @@ fn sweep_one(input: &Input, arguments: &Arguments, stop: &Stop) -> Result<Sweep>
         .collect();
     let runs = grids.iter().map(|(_, g)| g.len()).sum();
     let progress = Progress::new(&input.name, runs, arguments.common.quiet);
-    let mut found = sweep(
+    let in_mesh_units = |mut sweep: Sweep| {
+        for row in &mut sweep.rows {
+            row.errors = row.errors * input.frame.scale();
+        }
+        sweep
+    };
+    let written = Mutex::new(Instant::now());
+    let found = sweep(
         &system,
         &input.mesh.positions,
         &grids,
         Some(&order),
         stop,
         rounding_floor(input.mesh.diagonal()),
-        &|| progress.step(),
+        &|so_far| {
+            progress.step();
+            let mut written = written.lock().unwrap_or_else(PoisonError::into_inner);
+            if written.elapsed() >= PAUSE {
+                // If this fails, so does the end, which says it.
+                let _ = write(&in_mesh_units(so_far.clone()));
+                *written = Instant::now();
+            }
+        },
     )?;
-    for row in &mut found.rows {
-        row.errors = row.errors * input.frame.scale();
-    }
-    Ok(found)
+    Ok(in_mesh_units(found))
 }
 
 fn json(input: &Input, arguments: &Arguments, sweep: &Sweep) -> Value {

@@ -78,7 +78,7 @@ fn one(context: &mut Context, subject: &Subject, scheme: Scheme, summary: &mut T
     let grids: Vec<(Method, Vec<f64>)> = METHODS.iter().map(|&m| (m, common::default_grid(m))).collect();
     let size = subject.mesh.diagonal();
     let stop = Stop { tolerance: TOLERANCE * size, max_iterations: LIMIT };
-    let found = sweep(&system, &subject.mesh.positions, &grids, None, &stop, rounding_floor(size), &|| {})?;
+    let found = sweep(&system, &subject.mesh.positions, &grids, None, &stop, rounding_floor(size), &|_| {})?;
     for &method in &METHODS {
         let thresholds = found.thresholds.iter().find(|t| t.method == method);
         let best = found.best(method);

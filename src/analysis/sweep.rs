@@ -1,5 +1,7 @@
 //! ω sweeps: iterations and rates over a grid of ω, with the predicted spectral radius beside them.
 
+use std::sync::{Mutex, PoisonError};
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -60,7 +62,8 @@ pub fn rounding_floor(diagonal: f64) -> f64 {
 /// Runs every method at every ω of its grid, in parallel over the grid.
 ///
 /// `grids` pairs a method (Jacobi, PIA or SOR) with its values of ω; `order` is the vertex order of SOR;
-/// `floor` the rounding level of the errors; `done` is called after each run.
+/// `floor` the rounding level of the errors; `done` is called after each run, with the rows that are there so far, in the
+/// order of the grids.
 ///
 /// # Errors
 /// If an eigenvalue computation does not converge.
@@ -74,7 +77,7 @@ pub fn sweep(
     order: Option<&[u32]>,
     stop: &Stop,
     floor: f64,
-    done: &(dyn Fn() + Sync),
+    done: &(dyn Fn(&Sweep) + Sync),
 ) -> Result<Sweep> {
     let spectrum = spectrum(system)?;
     let mut thresholds = Vec::new();
@@ -88,31 +91,36 @@ pub fn sweep(
     }
     let jobs: Vec<(Method, f64)> =
         grids.iter().flat_map(|(method, omegas)| omegas.iter().map(|&omega| (*method, omega))).collect();
-    let rows: Result<Vec<Row>> = jobs
-        .par_iter()
-        .map(|&(method, omega)| {
-            let setup = match method {
-                Method::Jacobi => Setup::Jacobi { omega },
-                Method::Pia => Setup::Pia { omega },
-                Method::Sor => Setup::Sor { omega, order },
-                other => panic!("{other} is not swept over ω"),
-            };
-            let report = run(system, points, setup, stop).report;
-            let predicted = predicted_rate(system, &spectrum, setup)?;
-            let maxima: Vec<f64> = report.history.iter().map(|e| e.max).collect();
-            let data = thresholds.iter().find(|t| t.method == method).and_then(|t| t.data);
-            done();
-            Ok(Row {
-                method,
-                omega,
-                outcome: report.outcome,
-                iterations: report.iterations,
-                predicted_rho: predicted.unwrap_or(f64::NAN),
-                predicted_rho_data: data.map(|d| d.radius(omega)),
-                observed_rate: observed_rate(&maxima, floor),
-                errors: report.last(),
-            })
-        })
-        .collect();
-    Ok(Sweep { spectrum, thresholds, rows: rows? })
+    // Beside the rows, the number of each.
+    let found = Mutex::new((Sweep { spectrum, thresholds: thresholds.clone(), rows: Vec::new() }, Vec::new()));
+    jobs.par_iter().enumerate().try_for_each(|(number, &(method, omega))| -> Result<()> {
+        let setup = match method {
+            Method::Jacobi => Setup::Jacobi { omega },
+            Method::Pia => Setup::Pia { omega },
+            Method::Sor => Setup::Sor { omega, order },
+            other => panic!("{other} is not swept over ω"),
+        };
+        let report = run(system, points, setup, stop).report;
+        let predicted = predicted_rate(system, &spectrum, setup)?;
+        let maxima: Vec<f64> = report.history.iter().map(|e| e.max).collect();
+        let data = thresholds.iter().find(|t| t.method == method).and_then(|t| t.data);
+        let row = Row {
+            method,
+            omega,
+            outcome: report.outcome,
+            iterations: report.iterations,
+            predicted_rho: predicted.unwrap_or(f64::NAN),
+            predicted_rho_data: data.map(|d| d.radius(omega)),
+            observed_rate: observed_rate(&maxima, floor),
+            errors: report.last(),
+        };
+        let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
+        let (sweep, numbers) = &mut *found;
+        let place = numbers.partition_point(|&n| n < number);
+        numbers.insert(place, number);
+        sweep.rows.insert(place, row);
+        done(sweep);
+        Ok(())
+    })?;
+    Ok(found.into_inner().unwrap_or_else(PoisonError::into_inner).0)
 }

@@ -6,7 +6,7 @@ use super::{Faces, Incidence};
 
 /// The colours of [`Order::Multicolour`](super::order::Order::Multicolour), one after the other, each [breadth
 /// first](breadth_first): sweeps by colours give the same iterates as in that order, and neighbours lie together in
-/// memory whatever the file's order is. O(Σ|F|²).
+/// memory whatever the file's order is. O(C log C) for C corners.
 ///
 /// ```
 /// use limitlab::mesh::{Incidence, builtin, colours::in_colours};

@@ -1,5 +1,6 @@
 //! Vertex orders, for sweeps in place and for renumbering: order `o` puts vertex `o[k]` at the k-th place.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::str::FromStr;
 
@@ -114,29 +115,68 @@ impl Order {
     }
 }
 
-/// The least colour for every vertex, in the file's order, that no earlier vertex of its faces has. O(Σ|F|²).
+/// The least colour for every vertex, in the file's order, that no earlier vertex of its faces has. O(C log C) for C
+/// corners.
 pub fn colouring(faces: &Faces, incidence: &Incidence) -> Vec<u32> {
     const NONE: u32 = u32::MAX;
     let mut colour = vec![NONE; incidence.vertices()];
-    // The last vertex that met a colour among its neighbours.
-    let mut met: Vec<u32> = Vec::new();
+    let mut palettes: Vec<Option<Palette>> = Vec::new();
+    if (0..faces.len()).any(|f| faces.range(f).len() > LARGE) {
+        palettes.extend((0..faces.len()).map(|f| (faces.range(f).len() > LARGE).then(Palette::default)));
+    }
+    // The last vertex among whose neighbours a colour was found.
+    let mut found: Vec<u32> = Vec::new();
     for v in 0..incidence.vertices() {
-        for &c in incidence.corners_at(v) {
-            for &w in faces.face(incidence.face_of(c)) {
+        let at = || incidence.corners_at(v).iter().map(|&c| incidence.face_of(c));
+        let palette = |f: usize| palettes.get(f).and_then(Option::as_ref);
+        let mut free = 0;
+        for f in at() {
+            if let Some(palette) = palette(f) {
+                free = free.max(palette.least_free);
+                continue;
+            }
+            for &w in faces.face(f) {
                 let taken = colour[w as usize];
                 if taken != NONE {
-                    met[taken as usize] = v as u32;
+                    found[taken as usize] = v as u32;
                 }
             }
         }
-        let free = met.iter().position(|&last| last != v as u32);
-        let free = free.unwrap_or(met.len());
-        if free == met.len() {
-            met.push(NONE);
+        let is_taken = |colour: u32| {
+            found.get(colour as usize) == Some(&(v as u32))
+                || at().any(|f| palette(f).is_some_and(|palette| palette.colours.contains(&colour)))
+        };
+        while is_taken(free) {
+            free += 1;
         }
-        colour[v] = free as u32;
+        if free as usize >= found.len() {
+            found.resize(free as usize + 1, NONE);
+        }
+        colour[v] = free;
+        if !palettes.is_empty() {
+            at().for_each(|f| palettes[f].iter_mut().for_each(|palette| palette.add(free)));
+        }
     }
     colour
+}
+
+/// Faces of more corners keep the colours of theirs, instead of being looked through at each.
+const LARGE: usize = 16;
+
+/// The colours of one face.
+#[derive(Clone, Debug, Default)]
+struct Palette {
+    colours: BTreeSet<u32>,
+    least_free: u32,
+}
+
+impl Palette {
+    fn add(&mut self, colour: u32) {
+        self.colours.insert(colour);
+        while self.colours.contains(&self.least_free) {
+            self.least_free += 1;
+        }
+    }
 }
 
 /// The place of every vertex: `inverse(o)[o[k]] = k`.
@@ -258,6 +298,29 @@ mod tests {
 
     fn shuffled(mesh: &Mesh) -> Mesh {
         permute_vertices(mesh, &ordered(Order::Random(3), mesh))
+    }
+
+    #[test]
+    fn colours_are_the_least_that_no_earlier_vertex_of_a_face_has() {
+        let large = ["prism:40", "bipyramid:40"].map(|name| builtin::builtin(name).unwrap());
+        let meshes = (0..40).map(random_polygons).chain(large.iter().flat_map(|mesh| [mesh.clone(), shuffled(mesh)]));
+        for mesh in meshes {
+            let colour = colouring(&mesh.faces, &Incidence::new(&mesh.faces, mesh.len()));
+            let mut taken = vec![BTreeSet::new(); mesh.len()];
+            for v in 0..mesh.len() {
+                let least = (0..).find(|c| !taken[v].contains(c)).unwrap();
+                assert_eq!(colour[v], least, "vertex {v}");
+                for face in mesh.faces.iter().filter(|face| face.contains(&(v as u32))) {
+                    for &w in face {
+                        taken[w as usize].insert(least);
+                    }
+                }
+            }
+        }
+        // Linear in the corners, or this would not end.
+        let prism = builtin::builtin("prism:100000").unwrap();
+        let colour = colouring(&prism.faces, &Incidence::new(&prism.faces, prism.len()));
+        assert!(colour.iter().max() >= Some(&99_999));
     }
 
     #[test]

@@ -66,7 +66,7 @@ fn torus_sweep(grid: &[f64]) -> Sweep {
     let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 20_000 };
     let floor = rounding_floor(mesh.diagonal());
     let grids = [(Method::Jacobi, grid.to_vec())];
-    sweep(&system, &mesh.positions, &grids, None, &stop, floor, &|| {}).unwrap()
+    sweep(&system, &mesh.positions, &grids, None, &stop, floor, &|_| {}).unwrap()
 }
 
 /// On noisy points the constant vector, which has 9/4, is not excited; its neighbours in frequency are.
