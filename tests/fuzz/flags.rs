@@ -143,7 +143,7 @@ const PROGRAMS: &[Program] = &[
         name: "scaling",
         meshes: 0,
         needed: &[
-            ("--sizes", "100|130,100|0|7|x|"),
+            ("--sizes", "0|7|x||100"),
             ("--profile", "0"),
             ("--gains", "0"),
             ("--steps", "0|100"),

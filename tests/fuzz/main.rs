@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 
 #[test]
 fn readers() {
-    replay("readers", 5000, readers::check);
+    replay("readers", 20_000, readers::check);
 }
 
 #[test]
@@ -28,7 +28,7 @@ fn meshes() {
 #[test]
 fn flags() {
     let programs = Path::new(env!("CARGO_BIN_EXE_interpolate")).parent().unwrap();
-    replay("flags", 60, |data| flags::check(data, programs));
+    replay("flags", 30, |data| flags::check(data, programs));
 }
 
 /// Checks the committed inputs of a target and then `mutants` of them. The last line printed names what failed.

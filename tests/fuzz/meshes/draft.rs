@@ -190,18 +190,27 @@ impl Draft {
     /// The two ends of a side become one vertex; a triangle there becomes an edge.
     fn contract_side(&mut self, f: usize, k: usize) {
         let [v, w] = self.side(f, k);
-        let last = self.vertices as u32 - 1;
+        self.identify(v, w);
         for face in &mut self.faces {
-            face.iter_mut().filter(|x| **x == w).for_each(|x| *x = v);
             face.dedup();
             if face.len() > 1 && face[0] == face[face.len() - 1] {
                 face.pop();
             }
-            // The last vertex takes the number that is free.
-            face.iter_mut().filter(|x| **x == last).for_each(|x| *x = w);
         }
         self.faces.retain(|face| face.len() >= 3);
+    }
+
+    /// Two vertices become one. The last vertex takes the number that is free.
+    fn identify(&mut self, v: u32, w: u32) {
         self.vertices -= 1;
+        for x in self.faces.iter_mut().flatten() {
+            if *x == w {
+                *x = v;
+            }
+            if *x as usize == self.vertices {
+                *x = w;
+            }
+        }
     }
 
     /// A new vertex of valence 2.
@@ -243,7 +252,14 @@ impl Draft {
             2 => self.faces.push(self.faces[f].clone()),
             3 => self.faces[f][k] = u.int_in_range(0..=self.vertices as u32)?,
             4 => self.vertices += 1,
-            _ => {}
+            _ => {
+                let g = u.choose_index(self.faces.len())?;
+                let (v, w) = (self.faces[f][k], self.faces[g][0]);
+                if v != w {
+                    // Two umbrellas at one vertex, if the faces are apart.
+                    self.identify(v, w);
+                }
+            }
         }
         Ok(())
     }
