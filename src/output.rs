@@ -54,6 +54,29 @@ pub fn check_target(path: &Path) -> Result<()> {
     check().map_err(|e| Error::io(path, "write", e))
 }
 
+/// Lets a read-only file be replaced by [`write_file`]: its owner may write to it from now on. Any other file is left as
+/// it is.
+///
+/// # Errors
+/// [`Error::Io`] naming `path`, if the file is not ours.
+pub fn allow_replacing(path: &Path) -> Result<()> {
+    let allow = || {
+        let mut permissions = fs::metadata(path)?.permissions();
+        if !permissions.readonly() {
+            return Ok(());
+        }
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            permissions.set_mode(permissions.mode() | 0o200);
+        }
+        #[cfg(not(unix))]
+        permissions.set_readonly(false);
+        fs::set_permissions(path, permissions)
+    };
+    allow().map_err(|e| Error::io(path, "write", e))
+}
+
 /// Creates a folder and the folders above it, and makes sure that files can be written there; one that is there already
 /// is fine.
 ///
@@ -342,6 +365,9 @@ mod tests {
         }
         assert_eq!(fs::read_to_string(&protected).unwrap(), "mine");
         check_target(&folder.path().join("fresh")).unwrap();
+        allow_replacing(&protected).unwrap();
+        check_target(&protected).unwrap();
+        write(&protected, "ours").unwrap();
         assert_eq!(names(folder.path()), ["protected"]);
     }
 

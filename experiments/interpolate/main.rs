@@ -5,7 +5,7 @@ mod surfaces;
 mod tell;
 mod wishes;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -19,7 +19,7 @@ use limitlab::error::Error;
 use limitlab::interpolate::surface::refinement;
 use limitlab::mesh::io;
 use limitlab::mesh::order::Order;
-use limitlab::output::check_target;
+use limitlab::output::{allow_replacing, check_target};
 use limitlab::solvers::Method;
 use limitlab::subdivide::Refinement;
 
@@ -198,9 +198,18 @@ fn main() -> ExitCode {
     })
 }
 
+/// Whether the output is the input: who names one file twice wants it replaced, read-only or not (as by `sed -i`).
+fn is_file_of(input: &str, output: &Path) -> bool {
+    let [input, output] = [Path::new(input), output].map(|path| path.canonicalize().ok());
+    input.is_some_and(|input| output.is_some_and(|output| input == output && input.is_file()))
+}
+
 fn run(arguments: &Arguments) -> Result<()> {
     io::check_name(&arguments.output)?;
-    check_target(&arguments.output)?;
+    let in_place = is_file_of(&arguments.input, &arguments.output);
+    if !in_place {
+        check_target(&arguments.output)?;
+    }
     let Some(input) = arguments.mesh.input(&arguments.input, &arguments.common)? else {
         return Ok(());
     };
@@ -228,6 +237,9 @@ fn run(arguments: &Arguments) -> Result<()> {
 
     let start = Instant::now();
     let normals = result.surface.normals.as_deref();
+    if in_place {
+        allow_replacing(&arguments.output)?;
+    }
     io::write(&arguments.output, &result.surface.mesh, normals)?;
     result.seconds.write = start.elapsed().as_secs_f64();
     tell(arguments, &input, &wishes, &result)
