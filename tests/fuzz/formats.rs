@@ -8,11 +8,14 @@ use limitlab::Result;
 use limitlab::mesh::io::Loaded;
 use limitlab::mesh::{Mesh, obj, off, ply};
 
+type Read = fn(&[u8], &Path) -> Result<Loaded>;
+type WriteTo = fn(&mut dyn Write, &Mesh, Option<&[DVec3]>) -> std::io::Result<()>;
+
 /// A mesh format: what reads it, and what writes it.
 pub struct Format {
     pub ending: &'static str,
-    pub read: fn(&[u8], &Path) -> Result<Loaded>,
-    pub write: fn(&mut dyn Write, &Mesh, Option<&[DVec3]>) -> std::io::Result<()>,
+    pub read: Read,
+    pub write: WriteTo,
 }
 
 pub const FORMATS: [Format; 3] = [
