@@ -8,7 +8,7 @@ use limitlab::analysis::bracket::{bracket, element_bound};
 use limitlab::analysis::certificate::{certify, eigenvalues_below};
 use limitlab::analysis::eigen::{End, Request, extreme};
 use limitlab::analysis::interval::interval;
-use limitlab::analysis::order_study::{gauss_southwell, order_study, random_spread};
+use limitlab::analysis::order_study::{self, gauss_southwell, order_study, random_spread};
 use limitlab::analysis::promise::Promise;
 use limitlab::analysis::radius::spectral_radius;
 use limitlab::analysis::singularity::{Prediction, Singularity, modes, numerical_kernel_dimension};
@@ -457,6 +457,22 @@ fn certificates_lie_below_the_spectrum_and_close() {
     }
 }
 
+/// On a torus the diagonal of S is 4/9 and its rows sum to 1: what rounding may hide, by the theorem's formula.
+#[test]
+fn the_margin_of_a_certificate_is_that_of_the_theorem() {
+    let system = assemble(&named("torus:20x14"), Scheme::CatmullClark);
+    let (n, u) = (280.0, 0.5 * f64::EPSILON);
+    for (end, estimate, outwards) in [(End::Lowest, 1.0 / 9.0, -1.0), (End::Highest, 1.0, 1.0)] {
+        let found = certify(&system, Operator::A, end, estimate).expect("small").expect("an end");
+        let gamma = (n + 1.0) * u / (1.0 - (n + 1.0) * u);
+        let factor = gamma / (1.0 - gamma) * n * (4.0 / 9.0 - found.sigma).abs();
+        let entries = 6.0 * u * (1.0 + found.sigma.abs());
+        assert!((found.margin / (factor + entries) - 1.0).abs() < 1e-9, "{found:?}");
+        assert!((found.bound - (found.sigma + outwards * found.margin)).abs() < u);
+        assert!((found.sigma - estimate - outwards * 1e-8 * estimate).abs() < 1e-6 * 1e-8, "{found:?}");
+    }
+}
+
 #[test]
 fn odd_prisms_are_certified_where_the_valence_bound_is_nothing() {
     for k in [5, 9, 21, 101] {
@@ -506,6 +522,40 @@ fn the_detective_knows_its_suspects() {
     for scheme in [Scheme::Nasri, Scheme::ZhengCai] {
         assert!(!Singularity::detect(&mesh, &topology, scheme).is_singular());
     }
+}
+
+/// A cube with one corner moved by δ has a part δ/8 along ±1, which no control points reach.
+#[test]
+fn a_part_out_of_reach_is_told_from_rounding() {
+    let verdict = |mesh: &Mesh| {
+        let topology = Topology::new(&mesh.faces, mesh.len());
+        Singularity::detect(mesh, &topology, Scheme::CatmullClark)
+    };
+    for size in [1.0, 1e-6, 1e6] {
+        let mut cube = named("cube");
+        cube.positions.iter_mut().for_each(|p| *p *= size);
+        for moved in [1e-2, 1e-4, 1e-6, 1e-9, 1e-12] {
+            let mut mesh = cube.clone();
+            mesh.positions[5].y += moved * size;
+            let found = verdict(&mesh);
+            assert!(found.excited, "{moved:e} of {size:e}");
+            let part = found.singular[0].unreachable;
+            assert!((part.length() - moved * size / 8.0).abs() < 1e-15 * size, "{moved:e} of {size:e}: {part}");
+            if moved >= 1e-9 {
+                // What is left of the error at the end, at every vertex.
+                let stop = Stop { tolerance: 1e-3 * moved * size, max_iterations: 1000 };
+                let system = assemble(&mesh, Scheme::CatmullClark);
+                let report = run(&system, &mesh.positions, Setup::Pia { omega: 1.0 }, &stop).report;
+                assert_ne!(report.outcome, Outcome::Converged);
+                assert!((report.last().mean / part.length() - 1.0).abs() < 1e-3, "{moved:e} of {size:e}");
+            }
+        }
+        // Turned, so that the coordinates are rounded.
+        let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -0.7);
+        cube.positions.iter_mut().for_each(|p| *p = turn * *p);
+        assert!(!verdict(&cube).excited, "{size:e}");
+    }
+    assert!(!verdict(&named("prism:1000")).excited);
 }
 
 #[test]
@@ -647,6 +697,61 @@ fn greedy_and_ordered_sweeps_solve_the_same_system() {
         let rho = |name: &str| rows.iter().find(|r| r.order == name).and_then(|r| r.rho);
         let (forward, backward) = (rho("file").expect("a row"), rho("reverse").expect("a row"));
         assert!((forward - backward).abs() < 1e-6 * forward);
+    }
+}
+
+#[test]
+fn the_spread_is_that_of_the_random_orders_at_one_omega() {
+    let row = |order: &str, omega, rho, iterations| order_study::Row {
+        order: order.into(),
+        omega,
+        rho: Some(rho),
+        outcome: Outcome::Converged,
+        iterations,
+        max_error: 0.0,
+    };
+    let rows = [
+        row("file", 1.0, 0.1, 1.0),
+        row("random:1", 1.0, 0.5, 20.0),
+        row("random:2", 1.0, 0.25, 26.0),
+        row("random:3", 1.0, 0.75, 23.0),
+        row("random:1", 1.1, 0.9, 90.0),
+    ];
+    let found = random_spread(&rows, 1.0).expect("three rows");
+    assert_eq!((found.omega, found.runs), (1.0, 3));
+    assert_eq!((found.rho, found.iterations), ([0.25, 0.5, 0.75], [20.0, 23.0, 26.0]));
+    assert_eq!(random_spread(&rows, 1.1).expect("a row").rho, [0.9; 3]);
+    assert_eq!(random_spread(&rows, 1.2), None);
+}
+
+#[test]
+fn greedy_sweeps_count_as_many_updates_as_there_are_vertices() {
+    let mut mesh = named("torus:8x6");
+    add_noise(&mut mesh, 0.1, 1);
+    let system = assemble(&mesh, Scheme::CatmullClark);
+    for sweeps in [0, 1, 3] {
+        let stop = Stop { tolerance: 0.0, max_iterations: sweeps };
+        let greedy = gauss_southwell(&system, &mesh.positions, &stop);
+        assert_eq!((greedy.outcome, greedy.updates), (Outcome::MaxIterations, 48 * sweeps));
+    }
+}
+
+/// Without a proven bound the interval starts a little below the computed λ_min, or at 10⁻³ where that vanishes.
+#[test]
+fn an_estimated_chebyshev_interval_holds_the_spectrum() {
+    for name in ["prism:5", "dodecahedron", "cube"] {
+        let system = assemble(&named(name), Scheme::CatmullClark);
+        assert_eq!(system.bounds.lambda_min, 0.0);
+        let least = dense::eigenvalues(&system).expect("small").a[0];
+        let spectrum = || limitlab::analysis::spectrum::spectrum(&system);
+        let setup = comparison::standard_setup(&system, Method::Chebyshev, None, &spectrum).expect("dense spectra");
+        let Setup::Chebyshev { spectrum: (low, high) } = setup else { panic!("{setup:?}") };
+        assert_eq!(high, 1.0);
+        if name == "cube" {
+            assert_eq!(low, 1e-3);
+        } else {
+            assert!((0.95 * least..0.99 * least).contains(&low), "{name}: {low} for {least}");
+        }
     }
 }
 

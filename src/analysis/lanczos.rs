@@ -394,8 +394,50 @@ mod tests {
             let limits = Limits { max_steps, tolerance: 1e-15, ..LIMITS };
             let run = extremes(&diagonal(&values), start.clone(), limits).expect("a good start");
             assert!(run.low.residual >= run.low.error);
-            assert!(run.low.value <= run.low.residual, "{run:?}");
+            // The lowest eigenvalue is 0: the value is its error.
+            assert!(run.low.value <= run.low.error, "{run:?}");
         }
+    }
+
+    /// By the definition, from all eigenvalues and vectors of the projected matrix.
+    #[test]
+    fn the_error_estimate_is_the_least_of_the_clusters() {
+        use nalgebra::{DMatrix, SymmetricEigen};
+        let mut wider = 0;
+        // Two values near 0, a third one far away, and a residual that is larger than the distance of the two.
+        let pairs = [1.0, -1.0]
+            .into_iter()
+            .flat_map(|far| [1e-2, 1e-3, 1e-5].map(|near| (vec![far, 0.0, 0.0], vec![near, near, 10.0 * near])));
+        let wave = |i: usize| (1.7 * i as f64).sin();
+        let others = (3..20).map(|k| ((0..k).map(wave).collect(), (k..2 * k).map(|i| 0.2 + 0.1 * wave(i)).collect()));
+        for (alphas, betas) in pairs.chain(others) {
+            let (alphas, betas): (Vec<f64>, Vec<f64>) = (alphas, betas);
+            let k = alphas.len();
+            let dense = DMatrix::from_fn(k, k, |i, j| match i.abs_diff(j) {
+                0 => alphas[i],
+                1 => betas[i.min(j)],
+                _ => 0.0,
+            });
+            let eigen = SymmetricEigen::new(dense);
+            let mut pairs: Vec<(f64, f64)> =
+                (0..k).map(|j| (eigen.eigenvalues[j], eigen.eigenvectors[(k - 1, j)])).collect();
+            pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let (low, high) = projected(&alphas, &betas, 0.0).expect("values");
+            for (found, from_above) in [(low, false), (high, true)] {
+                if from_above {
+                    pairs.reverse();
+                }
+                let (value, last) = pairs[0];
+                let residual = betas[k - 1] * last.abs();
+                let away = |j: usize| (pairs[j].0 - value).abs();
+                let clusters = (0..k - 1).map(|j| away(j) + residual * residual / away(j + 1));
+                let error = clusters.fold(residual, f64::min);
+                assert!((found.value - value).abs() < 1e-12 && (found.residual - residual).abs() < 1e-9);
+                assert!((found.error - error).abs() < 1e-9, "{k}: {} instead of {error}", found.error);
+                wider += usize::from(error < residual && error < residual * residual / away(1));
+            }
+        }
+        assert!(wider > 2, "{wider} clusters of more than one value");
     }
 
     #[test]

@@ -77,6 +77,51 @@ mod tests {
         assert!((rate - 1.25).abs() < 1e-6, "{rate}");
     }
 
+    /// Errors that fall by a constant factor in each of successive stretches.
+    fn stretches(lengths_and_rates: &[(usize, f64)]) -> Vec<f64> {
+        let rates = lengths_and_rates.iter().flat_map(|&(length, rate)| std::iter::repeat_n(rate, length));
+        rates.scan(1.0, |error, rate| Some(std::mem::replace(error, *error * rate))).collect()
+    }
+
+    /// The factor of the least-squares line through (k, log e_k), by the normal equations.
+    fn fitted(errors: &[f64]) -> f64 {
+        let n = errors.len() as f64;
+        let sum = |term: &dyn Fn(f64, f64) -> f64| -> f64 {
+            errors.iter().enumerate().map(|(k, e)| term(k as f64, e.ln())).sum()
+        };
+        let (k, l) = (sum(&|k, _| k), sum(&|_, l| l));
+        let (kk, kl) = (sum(&|k, _| k * k), sum(&|k, l| k * l));
+        ((n * kl - k * l) / (n * kk - k * k)).exp()
+    }
+
+    fn assert_rate(history: &[f64], expected: f64) {
+        let rate = observed_rate(history, 0.0).expect("long enough");
+        assert!((rate - expected).abs() < 1e-12, "{rate} instead of {expected} of {} entries", history.len());
+    }
+
+    #[test]
+    fn the_first_half_is_left_out_and_all_of_the_second_is_used() {
+        for n in 8..31 {
+            assert_rate(&stretches(&[(n / 2, 0.3), (n - n / 2, 0.9)]), 0.9);
+            // One entry more of the other pace would be seen, and so would one less of this.
+            let late = stretches(&[(n / 2 + 1, 0.3), (n - n / 2 - 1, 0.9)]);
+            assert_rate(&late, fitted(&late[n / 2..]));
+        }
+        // Four entries are fitted, if no more are left.
+        assert_rate(&stretches(&[(2, 0.3), (4, 0.9)]), 0.9);
+    }
+
+    #[test]
+    fn sixteen_entries_are_halved_where_the_pace_changes_by_more_than_a_hundredth() {
+        let fifteen = stretches(&[(15, 0.3), (7, 0.9), (8, 0.8)]);
+        assert_rate(&fifteen, fitted(&fifteen[15..]));
+        assert_rate(&stretches(&[(16, 0.3), (8, 0.9), (8, 0.8)]), 0.8);
+        let faster = |part: f64| 0.9f64.powf(1.0 + part);
+        assert_rate(&stretches(&[(32, 0.3), (16, 0.9), (16, faster(0.03))]), faster(0.03));
+        let steady = stretches(&[(32, 0.3), (16, 0.9), (16, faster(0.005))]);
+        assert_rate(&steady, fitted(&steady[32..]));
+    }
+
     #[test]
     fn too_short_a_history_has_no_rate() {
         assert_eq!(observed_rate(&[1.0, 0.5, 0.25], 0.0), None);

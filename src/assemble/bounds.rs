@@ -84,3 +84,25 @@ pub fn usual_lambda_min(scheme: Scheme) -> f64 {
         Scheme::ZhengCai => 0.5,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The rows (a, 1 − a) and (1 − a, a) have the eigenvalues 1 and 2a − 1, and 1/a and 2 − 1/a over their diagonal.
+    #[test]
+    fn two_rows_attain_the_bounds_of_gershgorin() {
+        for a in [0.25, 0.5, 0.75] {
+            let bounds = SpectralBounds::gershgorin(&[a, a]);
+            let expected = SpectralBounds {
+                lambda_min: 2.0 * a - 1.0,
+                lambda_max: 1.0,
+                jacobi_lambda_min: 2.0 - 1.0 / a,
+                jacobi_lambda_max: 1.0 / a,
+            };
+            assert_eq!(bounds, expected);
+            // The least entry decides.
+            assert_eq!(SpectralBounds::gershgorin(&[0.8, a, 0.9]), expected);
+        }
+    }
+}

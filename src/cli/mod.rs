@@ -252,6 +252,23 @@ mod tests {
     }
 
     #[test]
+    fn a_grid_ends_before_its_end_if_the_step_does_not_divide_it() {
+        for (text, expected) in [("0.5:1:0.3", vec![0.5, 0.8]), ("1:2.9:1", vec![1.0, 2.0]), ("1:1.9:1", vec![1.0])] {
+            assert_eq!(text.parse::<Grid>().expect("a grid").0, expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_tolerance_is_relative_to_the_mesh_unless_it_is_absolute() {
+        let cube = crate::mesh::builtin::cube();
+        let stop = |tol_absolute| StopFlags { tol: 1e-3, tol_absolute, max_iter: 7 }.stop(&cube);
+        // The diagonal of [−1, 1]³ is √12.
+        assert!((stop(None).tolerance - 1e-3 * 12f64.sqrt()).abs() < 1e-18);
+        assert_eq!(stop(Some(1e-3)).tolerance, 1e-3);
+        assert_eq!(stop(None).max_iterations, 7);
+    }
+
+    #[test]
     fn a_list_names_the_item_that_is_wrong() {
         let list: List<u32> = "3, 4,5".parse().expect("three numbers");
         assert_eq!(list.0, [3, 4, 5]);

@@ -214,4 +214,15 @@ mod tests {
             assert_eq!(zero_area_faces(&Mesh::new(positions, mesh.faces.clone())), [0, 2], "{size:e}");
         }
     }
+
+    /// Right triangles of height h over a side of length 1 lose their area at the rounding of a few products.
+    #[test]
+    fn a_sliver_has_an_area_down_to_rounding() {
+        let heights = [1e-3, 1e-8, 1e-12, 1e-13, 1e-14, 1e-16, 0.0];
+        let mut positions = vec![DVec3::ZERO, DVec3::X];
+        positions.extend(heights.map(|h| DVec3::new(1.0, h, 0.0)));
+        let slivers: Vec<[u32; 3]> = (0..heights.len() as u32).map(|k| [0, 1, k + 2]).collect();
+        let flat = zero_area_faces(&Mesh::new(positions, Faces::from_lists(slivers)));
+        assert_eq!(flat, [5, 6]);
+    }
 }

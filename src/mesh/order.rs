@@ -418,6 +418,30 @@ mod tests {
         assert_eq!((empty.bandwidth, empty.mean_distance), (0, 0.0));
     }
 
+    /// The definition, replayed: what each vertex meets first comes next, by ascending number of neighbours.
+    #[test]
+    fn cuthill_mckee_appends_the_neighbours_of_each_vertex_by_degree() {
+        for mesh in [builtin::irregular_tri(300, 1), builtin::star(7)] {
+            let mesh = shuffled(&mesh);
+            let mut neighbours = vec![std::collections::BTreeSet::new(); mesh.len()];
+            for face in mesh.faces.iter() {
+                for &v in face {
+                    neighbours[v as usize].extend(face.iter().copied().filter(|&w| w != v));
+                }
+            }
+            let mut order = ordered(Order::Rcm, &mesh);
+            order.reverse();
+            let mut expected = vec![order[0]];
+            for next in 0..mesh.len() {
+                let met = neighbours[expected[next] as usize].iter();
+                let mut new: Vec<u32> = met.copied().filter(|w| !expected.contains(w)).collect();
+                new.sort_by_key(|&w| neighbours[w as usize].len());
+                expected.extend(new);
+            }
+            assert_eq!(order, expected);
+        }
+    }
+
     #[test]
     fn reverse_cuthill_mckee_is_as_narrow_as_the_one_of_sprs() {
         for (mesh, name) in [

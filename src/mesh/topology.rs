@@ -572,6 +572,18 @@ mod tests {
         }
     }
 
+    /// Between the vertices of a single face there is no way but its sides.
+    #[test]
+    fn a_face_of_any_size_is_one_component() {
+        for size in 3..40u32 {
+            let even: Vec<u32> = (0..size).map(|k| 2 * k).collect();
+            let odd: Vec<u32> = (0..size).rev().map(|k| 2 * k + 1).collect();
+            let (faces, t) = topology(2 * size as usize, &[&even, &odd]);
+            let expected: Vec<u32> = (0..2 * size).map(|v| v % 2).collect();
+            assert_eq!(t.components(&faces), (expected, 2), "{size} corners");
+        }
+    }
+
     #[test]
     fn isolated_vertices_are_components_of_their_own() {
         let (faces, t) = topology(5, &[&[1, 2, 4]]);

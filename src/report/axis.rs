@@ -323,6 +323,26 @@ mod tests {
     }
 
     #[test]
+    fn margins_and_whole_ends_begin_where_they_say() {
+        let axis = |scale, lo: f64, hi: f64| {
+            let axis = Axis::around(scale, [lo, hi].into_iter());
+            (axis.lo, axis.hi)
+        };
+        let near = |(a, b): (f64, f64), (c, d): (f64, f64)| {
+            assert!((a - c).abs() < 1e-12 * b && (b - d).abs() < 1e-12 * b, "({a}, {b}) instead of ({c}, {d})");
+        };
+        // From 0 if the least is less than three tenths of the greatest.
+        near(axis(Scale::Linear, 29.0, 100.0), (0.0, 100.0 + 0.03 * 71.0));
+        near(axis(Scale::Linear, 31.0, 100.0), (31.0 - 0.03 * 69.0, 100.0 + 0.03 * 69.0));
+        // Two decades end at powers of ten; less has a margin of a twentieth, of a decade at the least.
+        near(axis(Scale::Log, 1.0, 100.0), (1.0, 100.0));
+        near(axis(Scale::Log, 2.0, 250.0), (1.0, 1000.0));
+        near(axis(Scale::Log, 2.0, 4.0), (2.0 * 10f64.powf(-0.05), 4.0 * 10f64.powf(0.05)));
+        let decades = 50f64.log10();
+        near(axis(Scale::Log, 1.0, 50.0), (10f64.powf(-0.05 * decades), 50.0 * 10f64.powf(0.05 * decades)));
+    }
+
+    #[test]
     fn what_has_no_place_is_dropped() {
         let axis = Axis::over(Scale::Log, (1e-4, 1.0));
         assert_eq!(axis.position(0.0), None);

@@ -244,6 +244,23 @@ mod tests {
         assert_eq!(differences(columns, rows).len(), 1);
     }
 
+    /// Of the tolerance and the floor the larger counts, not both; and the tolerance is of the larger number.
+    #[test]
+    fn numbers_agree_within_the_tolerance_or_the_floor() {
+        let agree = |fresh: f64, committed: f64, tolerance: f64, floor: f64| {
+            let kind = Kind::Number { tolerance, floor, digits: 4 };
+            let [a, b] = [fresh, committed].map(|x| x.to_string());
+            let there = disagreement(kind, &a, &b).is_none();
+            assert_eq!(there, disagreement(kind, &b, &a).is_none(), "{a} and {b}");
+            there
+        };
+        assert!(agree(1.0, 1.0009, 1e-3, 1e-3));
+        assert!(!agree(1.0, 1.0015, 1e-3, 1e-3));
+        assert!(agree(1.0, 1.0015, 1e-3, 2e-3) && agree(1.0, 1.0015, 2e-3, 1e-3));
+        // 1/9 of the larger, 1/8 of the smaller.
+        assert!(agree(8.0, 9.0, 0.115, 0.0) && !agree(8.0, 9.0, 0.105, 0.0));
+    }
+
     #[test]
     fn columns_must_be_the_same() {
         let mut columns = columns();

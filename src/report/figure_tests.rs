@@ -256,6 +256,21 @@ fn empty_plots_are_drawn() {
     assert!(figure.render().is_ok());
 }
 
+/// Entries 16, 4 and 1 in blocks: black, and a half and a quarter of the way from there to the lightest grey.
+#[test]
+fn blocks_darken_with_the_square_root_of_their_entries() {
+    let entries = [(0, 16), (1, 4), (2, 1)].into_iter().flat_map(|(i, count)| std::iter::repeat_n((i, i), count));
+    let image = Figure::row([SparsityPlot::new("", 3, entries)]).render().unwrap();
+    let pixels = |grey: u8| {
+        let all = (0..image.height).flat_map(|y| (0..image.width).map(move |x| (x, y)));
+        all.filter(|&(x, y)| image.pixel(x, y) == [grey; 3]).count()
+    };
+    let block = pixels(75);
+    assert!(block > 1000, "{block}");
+    // 112.5, rounded.
+    assert!(pixels(113).abs_diff(block) < block / 20 && pixels(0) > block / 20 * 19);
+}
+
 #[test]
 fn equal_units_make_a_circle_round() {
     let circle = (0..=200).map(|i| (f64::from(i) * std::f64::consts::TAU / 200.0).sin_cos());

@@ -412,6 +412,8 @@ mod tests {
         assert_eq!(apart(&[(50.0, 20.0), (120.0, 20.0)]), [50.0, 120.0]);
         // Two of width 20 at one place: 28 apart, around it.
         assert_eq!(apart(&[(100.0, 20.0), (100.0, 20.0)]), [86.0, 114.0]);
+        // Three of them stay around it: the middle one where it was.
+        assert_eq!(apart(&[(100.0, 20.0), (100.0, 20.0), (100.0, 20.0)]), [72.0, 100.0, 128.0]);
         // Held inside.
         assert_eq!(apart(&[(0.0, 20.0)]), [10.0]);
         assert_eq!(apart(&[(195.0, 20.0), (199.0, 20.0)]), [162.0, 190.0]);
@@ -426,6 +428,17 @@ mod tests {
         assert_eq!(kept.len(), 11);
         assert!(kept.windows(2).all(|w| w[1].0 - w[0].0 >= MARKER_GAP));
         assert_ne!(thinned(dense, 1)[0], kept[0]);
+    }
+
+    #[test]
+    fn bars_stand_on_zero() {
+        let bars = |heights: Vec<f64>| {
+            let bars = vec![Bars { name: String::new(), edges: vec![0.0, 1.0, 2.0], heights, colour: None }];
+            LinePlot { bars, ..LinePlot::default() }.y_axis()
+        };
+        // A line through these would have an axis from 8 on, or up to −8.
+        assert_eq!(bars(vec![8.0, 10.0]).lo, 0.0);
+        assert!(bars(vec![-8.0, -10.0]).hi >= 0.0);
     }
 
     #[test]

@@ -33,6 +33,45 @@ fn all_eigenvalues_keep_to_the_proven_bounds() {
     });
 }
 
+/// ±1 in a colouring of quads with two colours, or cube roots of 1 in one of triangles with three, where all valences
+/// are the same: nothing lies below what the valences allow.
+#[test]
+fn coloured_meshes_attain_the_lower_bounds() {
+    use Scheme::*;
+    for (name, schemes) in [
+        ("cube", &[CatmullClark, Nasri, ZhengCai][..]),
+        ("torus:6x4", &[CatmullClark, Nasri, ZhengCai]),
+        ("octahedron", &[Loop, Sqrt3, Nasri, ZhengCai]),
+        ("tri-torus:6x9", &[Loop, Sqrt3, Nasri, ZhengCai]),
+    ] {
+        let mesh = built_in(name);
+        for &scheme in schemes {
+            let bounds = system(&mesh, scheme).bounds;
+            let plain = assemble(scheme, &mesh);
+            let slack = tol::eigenvalues(mesh.len(), 4.0);
+            let (least, jacobi) = (plain.eigenvalues()[0], plain.jacobi_eigenvalues()[0]);
+            assert!((bounds.lambda_min - least).abs() < slack, "{name}, {scheme}: {least}, {bounds:?}");
+            assert!((bounds.jacobi_lambda_min - jacobi).abs() < slack, "{name}, {scheme}: {jacobi}, {bounds:?}");
+        }
+    }
+}
+
+/// Where iterations in mixed precision start their interval: a little below the spectrum of ordinary meshes.
+#[test]
+fn the_usual_lambda_min_is_usual() {
+    for scheme in Scheme::ALL {
+        let names = match scheme.needs_triangles() {
+            true => ["tri-torus:12x12", "irregular-tri:500"],
+            false => ["torus:12x12", "irregular-quad:500"],
+        };
+        let usual = limitlab::assemble::bounds::usual_lambda_min(scheme);
+        for name in names {
+            let least = dense::eigenvalues(&system(&built_in(name), scheme)).unwrap().a[0];
+            assert!((0.7 * least..least + 1e-12).contains(&usual), "{scheme} on {name}: {usual} for {least}");
+        }
+    }
+}
+
 #[test]
 fn the_library_s_dense_eigenvalues_are_those_of_another_library() {
     for scheme in Scheme::ALL {

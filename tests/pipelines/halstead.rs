@@ -55,6 +55,59 @@ fn the_fit_meets_points_and_normals() {
     }
 }
 
+/// The energies by differences of limit points on a fine grid, over the same part of the surface: all but the
+/// quarters beside extraordinary vertices.
+#[test]
+fn energies_are_those_of_second_differences() {
+    const DEEPER: usize = 4;
+    // In units of the quads of the first refinement.
+    let h = 0.5f64.powi((LEVELS + DEEPER) as i32 - 1);
+    for name in ["cube", "tetrahedron", "bipyramid:5"] {
+        let mesh = noisy(name);
+        let fairness = Fairness::new(&mesh).unwrap();
+        let mut fine = fairness.fine.clone();
+        let mut counted = vec![true; fine.faces.len()];
+        for level in 0..DEEPER {
+            let finer = Refinement::CatmullClark.refine_n(&fine, 1).unwrap();
+            // A quarter has the number of its parent's corner.
+            counted = (0..fine.faces.len()).flat_map(|f| vec![counted[f]; 4]).collect();
+            fine = finer;
+            if level == 0 {
+                let topology = topology(&fine);
+                for (counted, face) in counted.iter_mut().zip(fine.faces.iter()) {
+                    *counted = face.iter().all(|&v| topology.incidence.face_count(v as usize) == 4);
+                }
+            }
+        }
+        let topology = topology(&fine);
+        let limits = catmull_clark::limit_positions(&fine, &topology).unwrap();
+        let corners = fine.faces.corners();
+        let at = |c: u32| limits[corners[c as usize] as usize];
+        let mut star = Vec::new();
+        let (mut thin_plate, mut membrane) = (0.0, 0.0);
+        for (v, &here) in limits.iter().enumerate() {
+            topology.star(&fine.faces, v, &mut star);
+            // Each face around it gives a quarter of its area.
+            let faces = star.iter().filter(|&&c| counted[topology.incidence.face_of(c)]).count();
+            if faces == 0 {
+                continue;
+            }
+            assert_eq!(star.len(), 4);
+            let next = |c: u32| topology.incidence.next(&fine.faces, c);
+            let [e, n, w, s] = [0, 1, 2, 3].map(|k| at(next(star[k])));
+            let [ne, nw, sw, se] = [0, 1, 2, 3].map(|k| at(next(next(star[k]))));
+            let [uu, vv, uv] = [e - 2.0 * here + w, n - 2.0 * here + s, (ne - nw + sw - se) / 4.0];
+            let [u, v] = [(e - w) / 2.0, (n - s) / 2.0];
+            let area = 0.25 * faces as f64 * h * h;
+            thin_plate += area * (uu.length_squared() + 2.0 * uv.length_squared() + vv.length_squared()) / h.powi(4);
+            membrane += area * (u.length_squared() + v.length_squared()) / (h * h);
+        }
+        let found = fairness.energies_of(&mesh).unwrap();
+        assert!((found.thin_plate / thin_plate - 1.0).abs() < 0.01, "{name}: {} {thin_plate}", found.thin_plate);
+        assert!((found.membrane / membrane - 1.0).abs() < 0.01, "{name}: {} {membrane}", found.membrane);
+    }
+}
+
 /// xᵀKx is least among all x that meet the points: the derivative along every direction in the null space of the
 /// limit masks vanishes, and the interpolating control mesh of the given faces, where there is one, costs more.
 #[test]

@@ -114,6 +114,9 @@ fn medial_metrics_in_closed_form() {
     let shift = DVec3::new(0.3, 0.0, 0.4);
     let moved = medial_shifts(&involutes, (&at(2.0, shift), &normals), (&given, &normals));
     assert!((moved[0].unwrap() - 0.25).abs() < ROUNDING);
+    // Over the given radius, not the new one.
+    let larger = medial_shifts(&involutes, (&at(5.0, shift), &normals), (&given, &normals));
+    assert!((larger[0].unwrap() - 0.25).abs() < ROUNDING);
     let scaled = scaled_distances(&at(2.0, shift), &given, &[2.0; 12]);
     assert!(scaled.iter().all(|d| (d - 0.25).abs() < ROUNDING));
 }
@@ -196,6 +199,11 @@ fn rings_turn_only_beyond_the_threshold_and_stop_at_the_tolerance() {
     }
     assert_eq!(result.turned.len(), turned);
     assert!(turned > 3 && left > 3, "the test sees both: {turned} {left}");
+    // A normal within the tolerance is right, whatever the threshold.
+    let rotation = Rotation { threshold: 0.0, tolerance: 0.4, levels: 1 };
+    let tolerant = rotate_rings(&mesh, Refinement::CatmullClark, &wanted, rotation).unwrap().turned;
+    assert!(tolerant.iter().map(|t| t.0).eq(result.turned.iter().map(|t| t.0)));
+    assert!(tolerant.iter().all(|t| t.1 > 0.0));
 }
 
 /// T15, by looking: after two refinements no vertex is in the faces of two original vertices; after one some are.

@@ -57,7 +57,9 @@ fn the_largest_update_ends_the_sweeps() {
     let all =
         auxiliary(&mesh, &topology, None, &PhaseOne { max_iterations: 40, eps: 0.0, ..PhaseOne::default() }).unwrap();
     assert!(!all.passed && all.updates.len() == 40);
-    for eps in [1e-2, 3e-3, 1e-8] {
+    // Each update just above the tolerance, and just below.
+    let near = all.updates[..8].iter().flat_map(|u| [u / 1.01, u * 1.01]).map(|u| u / mesh.diagonal());
+    for eps in near.chain([1e-2, 3e-3, 1e-8]) {
         let phase = PhaseOne { max_iterations: 40, eps, ..PhaseOne::default() };
         let found = auxiliary(&mesh, &topology, None, &phase).unwrap();
         let tolerance = eps * mesh.diagonal();
@@ -230,6 +232,20 @@ fn constraints_without_sense_are_errors_that_name_the_vertex() {
     assert!(text.contains("vertex 0: the given normal lies in the plane"), "{text}");
     normals[0] = Some(DVec3::ZERO);
     assert!(refused(&Constraints { normals: Some(&normals), ..Constraints::default() }).contains("vertex 0"));
+}
+
+/// The thinner the mesh, the smaller the areas of its faces against their sides; only rounding takes the normal away.
+#[test]
+fn thin_faces_are_flattened_down_to_rounding() {
+    let mesh = noisy("irregular-poly:60");
+    let topology = topology(&mesh);
+    for (thin, flattened) in [(1e-3, true), (1e-6, true), (1e-9, true), (1e-15, false), (0.0, false)] {
+        let positions = mesh.positions.iter().map(|p| DVec3::new(p.x, thin * p.y, thin * p.z)).collect();
+        let mesh = Mesh::new(positions, mesh.faces.clone());
+        let first = interpolate(&mesh, &topology, &Constraints::default(), &PhaseOne::default()).unwrap().first;
+        let expected = if flattened { 0 } else { mesh.len() };
+        assert_eq!(first.not_flattened.len(), expected, "{thin:e}");
+    }
 }
 
 #[test]

@@ -6,7 +6,8 @@ use glam::DVec3;
 use limitlab::assemble::{LimitSystem, Scheme};
 use limitlab::mesh::Mesh;
 use limitlab::solvers::chebyshev::promised_iterations;
-use limitlab::solvers::{Outcome, Report, Setup, Stop, run_watched};
+use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
+use limitlab::solvers::{Errors, Iterate, Outcome, Report, Setup, Stop, run_watched};
 use nalgebra::DMatrix;
 
 use crate::common::formulas::{Plain, assemble};
@@ -328,6 +329,47 @@ fn conjugate_gradients_are_the_textbook_s() {
             })
         });
     });
+}
+
+/// What the method is told of its errors is twice the truth, or the truth: the step after it is the first one of a new
+/// process from the same iterate, or the next one of the process at work.
+#[test]
+fn conjugate_gradients_that_have_lost_touch_start_afresh() {
+    const STEPS: usize = 4;
+    let mut held = 0;
+    for_each_case(1e-9, |case| {
+        let weights = |d: &Dense, r: &Points| d.scaled_rows(r, |i| d.plain.h[i]);
+        let expected = case.dense.cg(|r| weights(case.dense, r));
+        // The smallest meshes are done before.
+        if expected.len() < STEPS + 3 {
+            return;
+        }
+        held += 1;
+        for lost in [false, true] {
+            let mut method =
+                ConjugateGradient::new(case.system, &case.mesh.positions, Preconditioner::weights(case.system));
+            for _ in 0..STEPS {
+                method.errors();
+                method.advance().unwrap();
+            }
+            let known = method.errors();
+            let told = if lost { Errors { max: 2.0 * known.max, ..known } } else { known };
+            let truth = method.confirm(told);
+            assert!((truth.max / known.max - 1.0).abs() < 1e-6);
+            method.advance().unwrap();
+            let found = rows(method.points());
+            // z = H r = e, and the step that minimises the energy along it.
+            let before = &expected[STEPS];
+            let e = case.dense.e(before);
+            let r = case.dense.scaled_rows(&e, |i| 1.0 / case.dense.plain.h[i]);
+            let afresh = before + inner(&r, &e) / inner(&e, &(case.dense.plain.dense_m() * &e)) * &e;
+            let next = &expected[STEPS + 1];
+            let apart = max_row(&(&afresh - next));
+            let distance = max_row(&(found - if lost { &afresh } else { next }));
+            assert!(distance < 1e-3 * apart, "{}, lost {lost}: {distance:e} of {apart:e}", case.scheme);
+        }
+    });
+    assert!(held > 10, "{held}");
 }
 
 #[test]

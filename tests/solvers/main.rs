@@ -7,6 +7,7 @@ mod common;
 mod handmade;
 mod invariance;
 mod outcomes;
+mod predictions;
 mod rates;
 mod setups;
 mod singular;

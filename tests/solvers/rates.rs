@@ -1,10 +1,12 @@
 //! Closed-form rates on regular tori, and what the data see of them.
 
 use limitlab::analysis::rate::observed_rate;
-use limitlab::analysis::sweep::{Sweep, rounding_floor, sweep};
+use limitlab::analysis::spectrum::{Operator, excited};
+use limitlab::analysis::sweep::{Row, Sweep, rounding_floor, sweep};
+use limitlab::analysis::{Extremes, Spectrum};
 use limitlab::assemble::Scheme;
 use limitlab::mesh::Mesh;
-use limitlab::solvers::{Method, Outcome, Setup, Solution, Stop};
+use limitlab::solvers::{Errors, Method, Outcome, Setup, Solution, Stop};
 use std::f64::consts::TAU;
 
 use crate::common::meshes::*;
@@ -101,6 +103,54 @@ fn the_noisy_torus_is_best_at_four_fifths_and_diverges_where_an_excited_mode_gro
     assert_eq!(sweep.best(Method::Jacobi).unwrap().omega, 0.8);
     let first = sweep.rows.iter().find(|r| r.outcome == Outcome::Diverged).unwrap();
     assert_eq!(first.omega, 0.9);
+}
+
+#[test]
+fn the_best_omega_has_the_fewest_iterations_then_the_smallest_error() {
+    let row = |method, omega, outcome, iterations, max| Row {
+        method,
+        omega,
+        outcome,
+        iterations,
+        predicted_rho: 0.5,
+        predicted_rho_data: None,
+        observed_rate: None,
+        errors: Errors { max, mean: 0.5 * max },
+    };
+    let (converged, pia) = (Outcome::Converged, Method::Pia);
+    let all = Extremes { min: 0.1, max: 1.0 };
+    let rows = vec![
+        row(pia, 0.9, converged, 30, 1e-12),
+        row(pia, 1.0, converged, 20, 3e-11),
+        row(pia, 1.1, converged, 20, 1e-11),
+        row(pia, 1.2, converged, 20, 2e-11),
+        row(pia, 1.3, Outcome::MaxIterations, 10, 1e-13),
+        row(Method::Jacobi, 0.8, converged, 5, 1e-13),
+    ];
+    let sweep = Sweep { spectrum: Spectrum { a: all, jacobi: all }, thresholds: Vec::new(), rows };
+    assert_eq!(sweep.best(pia).map(|r| r.omega), Some(1.1));
+    assert_eq!(sweep.best(Method::Jacobi).map(|r| r.omega), Some(0.8));
+    assert_eq!(sweep.best(Method::Sor), None);
+}
+
+/// A smooth torus, and a part of it in the lowest mode, ±1 over a chessboard, of ever smaller amplitude.
+#[test]
+fn a_mode_counts_as_excited_down_to_a_ten_thousand_millionth() {
+    let mut mesh = built_in("torus:12x10");
+    let system = system(&mesh, Scheme::CatmullClark);
+    let smooth = mesh.positions.clone();
+    let mut lowest = |amplitude: f64| {
+        for (v, (p, smooth)) in mesh.positions.iter_mut().zip(&smooth).enumerate() {
+            let sign = if (v / 10 + v % 10) % 2 == 0 { 1.0 } else { -1.0 };
+            *p = *smooth + amplitude * sign * glam::DVec3::ONE;
+        }
+        excited(&system, &mesh.positions, Operator::A).unwrap().unwrap().min
+    };
+    for amplitude in [1e-2, 1e-5, 1e-8] {
+        let found = lowest(amplitude);
+        assert!((found - 1.0 / 9.0).abs() < tol::ESTIMATE, "{amplitude:e}: {found}");
+    }
+    assert!(lowest(0.0) > 0.5);
 }
 
 /// A smooth torus excites 8 of 1024 modes, all near the eigenvalue 1: PIA is done in 4 iterations, though its rate is 8/9.

@@ -46,3 +46,20 @@ fn a_number_on_the_wrong_side_is_told_everywhere() {
     assert!(rows[1].contains(",,0,,=,0,yes,not confirmed,"), "{}", rows[1]);
     assert!(rows[2].contains(",,,0.5,,,,not confirmed,"), "{}", rows[2]);
 }
+
+#[test]
+fn numbers_are_shown_with_six_digits_or_two_where_they_are_small() {
+    for (value, text) in [
+        (0.00123, "0.00123"),
+        (0.005, "0.005"),
+        (0.000999, "0.0010"),
+        (1.23e-9, "1.2e-9"),
+        (2.0 / 3.0, "0.666667"),
+        (3.0, "3"),
+        (1234567.5, "1.23457e6"),
+    ] {
+        assert_eq!(shown(value.into()), text);
+    }
+    assert_eq!(shown(Value::Count(12)), "12");
+    assert_eq!(shown(Value::Time(0.12345)), "0.12");
+}

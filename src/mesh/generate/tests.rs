@@ -213,3 +213,36 @@ fn irregular_quads_exist_for_every_size_and_seed_tried() {
         }
     }
 }
+
+/// Seen in single flips: the two new triangles lie in faces of the same numbers as the old ones.
+#[test]
+fn flips_leave_each_triangle_an_eighth_of_the_quadrilateral() {
+    let mut least: f64 = 1.0;
+    let mut flips = 0;
+    for seed in 0..40 {
+        let mut mesh = builtin::icosahedron();
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        mesh.positions
+            .iter_mut()
+            .for_each(|p| *p += DVec3::from_array(std::array::from_fn(|_| rng.random_range(-0.6..0.6))));
+        for attempt in 0..60 {
+            let mut flipped = mesh.clone();
+            flip_edges(&mut flipped, 1, 1000 * seed + attempt);
+            let changed = mesh.faces.iter().zip(flipped.faces.iter()).filter(|(old, new)| old != new);
+            let areas: Vec<DVec3> = changed
+                .map(|(_, new)| {
+                    let [a, b, c] = [0, 1, 2].map(|k| flipped.positions[new[k] as usize]);
+                    (b - a).cross(c - a)
+                })
+                .collect();
+            if let [a, b] = areas[..] {
+                let whole = a + b;
+                least = least.min(a.dot(whole).min(b.dot(whole)) / whole.length_squared());
+                flips += 1;
+            }
+        }
+    }
+    // Many flips come near the limit, none goes beyond it.
+    assert!(flips > 500, "{flips}");
+    assert!((0.125..0.13).contains(&least), "{least}");
+}

@@ -119,3 +119,38 @@ impl<S: System, F: Factorization> Iterate for Direct<'_, S, F> {
 fn failed(method: &str, outcome: Outcome, why: impl std::fmt::Display) -> Failure {
     Failure { outcome, detail: format!("{method}: {why}") }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::{LimitSystem, Scheme};
+    use crate::mesh::{Topology, builtin};
+
+    /// The factors of λ times the identity.
+    struct Multiple(f64);
+
+    impl Factorization for Multiple {
+        fn solve(&mut self, _h: &[f64], x: &mut [DVec3]) {
+            x.iter_mut().for_each(|x| *x /= self.0);
+        }
+        fn fill(&self) -> Option<usize> {
+            None
+        }
+    }
+
+    #[test]
+    fn singular_begins_at_four_units_of_rounding_a_vertex() {
+        for mesh in [builtin::cube(), builtin::torus(40, 30)] {
+            let topology = Topology::new(&mesh.faces, mesh.len());
+            let system = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark).unwrap();
+            let outcome =
+                |lambda: f64| Direct::new(&system, &mesh.positions, Multiple(lambda)).err().map(|f| f.outcome);
+            let unit = mesh.len() as f64 * f64::EPSILON;
+            assert_eq!(outcome(3.9 * unit), Some(Outcome::Singular), "{} vertices", mesh.len());
+            assert_eq!(outcome(4.1 * unit), None, "{} vertices", mesh.len());
+            for bad in [0.0, f64::NAN] {
+                assert_eq!(outcome(bad), Some(Outcome::Singular), "{bad}");
+            }
+        }
+    }
+}
