@@ -24,6 +24,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
+use serde_json::json;
 
 use claims::Claim;
 use context::{Context, Item};
@@ -93,6 +94,13 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<()> {
     if arguments.list {
         let claims = claims::all().map(|c| (c.id, c.title));
+        if arguments.json {
+            let entry = |id: &str, title: &str| json!({ "id": id, "title": title });
+            return cli::print_json(&json!({
+                "items": ITEMS.iter().map(|i| entry(i.id, i.title)).collect::<Vec<_>>(),
+                "claims": claims::all().map(|c| entry(c.id, c.title)).collect::<Vec<_>>(),
+            }));
+        }
         let all: Vec<(&str, &str)> = ITEMS.iter().map(|i| (i.id, i.title)).chain(claims).collect();
         let width = all.iter().map(|(id, _)| id.len()).max().unwrap_or(0);
         let lines: Vec<String> = all.iter().map(|(id, title)| format!("{id:width$}  {title}")).collect();

@@ -1,13 +1,13 @@
 //! Spectral radii of iterations whose error matrix is not symmetric: Gauss-Seidel, SOR, SSOR.
 
 use glam::DVec3;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, Schur};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::dense;
 use crate::assemble::LimitSystem;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// Steps of the power method before the first Arnoldi process.
 const WARM_UP: usize = 30;
@@ -82,7 +82,7 @@ pub fn spectral_radius(system: &LimitSystem, mut step: impl FnMut(&mut [DVec3]))
     let mut applications = WARM_UP;
     let mut before = f64::NAN;
     for cycle in 1.. {
-        let found = arnoldi(x, vectors, &mut step);
+        let found = arnoldi(x, vectors, &mut step)?;
         applications += found.steps;
         let value = found.ritz.norm();
         let still = (value - before).abs() <= STILL * value;
@@ -110,7 +110,10 @@ struct Cycle {
 }
 
 /// One Arnoldi process from the unit vector `start`.
-fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut impl FnMut(&mut [DVec3])) -> Cycle {
+///
+/// # Errors
+/// If the eigenvalues of the projected matrix are not found.
+fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut impl FnMut(&mut [DVec3])) -> Result<Cycle> {
     let mut basis = vec![start];
     let mut hessenberg = DMatrix::<f64>::zeros(vectors + 1, vectors);
     let mut next = 0.0;
@@ -136,8 +139,7 @@ fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut impl FnMut(&mut [DVec3]
     }
     let m = basis.len();
     let square = hessenberg.view((0, 0), (m, m)).into_owned();
-    let ritz = square
-        .complex_eigenvalues()
+    let ritz = ritz_values(&square)?
         .iter()
         .fold(Complex::new(0.0, 0.0), |best, &z| if z.norm() > best.norm() { z } else { best });
     let y = eigenvector(&square, ritz);
@@ -157,7 +159,22 @@ fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut impl FnMut(&mut [DVec3]
         }
         normalize(&mut restart);
     }
-    Cycle { ritz, residual, steps: m, restart }
+    Ok(Cycle { ritz, residual, steps: m, restart })
+}
+
+/// The eigenvalues of a projected matrix. Where it is a multiple of the identity but for rounding, as at a tiny ω, QR
+/// iterations may go on for ever: then those of the rest, which is of a size of its own.
+fn ritz_values(square: &DMatrix<f64>) -> Result<DVector<Complex<f64>>> {
+    const ITERATIONS: usize = 1000;
+    let m = square.nrows();
+    let eigenvalues = |matrix| Some(Schur::try_new(matrix, f64::EPSILON, ITERATIONS)?.complex_eigenvalues());
+    if let Some(found) = eigenvalues(square.clone()) {
+        return Ok(found);
+    }
+    let mean = square.trace() / m as f64;
+    eigenvalues(square - DMatrix::identity(m, m) * mean)
+        .map(|rest| rest.map(|z| z + mean))
+        .ok_or_else(|| Error::Computation("the eigenvalues of an Arnoldi process were not found".into()))
 }
 
 /// A unit eigenvector of the computed eigenvalue `z` by inverse iteration.

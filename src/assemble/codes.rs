@@ -406,7 +406,7 @@ mod tests {
         let found: Vec<_> = window.runs().map(|run| (run.rows(), run.neighbours())).collect();
         assert_eq!(found, [(0..1, 0), (1..3, 2), (3..4, 2), (4..5, 1)]);
         let Windows::Near(window) = codes.window(2..3, &points, 0) else { panic!("near") };
-        assert_eq!(window.runs().map(|run| run.rows()).collect::<Vec<_>>(), [2..3]);
+        assert!(window.runs().map(|run| run.rows()).eq(std::iter::once(2..3)));
     }
 
     #[test]

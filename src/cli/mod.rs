@@ -232,6 +232,7 @@ pub fn number(x: f64) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::validate::Boundary;
 
     #[test]
     fn a_grid_has_both_ends_and_round_numbers() {
@@ -260,8 +261,12 @@ mod tests {
 
     #[test]
     fn a_tolerance_is_relative_to_the_mesh_unless_it_is_absolute() {
-        let cube = crate::mesh::builtin::cube();
-        let stop = |tol_absolute| StopFlags { tol: 1e-3, tol_absolute, max_iter: 7 }.stop(&cube);
+        let flags = MeshFlags { scheme: None, noise: None, boundary: Boundary::Refuse, defects: false };
+        let common = CommonFlags { threads: None, quiet: true };
+        let cube = flags.input("cube", &common).expect("valid").expect("no report");
+        let stop = |tol_absolute| {
+            cube.stop(&StopFlags { tol: 1e-3, tol_absolute, max_iter: 7 }).expect("a cube has an extent")
+        };
         // The diagonal of [−1, 1]³ is √12.
         assert!((stop(None).tolerance - 1e-3 * 12f64.sqrt()).abs() < 1e-18);
         assert_eq!(stop(Some(1e-3)).tolerance, 1e-3);

@@ -144,7 +144,7 @@ fn mix(word: u64) -> u64 {
 fn zero_area_faces(mesh: &Mesh) -> Vec<u32> {
     // Each product of differences carries a relative error of at most 4 units in the last place.
     const ROUNDING: f64 = 8.0 * f64::EPSILON;
-    // Of a face whose corner k lies at `at(k)` from the first. What is not a number is for a closer look.
+    // Of a face whose corner k lies at `at(k)` from the first.
     let vanishes = |size: usize, at: &dyn Fn(usize) -> DVec3| {
         let (mut area, mut scale) = (DVec3::ZERO, 0.0);
         for k in 2..size {
@@ -152,7 +152,8 @@ fn zero_area_faces(mesh: &Mesh) -> Vec<u32> {
             area += a.cross(b);
             scale += a.length() * b.length();
         }
-        area.length().is_nan() || area.length() <= ROUNDING * scale
+        // What is not a number, too, is not clearly larger.
+        area.length().partial_cmp(&(ROUNDING * scale)) != Some(std::cmp::Ordering::Greater)
     };
     (0..mesh.faces.len() as u32)
         .into_par_iter()

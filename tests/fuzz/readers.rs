@@ -80,10 +80,8 @@ fn file(bytes: &[u8], ending: &str) -> NamedTempFile {
 fn vertices(bytes: &[u8]) {
     let listed = file(bytes, ".txt");
     let from_file = accepted(constraints::vertex_marks(listed.path().to_str().unwrap(), VERTICES));
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        assert!(from_file.is_none());
-        return;
-    };
+    // A comment of a file may be in any encoding.
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
     assert_eq!(accepted(constraints::vertex_marks(text, VERTICES)), from_file);
     let Some(marks) = from_file else { return };
     let chosen: Vec<String> = (0..VERTICES).filter(|&v| marks[v]).map(|v| v.to_string()).collect();

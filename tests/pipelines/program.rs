@@ -213,7 +213,7 @@ fn failures_say_what_is_wrong_and_write_nothing() {
         ("icosahedron --alpha 2.5 --subdivide 1".to_owned(), "α = 2.5 at vertex 0"),
         ("icosahedron --alpha 1".into(), "--subdivide"),
         ("cube --method labsik-greiner --subdivide 2".into(), "face 0 has 4 corners"),
-        ("icosahedron --vertices 12".into(), "`12` names a vertex that the mesh lacks"),
+        ("icosahedron --vertices 12".into(), "\"12\" names a vertex that the mesh lacks"),
         ("icosahedron --vertices none.txt".into(), "\"none.txt\" is neither"),
         (format!("icosahedron --normals {twice} --subdivide 2"), "line 2: vertex 4 is given twice"),
         (format!("icosahedron --normals {zero} --subdivide 2"), "vertex 4"),
