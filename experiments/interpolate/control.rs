@@ -17,6 +17,7 @@ use limitlab::interpolate::zheng_cai::{self, PhaseOne, Sweep};
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::order::Order;
 use limitlab::solvers::gauss_seidel::by_colours;
+use limitlab::solvers::system::Rows;
 use limitlab::solvers::{Errors, Method, Outcome, Report, Solution, Step, Stop, run_watched};
 
 use super::wishes::Wishes;
@@ -219,8 +220,11 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
 fn limit_errors(input: &Input, marks: Option<&[bool]>, control: &[DVec3]) -> Result<Errors> {
     let operator = Operator::new(&input.mesh.faces, input.topology(), input.scheme)
         .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
-    let points = input.mesh.positions.iter().enumerate().filter(|(v, _)| marks.is_none_or(|m| m[*v]));
-    let distances: Vec<f64> = points.map(|(v, p)| p.distance(operator.row(v, control))).collect();
+    let points = &input.mesh.positions;
+    let mut distances = vec![0.0; points.len()];
+    Rows::new(points.len()).residual(&operator, points, control, &mut distances, |_, e, out, _| *out = e.length());
+    let marked = distances.iter().enumerate().filter(|(v, _)| marks.is_none_or(|m| m[*v]));
+    let distances: Vec<f64> = marked.map(|(_, d)| *d).collect();
     Ok(Errors {
         max: distances.iter().copied().fold(0.0, f64::max),
         mean: distances.iter().sum::<f64>() / distances.len() as f64,

@@ -6,6 +6,7 @@ use super::spectrum::Extremes;
 use crate::assemble::bounds::SpectralBounds;
 use crate::solvers::System;
 use crate::solvers::chebyshev::promised_iterations;
+use crate::solvers::system::Rows;
 
 /// Safe intervals and rates that follow from [`SpectralBounds`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,8 +57,10 @@ impl Promise {
         assert_eq!(points.len(), system.len(), "one point a vertex");
         let (mut in_h, mut in_d) = (0.0, 0.0);
         let (mut h_max, mut d_max) = (0.0f64, 0.0f64);
-        for (i, &p) in points.iter().enumerate() {
-            let e = p - system.row(i, points);
+        // Rows one by one would sum a large face once for each of its corners.
+        let mut errors = vec![DVec3::ZERO; points.len()];
+        Rows::new(points.len()).residual(system, points, points, &mut errors, |_, e, out, _| *out = e);
+        for (i, e) in errors.into_iter().enumerate() {
             let h = system.weights()[i];
             let m = system.diagonal()[i] / h;
             in_h += e.length_squared() / h;
