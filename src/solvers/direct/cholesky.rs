@@ -10,9 +10,8 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, Mat, Par, Side};
 use glam::DVec3;
 
-use super::{Factorization, failed};
+use super::{Factorization, failed, room};
 use crate::assemble::Csr;
-use crate::memory::require;
 use crate::solvers::iteration::{Failure, Outcome};
 
 /// Which of the two factorizations.
@@ -53,12 +52,13 @@ impl Cholesky {
         };
         let broken = |why: &dyn std::fmt::Display| failed(name, Outcome::Breakdown, why);
         let pattern = faer_pattern(m);
+        // The graph twice while it is ordered, and the columns of its elements.
+        room(name, "the order of a matrix", m.values().len(), 12)?;
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Upper, SymmetricOrdering::Amd, Default::default())
             .map_err(|e| broken(&e))?;
         let matrix = SparseColMatRef::new(pattern, m.values());
         let fill = symbolic.len_val();
-        let what = || format!("the factor with {fill} entries");
-        require(fill as u64 * 8, what, "use an iterative method").map_err(|e| broken(&e))?;
+        room(name, "the factor", fill, 8)?;
         let mut values = vec![0.0; fill];
         match kind {
             Kind::Llt => {

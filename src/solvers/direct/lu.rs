@@ -8,7 +8,7 @@ use faer::{Conj, Mat, Par};
 use glam::DVec3;
 
 use super::cholesky::faer_pattern;
-use super::{Factorization, failed};
+use super::{Factorization, failed, room};
 use crate::assemble::LimitSystem;
 use crate::solvers::iteration::{Failure, Outcome};
 
@@ -29,6 +29,8 @@ impl SparseLu {
     /// do not suffice.
     pub fn new(system: &LimitSystem) -> Result<Self, Failure> {
         let broken = |why: &dyn std::fmt::Display| failed("LU", Outcome::Breakdown, why);
+        // A copy of the values, and factors with as many entries at the least: nothing cancels.
+        room("LU", "a factorization of a matrix", system.m.values().len(), 24)?;
         // Column j of A holds h_i m_ij: row j of M, weighted by the column's H.
         let m = &system.m;
         let values: Vec<f64> =

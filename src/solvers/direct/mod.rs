@@ -15,6 +15,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::iteration::{Errors, Failure, Iterate, Outcome};
 use super::system::{Rows, System};
+use crate::memory::require;
 
 /// A factored matrix that solves systems with A.
 pub trait Factorization {
@@ -113,6 +114,12 @@ impl<S: System, F: Factorization> Iterate for Direct<'_, S, F> {
     fn points(&self) -> &[DVec3] {
         &self.current
     }
+}
+
+/// Passes if memory has room for a part of a method that takes so many bytes for each of the entries of `what`.
+fn room(method: &str, what: &str, entries: usize, bytes: u64) -> Result<(), Failure> {
+    require(bytes * entries as u64, || format!("{what} with {entries} entries"), "use an iterative method")
+        .map_err(|e| failed(method, Outcome::Breakdown, e))
 }
 
 /// A factorization that could not be made.

@@ -9,9 +9,8 @@ use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::factorization::CscCholesky;
 
 use super::cholesky::faer_pattern;
-use super::{Factorization, failed};
+use super::{Factorization, failed, room};
 use crate::assemble::Csr;
-use crate::memory::require;
 use crate::solvers::iteration::{Failure, Outcome};
 
 /// M factored by nalgebra-sparse.
@@ -34,9 +33,8 @@ impl SecondOpinion {
             factorize_symbolic_cholesky(faer_pattern(m), Side::Upper, SymmetricOrdering::Amd, Default::default())
                 .map_err(|e| failed(name, Outcome::Breakdown, e))?;
         let fill = symbolic.len_val();
-        let what = || format!("the factor with {fill} entries");
         // Its indices take as much as its values, and while it is found it is there twice.
-        require(fill as u64 * 32, what, "use an iterative method").map_err(|e| failed(name, Outcome::Breakdown, e))?;
+        room(name, "the factor", fill, 32)?;
         let order: Vec<u32> = match symbolic.perm() {
             Some(perm) => perm.arrays().0.to_vec(),
             None => (0..n as u32).collect(),
