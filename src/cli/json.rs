@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 /// Prints one value, indented.
 ///
 /// # Errors
-/// As [`print`].
+/// As [`print()`](super::print).
 pub fn print_json(value: &impl Serialize) -> Result<()> {
     let mut bytes = Vec::new();
     value
