@@ -47,14 +47,15 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.mesh.print_defects(&[&arguments.input], &arguments.common)? {
+        return Ok(());
+    }
     create_dir(&arguments.out)?;
     let path = |name: &str| arguments.out.join(name);
     for name in FILES {
         check_target(&path(name))?;
     }
-    let Some(input) = arguments.mesh.input(&arguments.input, &arguments.common)? else {
-        return Ok(());
-    };
+    let input = arguments.mesh.input(&arguments.input, &arguments.common)?;
     let system = input.system()?;
     let points = &*input.given_points();
     let right_hand_side = system.symmetric_right_hand_side(points);

@@ -51,11 +51,12 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.mesh.print_defects(&arguments.meshes, &arguments.common)? {
+        return Ok(());
+    }
     let mut results = Vec::new();
     for name in &arguments.meshes {
-        let Some(input) = arguments.mesh.input(name, &arguments.common)? else {
-            continue;
-        };
+        let input = arguments.mesh.input(name, &arguments.common)?;
         let stop = input.stop(&arguments.stop)?;
         let rows = compare(&input, arguments, &stop)?;
         let table = table(&input, stop.tolerance * input.frame.scale(), &rows);
@@ -67,7 +68,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         }
         results.push(json(&input, &rows));
     }
-    cli::finish(results, &arguments.output, &arguments.common)
+    cli::finish(&results, &arguments.output, &arguments.common)
 }
 
 /// The rows, their errors in mesh units.

@@ -120,11 +120,12 @@ impl Findings {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.mesh.print_defects(&arguments.meshes, &arguments.common)? {
+        return Ok(());
+    }
     let mut results = Vec::new();
     for name in &arguments.meshes {
-        let Some(input) = arguments.mesh.input(name, &arguments.common)? else {
-            continue;
-        };
+        let input = arguments.mesh.input(name, &arguments.common)?;
         let findings = analyse(&input, arguments)?;
         let out = &arguments.output.out;
         let tables = [eigenvalue_table(&input, &findings), radius_table(&input, &findings)];
@@ -144,7 +145,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         }
         results.push(json(&input, &findings));
     }
-    cli::finish(results, &arguments.output, &arguments.common)
+    cli::finish(&results, &arguments.output, &arguments.common)
 }
 
 fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {

@@ -98,7 +98,7 @@ fn run(arguments: &Arguments, scheme: LocalScheme) -> Result<()> {
     if !arguments.output.json {
         cli::print(&tables[0].to_markdown())?;
     }
-    cli::finish(vec![object], &arguments.output, &arguments.common)
+    cli::finish(&[object], &arguments.output, &arguments.common)
 }
 
 fn row_json(row: &Row) -> Value {

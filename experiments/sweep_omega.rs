@@ -70,11 +70,12 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.mesh.print_defects(&arguments.meshes, &arguments.common)? {
+        return Ok(());
+    }
     let mut results = Vec::new();
     for name in &arguments.meshes {
-        let Some(input) = arguments.mesh.input(name, &arguments.common)? else {
-            continue;
-        };
+        let input = arguments.mesh.input(name, &arguments.common)?;
         let stop = input.stop(&arguments.stop)?;
         let table = |sweep: &Sweep| {
             common::table(
@@ -102,7 +103,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         }
         results.push(json(&input, arguments, &sweep));
     }
-    cli::finish(results, &arguments.output, &arguments.common)
+    cli::finish(&results, &arguments.output, &arguments.common)
 }
 
 /// Between two times that the rows which are there are written.

@@ -205,14 +205,15 @@ fn is_file_of(input: &str, output: &Path) -> bool {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.mesh.print_defects(&[&arguments.input], &arguments.common)? {
+        return Ok(());
+    }
     io::check_name(&arguments.output)?;
     let in_place = is_file_of(&arguments.input, &arguments.output);
     if !in_place {
         check_target(&arguments.output)?;
     }
-    let Some(input) = arguments.mesh.input(&arguments.input, &arguments.common)? else {
-        return Ok(());
-    };
+    let input = arguments.mesh.input(&arguments.input, &arguments.common)?;
     let refinement = match arguments.method {
         Choice::Keeping(scheme) => scheme,
         _ => refinement(input.scheme),

@@ -96,26 +96,44 @@ impl MeshFlags {
         })
     }
 
-    /// Loads and validates one mesh, moves its points, and settles their frame and the scheme. `None` if `--defects`
-    /// was asked for: the report has been printed. It tells of the points as they were given.
+    /// With `--defects`, prints what the validator says of the meshes, as their points were given: the report on one, or
+    /// `{"results": […]}` of several. Whether that was asked for, and the program has nothing else to do.
     ///
     /// # Errors
-    /// As [`load`](Self::load); a mesh with defects, with their counts and first places; noise, or sizes side by side,
-    /// that doubles cannot hold.
-    pub fn input(&self, name: &str, common: &CommonFlags) -> Result<Option<Input>> {
-        let start = Instant::now();
+    /// As [`load`](Self::load); if standard output cannot be written.
+    pub fn print_defects<N: AsRef<str>>(&self, names: &[N], common: &CommonFlags) -> Result<bool> {
+        if !self.defects {
+            return Ok(false);
+        }
+        let mut results = Vec::with_capacity(names.len());
+        for name in names {
+            results.push(self.report(&self.loaded(name.as_ref(), common)?).0);
+        }
+        super::print_results(&results)?;
+        Ok(true)
+    }
+
+    /// A mesh that has been read and that memory can hold.
+    fn loaded(&self, name: &str, common: &CommonFlags) -> Result<Loaded> {
         let loaded = self.load(name)?;
-        let read_seconds = start.elapsed().as_secs_f64();
         for remark in &loaded.remarks {
             common.remark(format_args!("{name}: {remark}"));
         }
         require_memory(&loaded.mesh).map_err(|e| Error::mesh(name, e.to_string()))?;
+        Ok(loaded)
+    }
+
+    /// Loads and validates one mesh, moves its points, and settles their frame and the scheme.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load); a mesh with defects, with their counts and first places; noise, or sizes side by side,
+    /// that doubles cannot hold.
+    pub fn input(&self, name: &str, common: &CommonFlags) -> Result<Input> {
+        let start = Instant::now();
+        let loaded = self.loaded(name, common)?;
+        let read_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let (report, renumbered) = self.report(&loaded);
-        if self.defects {
-            super::print_json(&report)?;
-            return Ok(None);
-        }
         for remark in &report.remarks {
             common.remark(format_args!("{name}: {remark}"));
         }
@@ -143,7 +161,7 @@ impl MeshFlags {
             Some(noise) => format!("{name} --noise {noise}"),
             None => name.to_owned(),
         };
-        Ok(Some(Input {
+        Ok(Input {
             name: name.to_owned(),
             label,
             mesh,
@@ -153,7 +171,7 @@ impl MeshFlags {
             scheme,
             read_seconds,
             check_seconds: start.elapsed().as_secs_f64(),
-        }))
+        })
     }
 
     /// Adds the noise to the points of a valid mesh, and takes them to their frame; or a vertex, and what is wrong there.

@@ -11,9 +11,11 @@ pub use json::print_json;
 pub use process::{exit, say};
 pub use progress::Progress;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
@@ -161,19 +163,20 @@ pub fn print(text: &str) -> Result<()> {
 ///
 /// # Errors
 /// If standard output cannot be written.
-pub fn finish(mut results: Vec<Value>, output: &OutputFlags, common: &CommonFlags) -> Result<()> {
-    if results.is_empty() {
-        return Ok(());
-    }
+pub fn finish(results: &[Value], output: &OutputFlags, common: &CommonFlags) -> Result<()> {
     common.remark(format_args!("tables and plots: {}", output.out.display()));
     if !output.json {
         return Ok(());
     }
-    let object = match results.len() {
-        1 => results.remove(0),
-        _ => json!({ "results": results }),
-    };
-    print_json(&object)
+    print_results(results)
+}
+
+/// Prints the object of one mesh, or `{"results": […]}` of several.
+fn print_results<T: Serialize>(results: &[T]) -> Result<()> {
+    match results {
+        [one] => print_json(one),
+        several => print_json(&BTreeMap::from([("results", several)])),
+    }
 }
 
 /// What a program of several tables prints on standard output: each in Markdown as soon as it is there, or with `--json`
@@ -263,7 +266,7 @@ mod tests {
     fn a_tolerance_is_relative_to_the_mesh_unless_it_is_absolute() {
         let flags = MeshFlags { scheme: None, noise: None, boundary: Boundary::Refuse, defects: false };
         let common = CommonFlags { threads: None, quiet: true };
-        let cube = flags.input("cube", &common).expect("valid").expect("no report");
+        let cube = flags.input("cube", &common).expect("valid");
         let stop = |tol_absolute| {
             cube.stop(&StopFlags { tol: 1e-3, tol_absolute, max_iter: 7 }).expect("a cube has an extent")
         };
