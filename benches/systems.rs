@@ -3,7 +3,7 @@
 //! One irregular quad sphere, Catmull-Clark, three right-hand sides. The number of vertices is 100 000 unless the
 //! environment variable `LIMITLAB_BENCH_VERTICES` says otherwise.
 
-#[path = "../experiments/scaling/baseline.rs"]
+#[path = "../experiments/src/bin/scaling/baseline.rs"]
 mod baseline;
 
 use std::hint::black_box;

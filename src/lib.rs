@@ -6,19 +6,17 @@
 //! iterative methods, and explains the convergence by spectra and proven bounds.
 //!
 //! The rooms, each of which uses only the ones above it: [`error`], [`output`], [`mesh`], [`subdivide`],
-//! [`assemble`], [`solvers`], [`analysis`], [`interpolate`], [`report`], [`cli`].
+//! [`assemble`], [`solvers`], [`analysis`], [`interpolate`].
 
 pub mod analysis;
 pub mod assemble;
-pub mod cli;
 pub mod error;
 pub mod interpolate;
-mod memory;
+pub mod memory;
 pub mod mesh;
 pub mod output;
 mod pages;
 mod prefetch;
-pub mod report;
 pub mod solvers;
 pub mod subdivide;
 

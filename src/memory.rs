@@ -32,7 +32,7 @@ pub(crate) fn require(bytes: u64, what: impl FnOnce() -> String, advice: &'stati
 ///
 /// # Errors
 /// As [`require`].
-pub(crate) fn require_small() -> Result<()> {
+pub fn require_small() -> Result<()> {
     require(SMALL, || "the program".into(), "raise the limit (ulimit -v)")
 }
 

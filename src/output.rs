@@ -89,7 +89,7 @@ pub fn create_dir(path: &Path) -> Result<()> {
 
 /// Gives up all that is not complete, as a process does that is about to end: removes the temporary files, and lets
 /// nothing be written from now on. Returns the files that this process has completed, in order.
-pub(crate) fn abandon() -> Vec<PathBuf> {
+pub fn abandon() -> Vec<PathBuf> {
     let mut ledger = ledger();
     for path in ledger.temporary.drain(..) {
         // Nothing sensible is left to do if this fails too.

@@ -1,13 +1,10 @@
 //! Every mesh of `../shared/meshes` against its MANIFEST: sizes, shape, and what is wrong with it.
 
-#[path = "common/mod.rs"]
-mod common;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-use common::collection::collection;
+use crate::common::collection::collection;
 use limitlab::mesh::io::{self, Loaded};
 use limitlab::mesh::topology::IrregularEdge;
 use limitlab::mesh::validate::{Boundary, DefectKind, Validation, validate};

@@ -182,15 +182,15 @@ fn renumbering_permutes_rows_and_the_front_order_is_a_permutation() {
         let file = Numbering::new((0..n as u32).collect());
         for numbering in [front, Numbering::new(shuffled), file] {
             let moved = Operator::in_order(faces, &topology, case.scheme, Some(&numbering)).expect("an operator");
-            let product = product(&moved, &numbering.there(&x));
-            assert_close(&case.name, &numbering.back(&product), &expected, ROUNDING);
+            let once = product(&moved, &numbering.there(&x));
+            assert_close(&case.name, &numbering.back(&once), &expected, ROUNDING);
             assert_eq!(numbering.back(moved.diagonal()), case.operator.diagonal());
             assert_eq!(numbering.back(moved.weights()), case.operator.weights());
             assert_eq!(moved.bounds(), case.operator.bounds());
             let closed = Operator::closed_in_order(faces, &topology.incidence, case.scheme, Some(&numbering))
                 .expect("an operator");
-            let again = crate::product(&closed, &numbering.there(&x));
-            assert!(again == product, "{}", case.name);
+            let again = product(&closed, &numbering.there(&x));
+            assert!(again == once, "{}", case.name);
         }
     }
 }

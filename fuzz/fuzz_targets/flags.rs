@@ -1,6 +1,6 @@
 #![no_main]
 
-#[path = "../../tests/fuzz/flags.rs"]
+#[path = "../../experiments/tests/flags.rs"]
 mod flags;
 
 use std::path::Path;

@@ -1,5 +1,6 @@
 //! Dense eigenvalues, for systems small enough: the oracle of everything estimated.
 
+use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use glam::DVec3;
 
@@ -65,6 +66,18 @@ pub fn eigenpairs(s: &Csr) -> Result<(Vec<f64>, Vec<Vec<f64>>)> {
     let values = (0..n).map(|j| eigen.S().column_vector()[j]).collect();
     let vectors = (0..n).map(|j| (0..n).map(|i| eigen.U()[(i, j)]).collect()).collect();
     Ok((values, vectors))
+}
+
+/// The solution V of `A V = P` by Gaussian elimination with partial pivoting on the full matrix, as the papers solve
+/// Nasri's system. O(N³) time, 8N² bytes. Not finite where A is singular.
+///
+/// # Panics
+/// If there is not one point a vertex.
+pub fn gaussian_elimination(system: &LimitSystem, points: &[DVec3]) -> Vec<DVec3> {
+    assert_eq!(points.len(), system.len(), "one point a vertex");
+    let mut v = Mat::from_fn(points.len(), 3, |i, axis| points[i][axis]);
+    to_dense(&system.a).partial_piv_lu().solve_in_place(v.as_mut());
+    (0..points.len()).map(|i| DVec3::new(v[(i, 0)], v[(i, 1)], v[(i, 2)])).collect()
 }
 
 fn to_dense(s: &Csr) -> Mat<f64> {

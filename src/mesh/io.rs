@@ -83,6 +83,11 @@ impl Format {
     }
 }
 
+/// Whether a name ends as mesh files do.
+pub fn has_mesh_ending(path: &Path) -> bool {
+    path.extension().is_some() && Format::of(path).is_ok()
+}
+
 /// Checks early that a file of this name can be written as a mesh.
 ///
 /// # Errors

@@ -23,6 +23,7 @@ pub mod ply;
 pub(crate) mod text;
 pub mod topology;
 pub mod validate;
+pub mod vertex_data;
 
 use std::sync::OnceLock;
 

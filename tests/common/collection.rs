@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// The collection's folder; `None`, said on standard error, where it is absent.
 pub fn collection() -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
+    let root = super::root().join("../shared/meshes");
     if root.is_dir() {
         return Some(root);
     }

@@ -5,4 +5,14 @@ pub mod collection;
 pub mod formulas;
 pub mod matrix_market;
 pub mod meshes;
+pub mod pipelines;
+pub mod replay;
 pub mod tol;
+
+use std::path::{Path, PathBuf};
+
+/// The root of the project, whichever of its packages is tested.
+pub fn root() -> PathBuf {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    if package.ends_with("experiments") { package.join("..") } else { package.to_path_buf() }
+}

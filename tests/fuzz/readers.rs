@@ -6,13 +6,13 @@ use std::io::Write;
 use std::path::Path;
 
 use limitlab::Result;
-use limitlab::cli::constraints;
 use limitlab::mesh::io::Loaded;
 use limitlab::mesh::validate::{Boundary, validate};
+use limitlab::mesh::vertex_data;
 use tempfile::NamedTempFile;
 
-use crate::formats::{FORMATS, Format, writes_and_reads_back};
-use crate::surface::Surface;
+use super::formats::{FORMATS, Format, writes_and_reads_back};
+use super::surface::Surface;
 
 /// Vertices of the mesh that lists are about.
 const VERTICES: usize = 12;
@@ -79,17 +79,17 @@ fn file(bytes: &[u8], ending: &str) -> NamedTempFile {
 
 fn vertices(bytes: &[u8]) {
     let listed = file(bytes, ".txt");
-    let from_file = accepted(constraints::vertex_marks(listed.path().to_str().unwrap(), VERTICES));
+    let from_file = accepted(vertex_data::vertex_marks(listed.path().to_str().unwrap(), VERTICES));
     // A comment of a file may be in any encoding.
     let Ok(text) = std::str::from_utf8(bytes) else { return };
-    assert_eq!(accepted(constraints::vertex_marks(text, VERTICES)), from_file);
+    assert_eq!(accepted(vertex_data::vertex_marks(text, VERTICES)), from_file);
     let Some(marks) = from_file else { return };
     let chosen: Vec<String> = (0..VERTICES).filter(|&v| marks[v]).map(|v| v.to_string()).collect();
-    assert_eq!(constraints::vertex_marks(&chosen.join(","), VERTICES).unwrap(), marks);
+    assert_eq!(vertex_data::vertex_marks(&chosen.join(","), VERTICES).unwrap(), marks);
 }
 
 fn normals(bytes: &[u8]) {
-    let read = |bytes: &[u8]| constraints::normals(file(bytes, ".txt").path(), VERTICES);
+    let read = |bytes: &[u8]| vertex_data::normals(file(bytes, ".txt").path(), VERTICES);
     rows_read_back(accepted(read(bytes)), |n| format!("{:?} {:?} {:?}", n.x, n.y, n.z), |text| read(text.as_bytes()));
 }
 
@@ -97,7 +97,7 @@ fn numbers(bytes: &[u8]) {
     // Vertices without a number get one that no file holds.
     let read = |bytes: &[u8]| {
         let file = file(bytes, ".txt");
-        let numbers = constraints::numbers(file.path().to_str().unwrap(), VERTICES, f64::NEG_INFINITY)?;
+        let numbers = vertex_data::numbers(file.path().to_str().unwrap(), VERTICES, f64::NEG_INFINITY)?;
         Ok(numbers.into_iter().map(|x| (x != f64::NEG_INFINITY).then_some(x)).collect())
     };
     rows_read_back(accepted(read(bytes)), |x| format!("{x:?}"), |text| read(text.as_bytes()));

@@ -10,7 +10,7 @@ use limitlab::subdivide::{Refinement, catmull_clark};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::{distance, noisy, topology};
+use crate::common::pipelines::{distance, noisy, topology};
 
 /// All points, nothing else.
 const ALL: Constraints = Constraints { interpolated: None, normals: None, handles: None };

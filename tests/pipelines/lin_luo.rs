@@ -8,7 +8,7 @@ use limitlab::interpolate::lin_luo::{curve, surface};
 use limitlab::mesh::{Mesh, builtin};
 use limitlab::subdivide::{Refinement, sqrt3};
 
-use crate::{ROUNDING, distance, noisy, topology};
+use crate::common::pipelines::{ROUNDING, distance, noisy, topology};
 
 fn polygon(n: usize) -> Vec<DVec3> {
     let point = |i: usize| {

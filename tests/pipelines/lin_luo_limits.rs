@@ -9,7 +9,7 @@ use limitlab::interpolate::lin_luo::surface::refine_n;
 use limitlab::mesh::Mesh;
 use limitlab::subdivide::sqrt3;
 
-use crate::{ROUNDING, distance, noisy, topology};
+use crate::common::pipelines::{ROUNDING, distance, noisy, topology};
 
 const MESHES: [&str; 4] = ["star:5", "bipyramid:8", "irregular-tri:60", "icosphere:1"];
 

@@ -12,7 +12,7 @@ use limitlab::solvers::iteration::Iterate;
 use limitlab::solvers::{Outcome, Setup, Stop, run, run_watched, solve};
 use limitlab::subdivide::{Refinement, catmull_clark};
 
-use crate::{ROUNDING, centroid, distance, noisy, topology};
+use crate::common::pipelines::{ROUNDING, centroid, distance, noisy, topology};
 
 const MESHES: [&str; 5] = ["torus:7x5", "quad-sphere:2", "dodecahedron", "irregular-poly:60", "icosphere:1"];
 
@@ -278,6 +278,8 @@ fn attributes_stay_creep_or_interpolate() {
     let stop = Stop { tolerance: 1e-13, max_iterations: 10 };
     let control = run(&system, &values, Setup::Lu, &stop).points;
     let refined = Mesh::new(refine(control, AttributeRule::Scheme), fine.faces);
-    let limits = catmull_clark::limit_positions(&refined, &crate::topology(&refined)).unwrap();
+    let limits =
+        catmull_clark::limit_positions(&refined, &limitlab::mesh::Topology::new(&refined.faces, refined.len()))
+            .unwrap();
     assert!(distance(&limits[..mesh.len()], &values) < 1e-10);
 }

@@ -11,7 +11,7 @@ use limitlab::mesh::{Mesh, builtin, io};
 use limitlab::solvers::{Outcome, Setup, Stop, run, run_watched};
 use limitlab::subdivide::doo_sabin::{self, Rule};
 
-use crate::{ROUNDING, centroid, distance, noisy, topology};
+use crate::common::pipelines::{ROUNDING, centroid, distance, noisy, topology};
 
 const MESHES: [&str; 4] = ["torus:7x5", "dodecahedron", "irregular-poly:60", "icosphere:1"];
 

@@ -10,10 +10,10 @@ use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use limitlab::solvers::{Errors, Iterate, Outcome, Report, Setup, Stop, run_watched};
 use nalgebra::DMatrix;
 
+use super::setups::reversed;
 use crate::common::formulas::{Plain, assemble};
 use crate::common::meshes::*;
 use crate::common::tol;
-use crate::setups::reversed;
 
 /// N×3: a point a row.
 type Points = DMatrix<f64>;
@@ -414,14 +414,14 @@ fn chebyshev_keeps_its_promise() {
         for factor in [1e-2, 1e-5, 1e-9] {
             let promised = promised_iterations(spectrum, factor);
             let stop = Stop { tolerance: 0.0, max_iterations: promised as usize };
-            let solution = crate::setups::checked(&system, &mesh.positions, Setup::Chebyshev { spectrum }, &stop);
+            let solution = super::setups::checked(&system, &mesh.positions, Setup::Chebyshev { spectrum }, &stop);
             assert_eq!(solution.report.iterations as f64, promised, "{scheme}");
             let reached = norm(&solution.points) / start;
             assert!(reached <= factor * (1.0 + 1e-6), "{scheme}: {reached:e} > {factor:e}");
 
             let h_max = system.h.iter().copied().fold(0.0, f64::max);
             let stop = Stop { tolerance: factor * h_max.sqrt() * start, max_iterations: 1000 };
-            let solution = crate::setups::checked(&system, &mesh.positions, Setup::Chebyshev { spectrum }, &stop);
+            let solution = super::setups::checked(&system, &mesh.positions, Setup::Chebyshev { spectrum }, &stop);
             assert_eq!(solution.report.outcome, Outcome::Converged);
             assert!(solution.report.iterations as f64 <= promised, "{scheme}");
         }

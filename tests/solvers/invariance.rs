@@ -6,9 +6,9 @@ use limitlab::mesh::generate::permute_vertices;
 use limitlab::mesh::order::Order;
 use limitlab::solvers::{Setup, Solution, Stop};
 
+use super::setups::*;
 use crate::common::meshes::*;
 use crate::common::tol;
-use crate::setups::*;
 
 fn is_krylov(setup: Setup) -> bool {
     use Setup::*;

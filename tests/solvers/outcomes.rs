@@ -6,8 +6,8 @@ use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::Mesh;
 use limitlab::solvers::{Outcome, Setup, Stop, run};
 
+use super::setups::*;
 use crate::common::meshes::*;
-use crate::setups::*;
 
 /// The mean of the neighbours: rows sum to 1, but M = Adj has a zero diagonal and negative eigenvalues.
 struct Neighbours;

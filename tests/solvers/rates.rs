@@ -9,9 +9,9 @@ use limitlab::mesh::Mesh;
 use limitlab::solvers::{Errors, Method, Outcome, Setup, Solution, Stop};
 use std::f64::consts::TAU;
 
+use super::setups::checked;
 use crate::common::meshes::*;
 use crate::common::tol;
-use crate::setups::checked;
 
 fn solved(mesh: &Mesh, scheme: Scheme, setup: Setup) -> Solution {
     let stop = Stop { tolerance: 1e-12 * mesh.diagonal(), max_iterations: 20_000 };

@@ -6,10 +6,10 @@ use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::{Mesh, io};
 use limitlab::solvers::{Outcome, Setup, Stop};
 
+use super::setups::*;
 use crate::common::collection::collection;
 use crate::common::meshes::*;
 use crate::common::tol;
-use crate::setups::*;
 
 fn stop(mesh: &Mesh) -> Stop {
     Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 20_000 }

@@ -5,10 +5,10 @@ use limitlab::assemble::Scheme;
 use limitlab::solvers::{Outcome, Setup, Stop};
 use nalgebra::DMatrix;
 
+use super::setups::*;
 use crate::common::formulas::assemble;
 use crate::common::meshes::*;
 use crate::common::tol;
-use crate::setups::*;
 
 const STOP: Stop = Stop { tolerance: 1e-11, max_iterations: 200_000 };
 

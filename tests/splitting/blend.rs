@@ -2,7 +2,7 @@
 
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix, condition_over_alpha, crossings};
 
-use crate::EIGEN;
+use super::EIGEN;
 
 /// Found with an independent implementation, to the digits given.
 const CROSSINGS: [(usize, f64); 7] =

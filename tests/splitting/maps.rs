@@ -3,7 +3,7 @@
 use glam::DVec2;
 use limitlab::analysis::splitting::{LocalScheme, Net, SplittingMatrix, characteristic_map};
 
-use crate::{EIGEN, SCHEMES};
+use super::{EIGEN, SCHEMES};
 
 const VALENCES: [usize; 8] = [3, 4, 5, 6, 7, 8, 12, 50];
 const BLENDS: [LocalScheme; 3] =

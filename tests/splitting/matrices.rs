@@ -3,7 +3,7 @@
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix, distance_to_space, rows};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use crate::{EIGEN, ROUNDING, SCHEMES};
+use super::{EIGEN, ROUNDING, SCHEMES};
 
 const BLENDS: [LocalScheme; 4] = [
     LocalScheme::Sqrt3 { alpha: 0.5 },

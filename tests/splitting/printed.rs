@@ -3,7 +3,7 @@
 use limitlab::analysis::splitting::thall::Entry;
 use limitlab::analysis::splitting::thall_tables;
 
-use crate::EIGEN;
+use super::EIGEN;
 
 fn difference(entry: &Entry) -> f64 {
     (entry.printed - entry.computed).abs()

@@ -8,8 +8,8 @@ use limitlab::subdivide::{Refinement, butterfly, labsik_greiner, sqrt3, unified_
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::ROUNDING;
-use crate::meshes::*;
+use super::ROUNDING;
+use super::meshes::*;
 
 #[test]
 fn butterfly_keeps_its_vertices() {

@@ -8,8 +8,8 @@ use limitlab::mesh::Mesh;
 use limitlab::subdivide::{Refinement, labsik_greiner};
 use nalgebra::{DMatrix, DVector};
 
-use crate::ROUNDING;
-use crate::meshes::*;
+use super::ROUNDING;
+use super::meshes::*;
 
 /// The twelve points of the regular mask, for the triangle (0,0), (1,0), (0,1) of the lattice, in the order of
 /// `REGULAR`: corners, opposite, next to those.

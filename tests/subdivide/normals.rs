@@ -7,8 +7,8 @@ use limitlab::mesh::{Mesh, Topology};
 use limitlab::subdivide::doo_sabin::{self, Rule};
 use limitlab::subdivide::{Refinement, Tangents, catmull_clark, loop_scheme, sqrt3};
 
-use crate::ROUNDING;
-use crate::meshes::*;
+use super::ROUNDING;
+use super::meshes::*;
 
 type TangentsOf = fn(&Mesh, &Topology) -> limitlab::Result<Vec<Tangents>>;
 

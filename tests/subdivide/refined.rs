@@ -7,7 +7,7 @@ use limitlab::mesh::{Faces, Mesh, Topology, builtin};
 use limitlab::subdivide::doo_sabin::{self, Rule};
 use limitlab::subdivide::{Refinement, catmull_clark, loop_scheme, sqrt3, unified_sqrt3};
 
-use crate::meshes::*;
+use super::meshes::*;
 
 /// Meshes for a scheme: irregular, in several components, of any polygons where the scheme takes them, in no order,
 /// and the odd ones whose refinements have several edges between two vertices.

@@ -4,8 +4,8 @@ use glam::{DMat3, DVec3};
 use limitlab::mesh::{Faces, Mesh};
 use limitlab::subdivide::{Refinement, catmull_clark, doo_sabin, loop_scheme, sqrt3};
 
-use crate::ROUNDING;
-use crate::meshes::*;
+use super::ROUNDING;
+use super::meshes::*;
 
 fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
     match scheme {

@@ -6,7 +6,7 @@ use glam::DVec3;
 use limitlab::mesh::generate::dual;
 use limitlab::mesh::{Faces, Mesh};
 
-use crate::surface::Surface;
+use super::super::surface::Surface;
 
 /// No further operation on drafts with more vertices.
 const MOST_VERTICES: usize = 200;

@@ -15,8 +15,8 @@ use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Mesh, Topology};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::formats::writes_and_reads_back;
-use crate::surface::Surface;
+use super::formats::writes_and_reads_back;
+use super::surface::Surface;
 use draft::Draft;
 
 /// A mesh, and what else a run is told.

@@ -3,8 +3,8 @@
 use limitlab::mesh::{Mesh, Topology};
 use limitlab::subdivide::Refinement;
 
+use super::super::surface::Surface;
 use super::{Case, on_any_threads, suitable, systems};
-use crate::surface::Surface;
 
 pub fn keeps_surfaces(mesh: &Mesh, topology: &Topology, euler: i64) {
     for refinement in Refinement::ALL {

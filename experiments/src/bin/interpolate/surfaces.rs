@@ -1,0 +1,176 @@
+//! From control points, or by schemes that need no system, to what is written.
+
+use std::time::Instant;
+
+use limitlab::Result;
+use limitlab::error::Error;
+use limitlab::interpolate::halstead::{self, Energies, Fairness, Weights, fit};
+use limitlab::interpolate::lin_luo;
+use limitlab::interpolate::normals::Rotation;
+use limitlab::interpolate::surface::{Request, Surface, surface};
+use limitlab::mesh::frame::Frame;
+use limitlab::mesh::{Mesh, Topology};
+use limitlab::solvers::Errors;
+use limitlab::subdivide::Refinement;
+use limitlab_experiments::cli::Input;
+
+use super::Arguments;
+use super::control::{Control, Seconds};
+use super::wishes::Wishes;
+
+pub struct Finished {
+    pub method: &'static str,
+    pub surface: Surface,
+    pub iterations: usize,
+    pub status: &'static str,
+    pub errors: Errors,
+    pub tolerance: f64,
+    pub fairness: Option<Energies>,
+    pub seconds: Seconds,
+}
+
+pub fn refine(arguments: &Arguments, input: &Input, wishes: &Wishes, control: Control) -> Result<Finished> {
+    let start = Instant::now();
+    let flags = &arguments.shape;
+    let mesh = Mesh::new(control.points, input.mesh.faces.clone());
+    let request = Request {
+        levels: flags.subdivide.into(),
+        limit: flags.limit,
+        normals: flags.write_normals,
+        constraints: wishes.constraints(),
+        rotation: Rotation {
+            threshold: flags.normal_threshold.to_radians(),
+            tolerance: flags.normal_tolerance.to_radians(),
+            levels: flags.normal_levels.into(),
+        },
+    };
+    let points = &input.mesh.positions;
+    let surface = surface(mesh, || input.topology(), input.scheme, points, &request)?;
+    let mut seconds = control.seconds;
+    seconds.subdivide = start.elapsed().as_secs_f64();
+    Ok(Finished {
+        method: control.method,
+        surface,
+        iterations: control.iterations,
+        status: control.status,
+        errors: control.errors,
+        tolerance: control.tolerance,
+        fairness: None,
+        seconds,
+    })
+}
+
+/// The fairest control mesh, and its surface.
+pub fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Finished> {
+    let start = Instant::now();
+    let fairness = Fairness::new(&input.mesh)?;
+    let assemble = input.check_seconds + start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let flags = &arguments.shape;
+    let weights = Weights { thin_plate: flags.thin_plate, membrane: flags.membrane };
+    let points = &input.mesh.positions;
+    let found = fit(&fairness, points, &wishes.constraints(), weights)?;
+    let solve = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let request = Request {
+        levels: usize::from(flags.subdivide).saturating_sub(halstead::LEVELS),
+        limit: flags.limit,
+        normals: flags.write_normals,
+        ..Request::default()
+    };
+    let surface = surface(found.mesh, || &fairness.topology, input.scheme, &[], &request)?;
+    Ok(Finished {
+        method: "halstead",
+        surface,
+        iterations: 1,
+        status: "converged",
+        errors: found.errors,
+        tolerance: 0.0,
+        fairness: Some(found.energies),
+        seconds: Seconds { assemble, solve, subdivide: start.elapsed().as_secs_f64(), ..Seconds::default() },
+    })
+}
+
+/// The unified √3 surface. Its errors are the distances of the vertices with α = 1, which stay: 0.
+pub fn unified(arguments: &Arguments, input: &Input, alpha: &[f64]) -> Result<Finished> {
+    let flags = &arguments.shape;
+    if flags.subdivide == 0 && !flags.limit {
+        return Err(Error::Computation(
+            "the unified √3 scheme leaves the control mesh as it is: ask for the surface with --subdivide or --limit"
+                .into(),
+        ));
+    }
+    let start = Instant::now();
+    let (mut mesh, alpha) = lin_luo::surface::refine_n(&input.mesh, alpha, flags.subdivide.into())?;
+    let mut normals = None;
+    if flags.limit || flags.write_normals {
+        let found = lin_luo::limit::limits(&mesh, &alpha)?;
+        normals = flags.write_normals.then_some(found.normals);
+        if flags.limit {
+            mesh.positions = found.positions;
+        }
+    }
+    let surface = Surface { normals, ..Surface::plain(mesh) };
+    Ok(unsolved("lin-luo", input, surface, start))
+}
+
+/// The surface of a scheme that keeps its vertices.
+pub fn keeping(arguments: &Arguments, input: &Input, scheme: Refinement) -> Result<Finished> {
+    let flags = &arguments.shape;
+    let start = Instant::now();
+    let mesh = scheme.refine_n(&input.mesh, flags.subdivide.into())?;
+    let normals = if flags.write_normals {
+        let topology = Topology::new(&mesh.faces, mesh.len());
+        Some(scheme.limit_normals(&mesh, &topology)?)
+    } else {
+        None
+    };
+    let surface = Surface { normals, ..Surface::plain(mesh) };
+    Ok(unsolved(scheme.name(), input, surface, start))
+}
+
+/// A surface without a system: vertices that are interpolated stay, so their errors are 0.
+fn unsolved(method: &'static str, input: &Input, surface: Surface, start: Instant) -> Finished {
+    Finished {
+        method,
+        surface,
+        iterations: 0,
+        status: "converged",
+        errors: Errors { max: 0.0, mean: 0.0 },
+        tolerance: 0.0,
+        fairness: None,
+        seconds: Seconds {
+            assemble: input.check_seconds,
+            subdivide: start.elapsed().as_secs_f64(),
+            ..Seconds::default()
+        },
+    }
+}
+
+/// Takes what was computed in the frame of the input to mesh units.
+pub fn leave(frame: &Frame, finished: &mut Finished) {
+    let unit = frame.scale();
+    frame.leave(&mut finished.surface.mesh.positions);
+    finished.errors = finished.errors * unit;
+    finished.tolerance *= unit;
+    if let Some(energies) = &mut finished.fairness {
+        // Integrals of squares.
+        energies.thin_plate *= unit * unit;
+        energies.membrane *= unit * unit;
+    }
+}
+
+/// Nothing that is no number reaches a file.
+pub fn require_finite(input: &Input, surface: &Surface) -> Result<()> {
+    let normals = surface.normals.iter().flatten();
+    match surface.mesh.positions.iter().chain(normals).position(|p| !p.is_finite()) {
+        None => Ok(()),
+        Some(v) => Err(Error::mesh(
+            &input.name,
+            format!(
+                "vertex {} of the result is not finite: the points are too large for doubles; scale the mesh down",
+                v % surface.mesh.len()
+            ),
+        )),
+    }
+}

@@ -1,0 +1,61 @@
+//! What is wished of single vertices.
+
+use glam::DVec3;
+use limitlab::Result;
+use limitlab::error::Error;
+use limitlab::interpolate::zheng_cai::Constraints;
+use limitlab::mesh::vertex_data;
+use limitlab_experiments::cli::Input;
+
+use super::ShapeFlags;
+
+/// The flags about single vertices, one entry a vertex each.
+pub struct Wishes {
+    pub interpolated: Option<Vec<bool>>,
+    pub normals: Option<Vec<Option<DVec3>>>,
+    pub handles: Option<Vec<f64>>,
+    pub alpha: Option<Vec<f64>>,
+}
+
+impl Wishes {
+    pub fn read(flags: &ShapeFlags, input: &Input) -> Result<Self> {
+        let n = input.mesh.len();
+        let marks = flags.vertices.as_deref();
+        let interpolated = marks.map(|t| vertex_data::vertex_marks(t, n)).transpose().map_err(|e| match e {
+            Error::Unknown(what) => Error::Unknown(format!("--vertices: {what}")),
+            other => other,
+        })?;
+        let is_interpolated = |v: usize| interpolated.as_ref().is_none_or(|m| m[v]);
+        let file = flags.normals.as_deref();
+        let mut normals = file.map(|p| vertex_data::normals(p, n)).transpose()?;
+        if let Some(normals) = normals.as_mut().filter(|n| n.iter().all(Option::is_some)) {
+            // A file with a normal for every vertex means those that are interpolated.
+            for (v, normal) in normals.iter_mut().enumerate() {
+                *normal = normal.filter(|_| is_interpolated(v));
+            }
+        }
+        let text = flags.shape_handle.as_deref();
+        let mut handles = text.map(|t| vertex_data::numbers(t, n, 1.0)).transpose()?;
+        if text.is_some_and(|t| t.parse::<f64>().is_ok()) {
+            for (v, handle) in handles.iter_mut().flatten().enumerate() {
+                *handle = if is_interpolated(v) { *handle } else { 1.0 };
+            }
+        }
+        let text = flags.alpha.as_deref();
+        let mut alpha = text.map(|t| vertex_data::numbers(t, n, 0.0)).transpose()?;
+        for (v, a) in alpha.iter_mut().flatten().enumerate() {
+            if interpolated.as_ref().is_some_and(|m| m[v]) {
+                *a = 1.0;
+            }
+        }
+        Ok(Wishes { interpolated, normals, handles, alpha })
+    }
+
+    pub fn constraints(&self) -> Constraints<'_> {
+        Constraints {
+            interpolated: self.interpolated.as_deref(),
+            normals: self.normals.as_deref(),
+            handles: self.handles.as_deref(),
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! The ledger: every statement of the four papers that a computation can confirm, correct or refute, with the
+//! numbers that decide it. All numbers are computed in each run, and verdicts follow from them by stated thresholds.
+//!
+//! - [`finding`]: numbers, thresholds, verdicts;
+//! - [`lab`]: the meshes and small tools that claims share;
+//! - one file a paper, and beside it one each for subjects of their own: [`thall`], [`zheng_cai`], [`pia`], [`lin_luo`];
+//! - [`findings`]: the page on what is settled and what is wrong, filled with the ledger's numbers.
+
+mod finding;
+mod findings;
+mod lab;
+mod lin_luo;
+mod pia;
+mod pia_catmull_clark;
+mod thall;
+mod thall_masks;
+mod thall_surfaces;
+mod zheng_cai;
+mod zheng_cai_faces;
+mod zheng_cai_speed;
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use serde_json::{Value as Json, json};
+
+use limitlab::Result;
+use limitlab::error::Error;
+use limitlab::output::write_file;
+use limitlab_experiments::cli::number;
+use limitlab_experiments::report::{Cell, Column, Table, readable};
+
+use crate::context::{Context, Item};
+use finding::{Evidence, Finding, Value, Verdict};
+use lab::Lab;
+
+pub const LEDGER: Item = Item { id: "claims", title: "The papers' claims one by one, with verdicts", run: run_ledger };
+
+pub const FINDINGS: Item =
+    Item { id: "findings", title: "Findings: what the papers left open or state wrongly", run: run_findings };
+
+/// A statement of a paper.
+pub struct Claim {
+    /// As in `--only ID`: the paper's letter and a number.
+    pub id: &'static str,
+    pub title: &'static str,
+    /// Where in the paper.
+    pub place: &'static str,
+    /// What it says there, in our words.
+    pub printed: &'static str,
+    /// Too slow for a quick run.
+    pub slow: bool,
+    pub check: fn(&Lab) -> Result<Finding>,
+}
+
+/// A claim with what came of it.
+pub struct Record {
+    pub claim: &'static Claim,
+    pub finding: Finding,
+}
+
+/// The papers by the letter of their claims.
+const PAPERS: [(char, &str); 4] = [
+    ('T', "Thall 2003, Fast C² Interpolating Subdivision Surfaces"),
+    ('Z', "Zheng & Cai 2005, Making Doo-Sabin surface interpolation always work"),
+    ('P', "Progressive Iterative Interpolation for Subdivision Surfaces"),
+    ('L', "Lin & Luo, A Unified √3 Subdivision Scheme"),
+];
+
+/// All claims in the order of the ledger.
+pub fn all() -> impl Iterator<Item = &'static Claim> {
+    [thall::CLAIMS, thall_masks::CLAIMS, zheng_cai::CLAIMS, pia::CLAIMS, lin_luo::CLAIMS].into_iter().flatten()
+}
+
+pub fn find(id: &str) -> Option<&'static Claim> {
+    all().find(|c| c.id == id)
+}
+
+/// Computes some claims, prints them, and holds them against the ledger in `--check`; writes nothing.
+///
+/// # Errors
+/// Those of the computations.
+pub fn run_alone(context: &mut Context, claims: &[&'static Claim]) -> Result<()> {
+    let records = compute(context, claims.iter().copied())?;
+    let sections: Vec<String> = records.iter().map(section).collect();
+    context.printer.page(&sections.join("\n"))?;
+    context.compare(&table(&records))?;
+    context.ledger = records;
+    Ok(())
+}
+
+fn run_ledger(context: &mut Context) -> Result<()> {
+    let quick = context.quick;
+    let records = compute(context, all().filter(|c| !(quick && c.slow)))?;
+    let table = table(&records);
+    let folder = context.folder();
+    let write = |name: &str, text: &str| write_file(&folder.join(name), |out| out.write_all(text.as_bytes()));
+    let page = page(context, &records);
+    write("claims.md", &page)?;
+    write("claims.csv", &table.to_csv())?;
+    write("claims.json", &format!("{:#}\n", json(&records)))?;
+    context.printer.page(&page)?;
+    context.compare(&table)?;
+    context.ledger = records;
+    Ok(())
+}
+
+fn run_findings(context: &mut Context) -> Result<()> {
+    if context.quick {
+        // The page quotes claims that a quick run leaves out.
+        return Ok(());
+    }
+    if context.ledger.is_empty() {
+        context.ledger = compute(context, all())?;
+    }
+    let page = findings::page(&context.note_on_meshes(), &context.ledger)?;
+    write_file(&context.folder().join("findings.md"), |out| out.write_all(page.as_bytes()))?;
+    context.printer.page(&page)
+}
+
+fn compute(context: &Context, claims: impl Iterator<Item = &'static Claim>) -> Result<Vec<Record>> {
+    let lab = Lab::new(context);
+    claims
+        .map(|claim| {
+            let finding = (claim.check)(&lab).map_err(|e| Error::Computation(format!("claim {}: {e}", claim.id)))?;
+            Ok(Record { claim, finding })
+        })
+        .collect()
+}
+
+/// One row for every number of every claim.
+fn table(records: &[Record]) -> Table {
+    let mut table = Table::new(
+        "claims",
+        LEDGER.title,
+        vec![
+            Column::key("claim"),
+            Column::key("quantity"),
+            Column::remark("title"),
+            // What is measured with a random start or by sums of many terms differs in the last digits.
+            Column::number("value", 1e-4, 6).floor(1e-9),
+            Column::count("count"),
+            Column::time("time"),
+            Column::text("relation"),
+            Column::number("threshold", 1e-9, 6),
+            Column::text("holds"),
+            Column::text("verdict"),
+            Column::remark("remark"),
+        ],
+    );
+    let none = Evidence::shown("", f64::NAN);
+    for Record { claim, finding } in records {
+        let rows = match finding.evidence.as_slice() {
+            [] => std::slice::from_ref(&none),
+            evidence => evidence,
+        };
+        for e in rows {
+            let [mut value, mut count, mut time] = [Cell::Empty, Cell::Empty, Cell::Empty];
+            match e.value {
+                _ if e.quantity.is_empty() => {}
+                Value::Number(x) => value = x.into(),
+                Value::Count(n) => count = n.into(),
+                Value::Time(x) => time = x.into(),
+            }
+            table.push(vec![
+                claim.id.into(),
+                e.quantity.as_str().into(),
+                claim.title.into(),
+                value,
+                count,
+                time,
+                e.test.map(|t| t.0.sign()).into(),
+                e.test.map(|t| t.1).into(),
+                e.holds().map(|h| if h { "yes" } else { "no" }).into(),
+                finding.verdict().name().into(),
+                finding.remark.as_str().into(),
+            ]);
+        }
+    }
+    table
+}
+
+pub fn json(records: &[Record]) -> Json {
+    let evidence = |e: &Evidence| {
+        let value = match e.value {
+            Value::Count(n) => n.into(),
+            _ => number(e.value.number()),
+        };
+        json!({
+            "quantity": e.quantity,
+            "value": value,
+            "relation": e.test.map(|t| t.0.sign()),
+            "threshold": e.test.map(|t| t.1),
+            "holds": e.holds(),
+        })
+    };
+    let record = |Record { claim, finding }: &Record| {
+        json!({
+            "id": claim.id,
+            "title": claim.title,
+            "source": source(claim),
+            "printed": claim.printed,
+            "verdict": finding.verdict().name(),
+            "evidence": finding.evidence.iter().map(evidence).collect::<Vec<_>>(),
+            "remark": finding.remark,
+        })
+    };
+    records.iter().map(record).collect()
+}
+
+fn paper(claim: &Claim) -> &'static str {
+    let letter = claim.id.chars().next();
+    let found = PAPERS.iter().find(|(l, _)| Some(*l) == letter);
+    found.map_or("", |(_, name)| name)
+}
+
+fn source(claim: &Claim) -> String {
+    format!("{}, {}", paper(claim), claim.place)
+}
+
+/// How many claims have each verdict, those that occur, as `12 reproduced, 3 corrected`.
+fn counts(records: &[Record]) -> String {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for record in records {
+        *counts.entry(record.finding.verdict().name()).or_default() += 1;
+    }
+    let parts = Verdict::ALL.iter().filter_map(|v| counts.get(v.name()).map(|n| format!("{n} {}", v.name())));
+    parts.collect::<Vec<_>>().join(", ")
+}
+
+/// The whole ledger for people: a list with verdicts, then a section a claim.
+fn page(context: &Context, records: &[Record]) -> String {
+    let mut page = format!(
+        "# {}\n\n{}\n\nEach number was computed in the run that wrote this page; each verdict follows from the \
+         numbers by the thresholds beside them. *Reproduced*: as printed. *Corrected*: a slip; the right form holds, \
+         the printed one does not. *Refuted*: by the counterexample given. *Settled*: left open or not said in the \
+         paper, decided here. *Not reproducible*: with the reason. *Not confirmed*: a number is on the wrong side of \
+         its threshold. Random meshes are {} closed ones of at most {} vertices with valences from 3, from fixed \
+         seeds; L is the diagonal of a mesh's bounding box. `claims.csv` has a row for every number, `claims.json` \
+         both.\n\n{} claims: {}.\n",
+        LEDGER.title,
+        context.note_on_meshes(),
+        lab::RANDOM_MESHES,
+        lab::RANDOM_VERTICES,
+        records.len(),
+        counts(records),
+    );
+    if context.quick {
+        let left_out: Vec<&str> = all().filter(|c| c.slow).map(|c| c.id).collect();
+        let _ = write!(page, "\nQuick run, without {}.\n", left_out.join(", "));
+    }
+    for (_, name) in PAPERS {
+        let own = || records.iter().filter(move |r| paper(r.claim) == name);
+        let _ = write!(page, "\n## {name}\n\n| ID | claim | verdict |\n| --- | --- | --- |\n");
+        for Record { claim, finding } in own() {
+            let verdict = finding.verdict().name();
+            let _ = writeln!(page, "| {} | {} | {verdict} |", claim.id, claim.title);
+        }
+        for record in own() {
+            let _ = write!(page, "\n{}", section(record));
+        }
+    }
+    page
+}
+
+/// A claim for people.
+fn section(Record { claim, finding }: &Record) -> String {
+    let mut text = format!(
+        "### {} {} — {}\n\n{}. {}\n\n",
+        claim.id,
+        claim.title,
+        finding.verdict().name(),
+        claim.place,
+        claim.printed
+    );
+    for e in &finding.evidence {
+        let _ = write!(text, "- {}: {}", e.quantity, shown(e.value));
+        if let Some((relation, threshold)) = e.test {
+            let missed = if e.holds() == Some(false) { "; it is not" } else { "" };
+            let _ = write!(text, " (to be {} {}{missed})", relation.sign(), shown(threshold.into()));
+        }
+        text.push('\n');
+    }
+    if !finding.remark.is_empty() {
+        let gap = if finding.evidence.is_empty() { "" } else { "\n" };
+        let _ = writeln!(text, "{gap}{}", finding.remark);
+    }
+    text
+}
+
+/// A number for people: six digits at most, whole numbers as such.
+fn shown(value: Value) -> String {
+    let x = value.number();
+    match value {
+        Value::Count(n) => n.to_string(),
+        Value::Time(_) => readable(x, 2),
+        Value::Number(_) if x.fract() == 0.0 && x.abs() < 1e6 => x.to_string(),
+        Value::Number(_) if x.abs() < 1e-3 => readable(x, 2),
+        Value::Number(_) => {
+            let text = readable(x, 6);
+            match text.contains('.') && !text.contains('e') {
+                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+                false => text,
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,311 @@
+//! What the items share: where meshes come from, where results go, what they are held against.
+
+use std::path::{Path, PathBuf};
+
+use limitlab::Result;
+use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::error::Error;
+use limitlab::mesh::noise::add_noise;
+use limitlab::mesh::validate::{Boundary, validate};
+use limitlab::mesh::{Mesh, Topology, builtin, io};
+use limitlab::output::create_dir;
+use limitlab_experiments::cli::{self, Printer, STAND_IN_NOISE};
+use limitlab_experiments::report::index::{self, Entry};
+use limitlab_experiments::report::{Animation, Figure, Table, compare};
+
+use serde_json::{Value as Json, json};
+
+use crate::claims::Record;
+
+/// One table or figure.
+pub struct Item {
+    /// As in `--only ID`, and the stem of its files.
+    pub id: &'static str,
+    pub title: &'static str,
+    pub run: fn(&mut Context) -> Result<()>,
+}
+
+/// The folder of the results on stand-ins, within the report folder.
+const BUILT_IN: &str = "built-in";
+
+/// A run of the program.
+pub struct Context {
+    root: PathBuf,
+    models: Option<PathBuf>,
+    pub quick: bool,
+    check: Option<PathBuf>,
+    differences: Vec<String>,
+    pub printer: Printer,
+    /// The ledger of claims, once it is computed.
+    pub ledger: Vec<Record>,
+}
+
+/// A mesh with its name for the tables.
+pub struct Subject {
+    pub name: String,
+    pub mesh: Mesh,
+    pub topology: Topology,
+}
+
+impl Subject {
+    /// The limit system under `scheme`.
+    ///
+    /// # Errors
+    /// As [`LimitSystem::new`], with the mesh's name.
+    pub fn system(&self, scheme: Scheme) -> Result<LimitSystem> {
+        LimitSystem::new(&self.mesh, &self.topology, scheme).map_err(|e| Error::mesh(&self.name, e.to_string()))
+    }
+
+    /// Whether the scheme is defined on the mesh's faces.
+    pub fn suits(&self, scheme: Scheme) -> bool {
+        scheme.first_unsuitable_face(&self.mesh.faces).is_none()
+    }
+}
+
+impl Context {
+    pub fn new(
+        root: &Path,
+        models: Option<&Path>,
+        quick: bool,
+        check: Option<&Path>,
+        printer: Printer,
+    ) -> Result<Self> {
+        if let Some(folder) = models
+            && !folder.join("closed").is_dir()
+        {
+            return Err(Error::Unknown(format!(
+                "{}: no folder closed/ in it; --meshes names the folder with the models' folders closed/ and open/",
+                folder.display()
+            )));
+        }
+        if let Some(folder) = check
+            && !folder.is_dir()
+        {
+            return Err(Error::Unknown(format!("{}: no such folder; --check names a report folder", folder.display())));
+        }
+        let context = Context {
+            root: root.to_path_buf(),
+            models: models.map(Path::to_path_buf),
+            quick,
+            check: check.map(Path::to_path_buf),
+            differences: Vec::new(),
+            printer,
+            ledger: Vec::new(),
+        };
+        create_dir(&context.folder())?;
+        Ok(context)
+    }
+
+    /// Whether the real models are at hand.
+    pub fn real(&self) -> bool {
+        self.models.is_some()
+    }
+
+    /// Where this run's results go.
+    pub fn folder(&self) -> PathBuf {
+        self.within(&self.root)
+    }
+
+    fn within(&self, root: &Path) -> PathBuf {
+        if self.real() { root.to_path_buf() } else { root.join(BUILT_IN) }
+    }
+
+    /// What the tables say about their meshes.
+    pub fn note_on_meshes(&self) -> String {
+        if self.real() {
+            "Meshes: real models, named by their files (PSB m… are models of the Princeton Shape Benchmark), in file \
+             coordinates."
+                .into()
+        } else {
+            format!(
+                "Meshes: built-in stand-ins, not the paper's models, with noise {STAND_IN_NOISE} (amplitude × mean \
+                 edge length : seed); run with --meshes DIR for the models."
+            )
+        }
+    }
+
+    /// A real model, `closed/NAME.off` and the like.
+    ///
+    /// # Errors
+    /// If it is missing, or invalid under this treatment of the boundary.
+    pub fn model(&self, file: &str, boundary: Boundary) -> Result<Subject> {
+        let Some(folder) = &self.models else {
+            return Err(Error::Computation(format!("{file} is a real model: run with --meshes DIR")));
+        };
+        let loaded = io::read(&folder.join(file))?;
+        let topology = validate(&loaded.mesh, None, boundary).into_topology(&loaded.name)?;
+        let name = Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(Subject { name, mesh: loaded.mesh, topology })
+    }
+
+    /// A built-in mesh with the noise of stand-ins.
+    ///
+    /// # Errors
+    /// If there is no such mesh.
+    pub fn stand_in(&self, name: &str) -> Result<Subject> {
+        let mut mesh = builtin::builtin(name)?;
+        add_noise(&mut mesh, STAND_IN_NOISE.amplitude, STAND_IN_NOISE.seed);
+        let topology = Topology::new(&mesh.faces, mesh.len());
+        Ok(Subject { name: name.to_owned(), mesh, topology })
+    }
+
+    /// All valid closed models in order of their names, or the stand-ins `otherwise`; none with more than `most`
+    /// vertices.
+    ///
+    /// # Errors
+    /// If a folder or file cannot be read, or a closed model is invalid.
+    pub fn subjects(&self, otherwise: &[&str], most: usize) -> Result<Vec<Subject>> {
+        let Some(folder) = &self.models else {
+            return otherwise
+                .iter()
+                .map(|name| self.stand_in(name))
+                .filter(|s| s.as_ref().is_ok_and(|s| s.mesh.len() <= most) || s.is_err())
+                .collect();
+        };
+        let closed = folder.join("closed");
+        let refused = |e| Error::io(&closed, "read", e);
+        let mut files: Vec<String> = Vec::new();
+        for entry in std::fs::read_dir(&closed).map_err(refused)? {
+            let name = entry.map_err(refused)?.file_name();
+            files.push(format!("closed/{}", name.to_string_lossy()));
+        }
+        files.sort();
+        let mut subjects = Vec::new();
+        for file in files {
+            let subject = self.model(&file, Boundary::Refuse)?;
+            if subject.mesh.len() <= most {
+                subjects.push(subject);
+            }
+        }
+        Ok(subjects)
+    }
+
+    /// Writes a table as CSV and Markdown, prints it, and holds it against the one in `--check`.
+    ///
+    /// # Errors
+    /// If a file cannot be read or written.
+    pub fn table(&mut self, mut table: Table) -> Result<()> {
+        table.notes.insert(0, self.note_on_meshes());
+        table.write(&self.folder())?;
+        self.printer.table(&table)?;
+        self.compare(&table)
+    }
+
+    /// Holds a table against the one of the same name in `--check`.
+    ///
+    /// # Errors
+    /// If that file cannot be read.
+    pub fn compare(&mut self, table: &Table) -> Result<()> {
+        if let Some(root) = &self.check {
+            let committed = self.within(root).join(format!("{}.csv", table.id));
+            for difference in compare(table, &committed)? {
+                self.differences.push(difference.to_string());
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes a figure as `STEM.png`.
+    ///
+    /// # Errors
+    /// If it cannot be drawn or written.
+    pub fn figure(&self, stem: &str, figure: &Figure) -> Result<()> {
+        figure.render()?.save(&self.folder().join(format!("{stem}.png")))
+    }
+
+    /// Writes figures of one size as an animation, `STEM.png`.
+    ///
+    /// # Errors
+    /// If one cannot be drawn, or the file not written.
+    pub fn animation(&self, stem: &str, figures: &[Figure]) -> Result<()> {
+        let animation =
+            Animation { frames: figures.iter().map(Figure::render).collect::<Result<_>>()?, milliseconds: 700 };
+        animation.save(&self.folder().join(format!("{stem}.png")))
+    }
+
+    /// Writes the index of all results in the report folder, those of earlier runs too.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn write_index(&self, items: &[Item]) -> Result<()> {
+        let mut entries = Vec::new();
+        for (folder, meshes) in [("", "the real models"), (BUILT_IN, "built-in stand-ins")] {
+            let files = listing(&self.root.join(folder))?;
+            for item in items {
+                let own: Vec<String> = files
+                    .iter()
+                    .filter(|f| belongs(f, item.id))
+                    .map(|f| Path::new(folder).join(f).to_string_lossy().into_owned())
+                    .collect();
+                if !own.is_empty() {
+                    entries.push(Entry {
+                        id: item.id.into(),
+                        title: item.title.into(),
+                        files: own,
+                        meshes: meshes.into(),
+                    });
+                }
+            }
+        }
+        index::write_index(
+            &self.root,
+            "Reports",
+            "What `reproduce` wrote: results on the papers' own models here, results on built-in stand-ins in \
+             `built-in/`. Each table is a Markdown file for people and a CSV file for programs; `cargo run --release \
+             -- --only ID` makes one again. [scaling.md](scaling.md), with its profile, threads, steps, edits and decay, \
+             is by the program `scaling`: time and memory over growing meshes, on one machine; ten million vertices \
+             in `ten-million/`.",
+            &entries,
+        )
+    }
+
+    /// The end of a run: with `--json` its object, in which `claims` are those that were computed; then success, or what differs from
+    /// `--check`.
+    ///
+    /// # Errors
+    /// The first difference and their number; standard output that cannot be written.
+    pub fn finish(self, claims: Json) -> Result<()> {
+        let folder = self.folder();
+        self.printer.finish(json!({
+            "meshes": self.models.map_or("built-in".into(), |folder| folder.display().to_string()),
+            "quick": self.quick,
+            "folder": folder.display().to_string(),
+            "claims": claims,
+            "differences": self.differences,
+        }))?;
+        for difference in &self.differences {
+            cli::say(format_args!("differs: {difference}"));
+        }
+        match self.differences.first() {
+            None => Ok(()),
+            Some(first) => Err(Error::Computation(format!(
+                "{} differences from the committed reports, the first: {first}; if the change is meant, run \
+                 reproduce again and commit its output",
+                self.differences.len()
+            ))),
+        }
+    }
+}
+
+/// Whether `file` is of the item `id`: its stem is the ID, or starts with it and two dashes.
+fn belongs(file: &str, id: &str) -> bool {
+    let stem = file.split('.').next().unwrap_or_default();
+    stem == id || stem.strip_prefix(id).is_some_and(|r| r.starts_with("--"))
+}
+
+/// The names of the files in a folder, sorted; none if it does not exist.
+fn listing(folder: &Path) -> Result<Vec<String>> {
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let refused = |e| Error::io(folder, "read", e);
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(refused)? {
+        let entry = entry.map_err(refused)?;
+        if entry.path().is_file() {
+            names.push(entry.file_name().to_string_lossy().into_owned());
+        }
+    }
+    names.sort();
+    Ok(names)
+}

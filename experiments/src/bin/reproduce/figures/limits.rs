@@ -1,0 +1,197 @@
+//! PIA Fig. 3–7 and Thall's surfaces: meshes beside limit surfaces through their vertices.
+
+use glam::DVec3;
+
+use limitlab::Result;
+use limitlab::assemble::Scheme;
+use limitlab::solvers::Setup;
+use limitlab::subdivide::Refinement;
+use limitlab_experiments::report::{Figure, Picture, Points};
+
+use super::{Album, GIVEN, Line, POINT, cage, control, limit_surface, sheet, view};
+use crate::context::Subject;
+
+/// A figure of the PIA paper.
+struct Printed {
+    name: &'static str,
+    caption: &'static str,
+    file: &'static str,
+    otherwise: &'static str,
+    scheme: Scheme,
+    /// Updates: the paper's iterations less one.
+    updates: usize,
+    up: DVec3,
+    /// Of the eye, in degrees.
+    azimuth: f64,
+    elevation: f64,
+    /// The part of the height, from the top, that is shown.
+    shown: f64,
+    /// Of a panel, in points.
+    size: (u32, u32),
+}
+
+const PRINTED: [Printed; 5] = [
+    Printed {
+        name: "pia-3-horse",
+        caption: "PIA Fig. 3 (horse): mesh and Loop surface, 12 iterations",
+        file: "closed/psb_m104_horse_233v.off",
+        otherwise: "irregular-tri:233",
+        scheme: Scheme::Loop,
+        updates: 11,
+        up: DVec3::Y,
+        azimuth: 30.0,
+        elevation: 12.0,
+        shown: 1.0,
+        size: (190, 190),
+    },
+    Printed {
+        name: "pia-4-bird",
+        caption: "PIA Fig. 4 (bird): mesh and Loop surface, 9 iterations",
+        file: "closed/psb_m32_bird_1129v.off",
+        otherwise: "irregular-tri:1129",
+        scheme: Scheme::Loop,
+        updates: 8,
+        up: DVec3::Y,
+        azimuth: 60.0,
+        elevation: 12.0,
+        shown: 1.0,
+        size: (190, 190),
+    },
+    Printed {
+        name: "pia-5-hand",
+        caption: "PIA Fig. 5 (hand): mesh and Loop surface, 3 iterations",
+        file: "closed/psb_m329_hand_6191v.off",
+        otherwise: "irregular-tri:6191",
+        scheme: Scheme::Loop,
+        updates: 2,
+        up: DVec3::NEG_Y,
+        azimuth: 20.0,
+        elevation: 12.0,
+        shown: 1.0,
+        size: (172, 182),
+    },
+    Printed {
+        name: "pia-6-boy",
+        caption: "PIA Fig. 6 (boy, holes filled): mesh and Loop surface, 6 iterations; the head alone",
+        file: "closed/psb_m149_boy_17342v_holesfilled.off",
+        otherwise: "icosphere:5",
+        scheme: Scheme::Loop,
+        updates: 5,
+        up: DVec3::Y,
+        azimuth: 60.0,
+        elevation: 12.0,
+        shown: 0.22,
+        size: (165, 160),
+    },
+    Printed {
+        name: "pia-7-mushroom",
+        caption: "PIA Fig. 7 (mushroom): mesh and Catmull-Clark surface, 8 iterations",
+        file: "closed/geomview_mushroom_226v.off",
+        otherwise: "irregular-quad:226",
+        scheme: Scheme::CatmullClark,
+        updates: 7,
+        up: DVec3::Y,
+        azimuth: 60.0,
+        elevation: 20.0,
+        shown: 1.0,
+        size: (190, 150),
+    },
+];
+
+fn refinement(scheme: Scheme) -> Refinement {
+    match scheme {
+        Scheme::Loop => Refinement::Loop,
+        _ => Refinement::CatmullClark,
+    }
+}
+
+/// The mesh beside its interpolating surface.
+pub fn pia(album: &mut Album) -> Result<()> {
+    for printed in &PRINTED {
+        let subject = album.subject(printed.file, printed.otherwise)?;
+        let system = subject.system(printed.scheme)?;
+        let (cage_mesh, error) = control(&subject, &system, Setup::Pia { omega: 1.0 }, printed.updates);
+        let surface = limit_surface(refinement(printed.scheme), &cage_mesh)?;
+        let view = view(printed.up, printed.azimuth, printed.elevation);
+        let height = |p: &DVec3| p.dot(printed.up);
+        let heights = || subject.mesh.positions.iter().map(height);
+        let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
+        let framed: Vec<DVec3> = (surface.mesh.positions.iter())
+            .chain(&subject.mesh.positions)
+            .filter(|p| height(p) >= high - printed.shown * (high - low))
+            .copied()
+            .collect();
+        let panels = vec![
+            Picture::new(format!("(a) the mesh, {} vertices", subject.mesh.len()), view)
+                .surface(cage(&subject.mesh, GIVEN))
+                .frame(&framed),
+            Picture::new(format!("(b) the surface after {} updates", printed.updates), view)
+                .surface(surface)
+                .frame(&framed),
+        ];
+        let line = Line {
+            name: printed.name,
+            shows: printed.caption,
+            subject: &subject,
+            iterations: Some(printed.updates),
+            error: Some(error),
+        };
+        album.add(&line, &sheet(2, printed.size, panels))?;
+    }
+    Ok(())
+}
+
+/// Iterates of the series.
+const SERIES: [usize; 6] = [0, 1, 2, 3, 5, 10];
+
+/// The limit surfaces of Thall's iterates, with the points that they have to reach, and the last one's error.
+fn thall_pictures(subject: &Subject, iterates: &[usize]) -> Result<(Vec<Picture>, f64)> {
+    let system = subject.system(Scheme::CatmullClark)?;
+    let size = subject.mesh.diagonal();
+    let view = view(DVec3::Y, 60.0, 12.0);
+    let mut panels = Vec::new();
+    let mut last = 0.0;
+    for &k in iterates {
+        let (cage_mesh, error) = control(subject, &system, Setup::THALL, k);
+        last = error;
+        let caption = format!("k = {k}: error {:.2} %", 100.0 * error / size);
+        let picture = Picture::new(caption, view)
+            .surface(limit_surface(Refinement::CatmullClark, &cage_mesh)?)
+            .points(Points { positions: subject.mesh.positions.clone(), radius: 0.9, colour: POINT })
+            .frame(&subject.mesh.positions);
+        panels.push(picture);
+    }
+    Ok((panels, last))
+}
+
+const THALL_MODEL: (&str, &str) = ("closed/spot_188v_poly.off", "quad-sphere:2");
+
+/// Thall's iteration: the limit surface of every iterate, with the points that it has to reach.
+pub fn thall_series(album: &mut Album) -> Result<()> {
+    let subject = album.subject(THALL_MODEL.0, THALL_MODEL.1)?;
+    let (panels, last) = thall_pictures(&subject, &SERIES)?;
+    let line = Line {
+        name: "thall-iterations",
+        shows: "Thall's iteration, ω = ½: the Catmull-Clark surface of iterate 0, 1, 2, … and the given points",
+        subject: &subject,
+        iterations: SERIES.last().copied(),
+        error: Some(last),
+    };
+    album.add(&line, &sheet(3, (106, 116), panels))
+}
+
+/// The same, moving.
+pub fn thall_animation(album: &mut Album) -> Result<()> {
+    let subject = album.subject(THALL_MODEL.0, THALL_MODEL.1)?;
+    let iterates: Vec<usize> = (0..=6).collect();
+    let (panels, last) = thall_pictures(&subject, &iterates)?;
+    let frames: Vec<Figure> = (panels.into_iter()).map(|panel| sheet(1, (94, 104), vec![panel])).collect();
+    let line = Line {
+        name: "thall-animation",
+        shows: "Thall's iteration, ω = ½, as an animated PNG: iterates 0 to 6 and the given points",
+        subject: &subject,
+        iterations: iterates.last().copied(),
+        error: Some(last),
+    };
+    album.animate(&line, &frames)
+}

@@ -1,0 +1,204 @@
+//! The papers' pictures again: meshes, interpolating surfaces, where the errors are.
+//!
+//! A picture is `figures--NAME.png`; the table `figures` says what each shows, on which mesh, and how far the surface
+//! is from the points.
+
+mod curves;
+mod doo_sabin;
+mod errors;
+mod limits;
+mod normals;
+mod sqrt3;
+
+use limitlab::Result;
+use limitlab::assemble::LimitSystem;
+use limitlab::mesh::validate::Boundary;
+use limitlab::mesh::{Mesh, Topology};
+use limitlab::solvers::{Setup, Stop, run as solve};
+use limitlab::subdivide::{Refinement, catmull_clark, loop_scheme};
+use limitlab_experiments::report::{Colour, Column, Figure, Picture, Surface, Table, View};
+
+use crate::context::{Context, Item, Subject};
+
+pub const ALL: Item =
+    Item { id: "figures", title: "Pictures of the papers' surfaces, of errors and of slow modes", run };
+
+/// Colours of meshes as they were given, of control meshes, of surfaces.
+const GIVEN: Colour = Colour(236, 224, 200);
+const CONTROL: Colour = Colour(206, 220, 206);
+/// Given points on a surface.
+const POINT: Colour = Colour(200, 60, 30);
+/// Widths of edges in points.
+const EDGE: f64 = 0.35;
+const FINE_EDGE: f64 = 0.2;
+const FINEST_EDGE: f64 = 0.12;
+/// Faces that a surface is refined to, at most.
+const FACES: usize = 400_000;
+
+fn run(context: &mut Context) -> Result<()> {
+    let mut album = Album::new(context);
+    limits::thall_series(&mut album)?;
+    if !album.context.quick {
+        limits::thall_animation(&mut album)?;
+        limits::pia(&mut album)?;
+        normals::bones(&mut album)?;
+        normals::end_cap(&mut album)?;
+        errors::maps(&mut album)?;
+        errors::slow_modes(&mut album)?;
+        doo_sabin::approximation(&mut album)?;
+        doo_sabin::against_nasri(&mut album)?;
+        doo_sabin::large(&mut album)?;
+        doo_sabin::with_normals(&mut album)?;
+        doo_sabin::scaled_faces(&mut album)?;
+        doo_sabin::with_handles(&mut album)?;
+        curves::relation(&mut album)?;
+        curves::samples(&mut album)?;
+        curves::stencils(&mut album)?;
+        sqrt3::against_butterfly(&mut album)?;
+        sqrt3::bunny(&mut album)?;
+        sqrt3::parameters(&mut album)?;
+        sqrt3::reflections(&mut album)?;
+    }
+    let Album { table, .. } = album;
+    context.table(table)
+}
+
+/// Pictures with their table.
+struct Album<'a> {
+    context: &'a mut Context,
+    table: Table,
+}
+
+/// What the table says of a picture.
+struct Line<'a> {
+    /// Of the file.
+    name: &'a str,
+    shows: &'a str,
+    subject: &'a Subject,
+    iterations: Option<usize>,
+    /// The largest distance of a given point from its limit point.
+    error: Option<f64>,
+}
+
+impl<'a> Album<'a> {
+    fn new(context: &'a mut Context) -> Self {
+        let mut table = Table::new(
+            ALL.id,
+            ALL.title,
+            vec![
+                Column::key("picture"),
+                Column::text("shows"),
+                Column::text("mesh"),
+                Column::text("vertices"),
+                Column::count("iterations"),
+                Column::number("error_percent", 1e-6, 3).floor(1e-9),
+            ],
+        );
+        table.note(
+            "Each picture is the file `figures--PICTURE.png` beside this one. Surfaces are refined and their vertices \
+             then put on the limit surface, with its normals (Loop, Catmull-Clark), or refined until facets are no \
+             longer seen (Doo-Sabin, √3). `iterations` and `error_percent`, the largest distance of a given point \
+             from its limit point in percent of the bounding box's diagonal, are those of the last surface in the \
+             picture.",
+        );
+        if context.real() {
+            table.note(
+                "Sources of the models: horse, bird, hand, boy and hat are of the Princeton Shape Benchmark (Shilane, \
+                 Min, Kazhdan & Funkhouser 2004; copyright 2003 Princeton University); the mushroom is Geomview's; \
+                 the bunny is of the Stanford 3D Scanning Repository; spot and bob are Keenan Crane's; letter P and \
+                 tripod are CGAL's.",
+            );
+        }
+        Album { context, table }
+    }
+
+    /// The real model `file`, or the built-in mesh `otherwise`.
+    fn subject(&self, file: &str, otherwise: &str) -> Result<Subject> {
+        if self.context.real() { self.context.model(file, Boundary::Refuse) } else { self.context.stand_in(otherwise) }
+    }
+
+    fn add(&mut self, line: &Line, figure: &Figure) -> Result<()> {
+        self.list(line);
+        self.context.figure(&format!("{}--{}", ALL.id, line.name), figure)
+    }
+
+    /// As [`add`](Self::add), figures one after the other.
+    fn animate(&mut self, line: &Line, figures: &[Figure]) -> Result<()> {
+        self.list(line);
+        self.context.animation(&format!("{}--{}", ALL.id, line.name), figures)
+    }
+
+    fn list(&mut self, line: &Line) {
+        let size = line.subject.mesh.diagonal();
+        self.table.push(vec![
+            line.name.into(),
+            line.shows.into(),
+            line.subject.name.as_str().into(),
+            line.subject.mesh.len().to_string().into(),
+            line.iterations.into(),
+            line.error.map(|e| 100.0 * e / size).into(),
+        ]);
+    }
+}
+
+/// A mesh of our own.
+fn plain(name: &str, mesh: Mesh) -> Subject {
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    Subject { name: name.to_owned(), mesh, topology }
+}
+
+/// `3.8×10⁻²`, as the report's texts are marked up.
+fn power(x: f64) -> String {
+    let text = format!("{x:.1e}");
+    match text.split_once('e') {
+        Some((digits, exponent)) => format!("{digits}×10^{{{}}}", exponent.replace('-', "−")),
+        None => text,
+    }
+}
+
+/// The control points after so many steps from V = P, and the largest error that they leave.
+fn control(subject: &Subject, system: &LimitSystem, setup: Setup, iterations: usize) -> (Mesh, f64) {
+    let stop = Stop { tolerance: 0.0, max_iterations: iterations };
+    let solution = solve(system, &subject.mesh.positions, setup, &stop);
+    let error = solution.report.last().max;
+    (Mesh::new(solution.points, subject.mesh.faces.clone()), error)
+}
+
+/// The scheme's limit surface of a control mesh: as many refinements as [`FACES`] allows, then limit points and
+/// limit normals.
+fn limit_surface(scheme: Refinement, control: &Mesh) -> Result<Surface> {
+    let mut levels = 1;
+    while levels < 5 && (control.faces.corners().len() << (2 * levels)) < FACES {
+        levels += 1;
+    }
+    let refined = scheme.refine_n(control, levels)?;
+    let topology = Topology::new(&refined.faces, refined.len());
+    let (points, normals) = match scheme {
+        Refinement::Loop => {
+            (loop_scheme::limit_positions(&refined, &topology)?, loop_scheme::limit_normals(&refined, &topology)?)
+        }
+        _ => (catmull_clark::limit_positions(&refined, &topology)?, catmull_clark::limit_normals(&refined, &topology)?),
+    };
+    Ok(Surface::with_normals(Mesh::new(points, refined.faces), normals))
+}
+
+/// A mesh with flat faces and its edges.
+fn cage(mesh: &Mesh, colour: Colour) -> Surface {
+    let width = match mesh.len() {
+        0..600 => EDGE,
+        600..3000 => FINE_EDGE,
+        _ => FINEST_EDGE,
+    };
+    Surface::flat(mesh.clone()).colour(colour).edges(width)
+}
+
+/// Panels in rows of `columns`, each `width`×`height` points.
+fn sheet(columns: usize, (width, height): (u32, u32), panels: Vec<Picture>) -> Figure {
+    let rows = panels.len().div_ceil(columns);
+    Figure { width: width * columns as u32, height: height * rows as u32, columns, ..Figure::row(panels) }
+}
+
+/// The view of a model, whose axes differ.
+fn view(up: glam::DVec3, azimuth: f64, elevation: f64) -> View {
+    View::around(up, azimuth, elevation).perspective(20.0)
+}

@@ -1,0 +1,142 @@
+//! Lin-Luo Fig. 5–7: the interpolatory √3 scheme and the blend by α.
+
+use glam::DVec3;
+
+use limitlab::Result;
+use limitlab::mesh::{Mesh, Topology};
+use limitlab::subdivide::{Refinement, unified_sqrt3};
+use limitlab_experiments::report::{Finish, Picture, Points, Surface};
+
+use super::{Album, FACES, GIVEN, Line, POINT, cage, sheet, view};
+
+/// The mesh after `steps` of the unified scheme.
+fn refined(mesh: &Mesh, alpha: &[f64], steps: usize) -> Result<Mesh> {
+    let (mut mesh, mut alpha) = (mesh.clone(), alpha.to_vec());
+    for _ in 0..steps {
+        let topology = Topology::new(&mesh.faces, mesh.len());
+        (mesh, alpha) = unified_sqrt3::refine(&mesh, &topology, &alpha)?;
+    }
+    Ok(mesh)
+}
+
+/// An even number of steps, after which the original edges are back, up to [`FACES`] triangles.
+fn surface(mesh: &Mesh, alpha: &[f64]) -> Result<Surface> {
+    Ok(Surface::smooth(refined(mesh, alpha, steps(mesh))?))
+}
+
+fn steps(mesh: &Mesh) -> usize {
+    let mut steps = 2;
+    while steps < 8 && mesh.faces.len() * 3_usize.pow(steps as u32 + 2) <= FACES {
+        steps += 2;
+    }
+    steps
+}
+
+/// Fig. 5: modified Butterfly and the interpolatory √3 scheme, and beside them Labsik and Greiner's.
+pub fn against_butterfly(album: &mut Album) -> Result<()> {
+    let subject = album.subject("closed/bob_small_250v.off", "tri-torus:12x7")?;
+    let mesh = &subject.mesh;
+    let view = view(DVec3::Y, 35.0, 20.0);
+    let butterfly = Surface::smooth(Refinement::Butterfly.refine_n(mesh, 4)?);
+    let ours = surface(mesh, &vec![1.0; mesh.len()])?;
+    let earlier = Surface::smooth(Refinement::LabsikGreiner.refine_n(mesh, steps(mesh))?);
+    let shown = [
+        ("(a) the mesh", cage(mesh, GIVEN)),
+        ("(b) modified Butterfly", butterfly),
+        ("(c) interpolatory √3", ours),
+        ("Labsik-Greiner √3", earlier),
+    ];
+    let panels =
+        shown.map(|(caption, surface)| Picture::new(caption, view).surface(surface).frame(&mesh.positions)).to_vec();
+    let line = Line {
+        name: "lin-luo-5",
+        shows: "Lin-Luo Fig. 5: a mesh with a hole by modified Butterfly and by the interpolatory √3 scheme (α = 1), with \
+                Labsik and Greiner's beside",
+        subject: &subject,
+        iterations: None,
+        error: None,
+    };
+    album.add(&line, &sheet(4, (135, 131), panels))
+}
+
+/// Fig. 6: a bunny under the interpolatory √3 scheme, step by step.
+pub fn bunny(album: &mut Album) -> Result<()> {
+    let subject = album.subject("closed/bunny_1839v.off", "irregular-tri:1129")?;
+    let mesh = &subject.mesh;
+    let alpha = vec![1.0; mesh.len()];
+    let view = view(DVec3::Y, 0.0, 10.0);
+    let panels = vec![
+        Picture::new("(a) the mesh", view).surface(cage(mesh, GIVEN)),
+        Picture::new("(b) after one step", view).surface(cage(&refined(mesh, &alpha, 1)?, super::CONTROL)),
+        Picture::new("(c) after four steps", view).surface(surface(mesh, &alpha)?),
+    ];
+    let line = Line {
+        name: "lin-luo-6",
+        shows: "Lin-Luo Fig. 6: a bunny under the interpolatory √3 scheme (α = 1)",
+        subject: &subject,
+        iterations: None,
+        error: None,
+    };
+    album.add(&line, &sheet(3, (135, 138), panels))
+}
+
+const MODEL: (&str, &str) = ("closed/tripod_24v.off", "star:5");
+
+/// Fig. 7: the surfaces for several α, and two through some vertices only.
+pub fn parameters(album: &mut Album) -> Result<()> {
+    let subject = album.subject(MODEL.0, MODEL.1)?;
+    let mesh = &subject.mesh;
+    let view = view(DVec3::Y, 35.0, 25.0);
+    let all = |alpha: f64| vec![alpha; mesh.len()];
+    let every = |step: usize| -> Vec<usize> { (0..mesh.len()).step_by(step).collect() };
+    let mut panels = vec![Picture::new("control mesh", view).surface(cage(mesh, GIVEN))];
+    for alpha in [1.0, 0.8, 0.5] {
+        panels.push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
+    }
+    for (caption, chosen) in [("every 4th vertex", every(4)), ("every 2nd vertex", every(2))] {
+        let mut alpha = all(0.0);
+        for &v in &chosen {
+            alpha[v] = 1.0;
+        }
+        let points =
+            Points { positions: chosen.iter().map(|&v| mesh.positions[v]).collect(), radius: 1.1, colour: POINT };
+        panels.push(Picture::new(caption, view).surface(surface(mesh, &alpha)?).points(points));
+    }
+    for alpha in [0.0, 0.2] {
+        panels.push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
+    }
+    let framed: Vec<DVec3> =
+        (panels.iter()).flat_map(|p| p.surfaces.iter().flat_map(|s| &s.mesh.positions)).copied().collect();
+    for panel in &mut panels {
+        panel.framed = Some(framed.clone());
+    }
+    let line = Line {
+        name: "lin-luo-7",
+        shows: "Lin-Luo Fig. 7: the unified √3 scheme for α from 1 to 0, and with α = 1 at some vertices (red) and 0 \
+                at the others",
+        subject: &subject,
+        iterations: None,
+        error: None,
+    };
+    album.add(&line, &sheet(4, (115, 115), panels))
+}
+
+/// How smooth the surfaces are: reflection lines for α = 0, ½, 1.
+pub fn reflections(album: &mut Album) -> Result<()> {
+    let subject = album.subject(MODEL.0, MODEL.1)?;
+    let mesh = &subject.mesh;
+    let view = view(DVec3::Y, 35.0, 25.0);
+    let mut panels = Vec::new();
+    for (caption, alpha) in [("α = 0", 0.0), ("α = ½", 0.5), ("α = 1", 1.0)] {
+        let surface = surface(mesh, &vec![alpha; mesh.len()])?.finish(Finish::ReflectionLines);
+        panels.push(Picture::new(caption, view).surface(surface));
+    }
+    let line = Line {
+        name: "lin-luo-reflections",
+        shows: "The unified √3 scheme: reflection lines, which break where normals jump",
+        subject: &subject,
+        iterations: None,
+        error: None,
+    };
+    album.add(&line, &sheet(3, (170, 165), panels))
+}

@@ -1,0 +1,161 @@
+//! Do the tensor products of regular quads make a preconditioner that pays?
+
+use glam::DVec3;
+
+use limitlab::Result;
+use limitlab::analysis::lines::{Preconditioner, Regularity, count};
+use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::interpolate::automatic::control_points;
+use limitlab::mesh::noise::add_noise;
+use limitlab::mesh::validate::Boundary;
+use limitlab::mesh::{Mesh, Topology, builtin};
+use limitlab::solvers::Stop;
+use limitlab::subdivide::Refinement;
+use limitlab_experiments::cli::STAND_IN_NOISE;
+use limitlab_experiments::report::{Cell, Column, Table};
+
+use crate::context::{Context, Item};
+
+pub const LINES: Item =
+    Item { id: "lines", title: "Line solves along edge loops as a preconditioner for Catmull-Clark", run };
+
+/// With the number of Catmull-Clark refinements.
+const STAND_INS: [(&str, usize); 6] = [
+    ("torus:32x32", 0),
+    ("quad-sphere:4", 0),
+    ("irregular-quad:300", 0),
+    ("irregular-quad:300", 1),
+    ("irregular-quad:300", 2),
+    ("quad-sphere:7", 0),
+];
+const MODELS: [(&str, usize); 9] = [
+    ("closed/bob_334v_quad.off", 0),
+    ("closed/bob_334v_quad.off", 1),
+    ("closed/bob_334v_quad.off", 2),
+    ("closed/spot_2930v_quad.off", 0),
+    ("closed/spot_2930v_quad.off", 1),
+    ("closed/spot_2930v_quad.off", 2),
+    ("closed/horse_2400v_quad.off", 0),
+    ("closed/horse_2400v_quad.off", 1),
+    ("closed/horse_2400v_quad.off", 2),
+];
+/// Vertices of the largest mesh of a quick run.
+const QUICK: usize = 6000;
+/// Relative to the diagonal of the bounding box.
+const TOLERANCE: f64 = 1e-10;
+const LIMIT: usize = 1000;
+
+/// Nanoseconds a vertex at 10⁶ vertices on two threads, as measured on the machine of the report `scaling`.
+mod cost {
+    /// Of `auto`: what precedes its iterations; one iteration with its share of what surrounds them.
+    pub const SETUP: f64 = 130.0;
+    pub const ITERATION: f64 = 3.6;
+    /// To find the chains, in the order of `auto`.
+    pub const CHAINS: f64 = 80.0;
+    /// The differences e = P − A V in double precision.
+    pub const RESIDUAL: f64 = 5.0;
+    /// B e in single precision, and the update of V.
+    pub const LINES: f64 = 24.0;
+    /// The same in the best order seen, the rows of a torus.
+    pub const LINES_AT_BEST: f64 = 16.0;
+    /// To invert the matrix of a star; to solve on it before and after the lines.
+    pub const STAR: f64 = 11_000.0;
+    pub const RELAX: f64 = 1_800.0;
+}
+
+/// The time of `auto` over that of the preconditioned iteration.
+fn time_ratio(irregular: f64, auto: usize, lines: usize) -> f64 {
+    let stars = |each: f64| irregular * each;
+    let one = cost::RESIDUAL + cost::LINES + stars(cost::RELAX);
+    let setup = cost::SETUP + cost::CHAINS + stars(cost::STAR);
+    (cost::SETUP + auto as f64 * cost::ITERATION) / (setup + lines as f64 * one + cost::RESIDUAL)
+}
+
+fn run(context: &mut Context) -> Result<()> {
+    let mut table = Table::new(
+        LINES.id,
+        LINES.title,
+        vec![
+            Column::key("mesh"),
+            Column::key("refined"),
+            Column::text("vertices"),
+            Column::number("regular", 1e-9, 4),
+            Column::number("mean_chain", 1e-9, 3),
+            Column::number("kappa", 0.01, 4),
+            Column::number("kappa_lines", 0.01, 4),
+            Column::count("auto_iterations"),
+            Column::count("lines_iterations"),
+            Column::number("time_ratio", 0.1, 3),
+        ],
+    );
+    table.note(format!(
+        "`regular`: share of vertices of valence 4 among quads. Chains of edges go straight through them; `mean_chain` \
+         counts the regular vertices on one. `lines` solves with tridiag(1, 4, 1) along every chain, then across, \
+         symmetrised, between exact solves on the two rings around each irregular vertex: the inverse of the matrix on \
+         a regular torus. `kappa` is that of A, and of the preconditioned matrix, as conjugate gradients saw it; \
+         iterations are those of `auto` and of preconditioned conjugate gradients to {TOLERANCE:e} of the bounding \
+         box's diagonal. Noise {STAND_IN_NOISE} on every mesh, after refinement."
+    ));
+    table.note(format!(
+        "`time_ratio` estimates, for 10⁶ vertices as regular as these and two threads, the time of `auto` over that of \
+         `lines`, from faces to control points: ({s} + {i} k) / ({s} + {c} + {q} σ + {r} + m ({r} + {l} + {x} σ)) with \
+         k and m the two numbers of iterations, σ = 1 − regular; measured nanoseconds a vertex: {s} for incidence, order \
+         and operator, {i} for an iteration of `auto`, {c} for finding the chains, {r} for a residual, {l} for the line \
+         solves in single precision and an update, {q} and {x} per irregular vertex for inverting and applying \
+         its star.",
+        s = cost::SETUP,
+        i = cost::ITERATION,
+        c = cost::CHAINS,
+        r = cost::RESIDUAL,
+        l = cost::LINES,
+        q = cost::STAR,
+        x = cost::RELAX,
+    ));
+    table.note(format!(
+        "Verdict: it wins in iterations, ten to one, and not in time: `auto` spends more than half of its time before its \
+         first iteration, finding the chains comes on top of that, and every irregular vertex costs its star. With \
+         chains for nothing, no irregular vertex, line solves at the {best} ns of the rows of a torus, two \
+         iterations instead of 28 of `auto` would make the ratio {:.2}.",
+        (cost::SETUP + 28.0 * cost::ITERATION)
+            / (cost::SETUP + 2.0 * (cost::RESIDUAL + cost::LINES_AT_BEST) + cost::RESIDUAL),
+        best = cost::LINES_AT_BEST,
+    ));
+    let sources: &[(&str, usize)] = if context.real() { &MODELS } else { &STAND_INS };
+    for &(name, levels) in sources {
+        let mesh = if context.real() { context.model(name, Boundary::Refuse)?.mesh } else { builtin::builtin(name)? };
+        // Every refinement makes four vertices of one, but for a few.
+        if !context.quick || mesh.len() << (2 * levels) <= QUICK {
+            table.push(row(name, mesh, levels)?);
+        }
+    }
+    context.table(table)
+}
+
+fn row(name: &str, mesh: Mesh, levels: usize) -> Result<Vec<Cell>> {
+    let mut mesh = Refinement::CatmullClark.refine_n(&mesh, levels)?;
+    add_noise(&mut mesh, STAND_IN_NOISE.amplitude, STAND_IN_NOISE.seed);
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    let system = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark)?;
+    let stop = Stop { tolerance: TOLERANCE * mesh.diagonal(), max_iterations: LIMIT };
+    let points = &mesh.positions;
+    let regularity = Regularity::new(&mesh.faces, &topology);
+    let preconditioner = Preconditioner::new(&system, &regularity)?;
+    let scaled = |r: &[DVec3]| r.iter().zip(&system.h).map(|(r, h)| *r * *h).collect();
+    let plain = count(&system, points, &stop, scaled)?;
+    let lines = count(&system, points, &stop, |r| preconditioner.apply(r))?;
+    let auto = control_points(&mesh, Some(&topology), Scheme::CatmullClark, &stop)?;
+    let iterations = auto.report.iterations;
+    let irregular = 1.0 - regularity.share();
+    Ok(vec![
+        name.trim_start_matches("closed/").trim_end_matches(".off").into(),
+        levels.to_string().into(),
+        mesh.len().to_string().into(),
+        regularity.share().into(),
+        regularity.mean_chain().into(),
+        plain.kappa.into(),
+        lines.kappa.into(),
+        iterations.into(),
+        lines.iterations.into(),
+        time_ratio(irregular, iterations, lines.iterations).into(),
+    ])
+}

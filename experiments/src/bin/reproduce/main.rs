@@ -1,0 +1,145 @@
+//! Every table and figure of the papers, on the papers' own models or on built-in stand-ins: `reproduce`.
+
+mod claims;
+mod context;
+mod figures;
+mod lines;
+mod methods;
+mod omega;
+mod orders;
+mod pia;
+mod popping;
+mod ripples;
+mod sparsity;
+mod splitting;
+mod thall;
+mod valences;
+mod zheng_cai;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use serde_json::json;
+
+use claims::Claim;
+use context::{Context, Item};
+use limitlab::Result;
+use limitlab::error::Error;
+use limitlab_experiments::cli::{self, CommonFlags, Printer, Progress};
+
+/// Regenerates the papers' tables and figures with what this workbench measures beside what they print.
+///
+/// With --meshes the papers' own models are read from that folder, and the results go to the report folder itself;
+/// without, built-in meshes stand in, and the results go to its folder built-in.
+#[derive(Parser)]
+#[command(name = "reproduce", version)]
+struct Arguments {
+    /// Only the item or claim with this ID; may be repeated. A claim alone is printed and not written
+    #[arg(long, value_name = "ID")]
+    only: Vec<String>,
+    /// List the items and the papers' claims, and stop
+    #[arg(long)]
+    list: bool,
+    /// The report folder
+    #[arg(long, value_name = "DIR", default_value = "reports")]
+    out: PathBuf,
+    /// The folder with the real models (closed/, open/)
+    #[arg(long, value_name = "DIR")]
+    meshes: Option<PathBuf>,
+    /// A subset of the rows, within a minute
+    #[arg(long)]
+    quick: bool,
+    /// Print one JSON object on standard output, and nothing else there: all tables, and the claims with their numbers
+    #[arg(long)]
+    json: bool,
+    /// Compare every table with the one of the same name in this report folder, and fail if they differ
+    #[arg(long, value_name = "DIR")]
+    check: Option<PathBuf>,
+    #[command(flatten)]
+    common: CommonFlags,
+}
+
+/// All items, in the order in which they run.
+const ITEMS: [Item; 15] = [
+    pia::TABLE1,
+    thall::ITERATIONS,
+    zheng_cai::SECTION_3_5,
+    omega::SWEEPS,
+    methods::ALL,
+    sparsity::PATTERNS,
+    splitting::LOCAL,
+    orders::ORDERS,
+    lines::LINES,
+    valences::VALENCES,
+    popping::POPPING,
+    ripples::RIPPLES,
+    figures::ALL,
+    claims::LEDGER,
+    claims::FINDINGS,
+];
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    cli::exit(|| {
+        arguments.common.apply()?;
+        run(&arguments)
+    })
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.list {
+        let claims = claims::all().map(|c| (c.id, c.title));
+        if arguments.json {
+            let entry = |id: &str, title: &str| json!({ "id": id, "title": title });
+            return cli::print_json(&json!({
+                "items": ITEMS.iter().map(|i| entry(i.id, i.title)).collect::<Vec<_>>(),
+                "claims": claims::all().map(|c| entry(c.id, c.title)).collect::<Vec<_>>(),
+            }));
+        }
+        let all: Vec<(&str, &str)> = ITEMS.iter().map(|i| (i.id, i.title)).chain(claims).collect();
+        let width = all.iter().map(|(id, _)| id.len()).max().unwrap_or(0);
+        let lines: Vec<String> = all.iter().map(|(id, title)| format!("{id:width$}  {title}")).collect();
+        return cli::print(&lines.join("\n"));
+    }
+    let mut chosen: Vec<&Item> = Vec::new();
+    let mut claims: Vec<&'static Claim> = Vec::new();
+    if arguments.only.is_empty() {
+        chosen.extend(&ITEMS);
+    }
+    for id in &arguments.only {
+        if let Some(item) = ITEMS.iter().find(|i| i.id == id) {
+            chosen.push(item);
+        } else if let Some(claim) = claims::find(id) {
+            claims.push(claim);
+        } else {
+            return Err(Error::Unknown(format!("no item or claim is called \"{id}\"; see reproduce --list")));
+        }
+    }
+    let mut context = Context::new(
+        &arguments.out,
+        arguments.meshes.as_deref(),
+        arguments.quick,
+        arguments.check.as_deref(),
+        Printer::new(arguments.json),
+    )?;
+    let steps = chosen.len() + usize::from(!claims.is_empty());
+    let progress = Progress::new("reproduce", steps, arguments.common.quiet);
+    for item in &chosen {
+        progress.message(item.id);
+        (item.run)(&mut context)?;
+        progress.step();
+    }
+    if !claims.is_empty() {
+        progress.message("claims");
+        claims::run_alone(&mut context, &claims)?;
+        progress.step();
+    }
+    drop(progress);
+    if !chosen.is_empty() {
+        context.write_index(&ITEMS)?;
+        arguments.common.remark(format_args!("reports: {}", context.folder().display()));
+    }
+    let claims = claims::json(&context.ledger);
+    context.finish(claims)
+}

@@ -1,0 +1,110 @@
+//! ω sweeps: iterations and rates over ω, with the predicted thresholds and optima.
+
+use limitlab::Result;
+use limitlab::analysis::sweep::{rounding_floor, sweep};
+use limitlab::assemble::Scheme;
+use limitlab::mesh::validate::Boundary;
+use limitlab::solvers::{Method, Stop};
+use limitlab_experiments::report::{Column, Table};
+use limitlab_experiments::studies::sweep as study;
+
+use crate::context::{Context, Item, Subject};
+
+pub const SWEEPS: Item =
+    Item { id: "omega-sweeps", title: "Iterations over ω for Jacobi, PIA and SOR, predicted and measured", run };
+
+const STAND_INS: [(&str, Scheme); 5] = [
+    ("torus:32x32", Scheme::CatmullClark),
+    ("quad-sphere:4", Scheme::CatmullClark),
+    ("icosphere:3", Scheme::Loop),
+    ("irregular-quad:1000", Scheme::CatmullClark),
+    ("irregular-poly:1000", Scheme::Nasri),
+];
+const MODELS: [(&str, Scheme); 4] = [
+    ("closed/psb_m104_horse_233v.off", Scheme::Loop),
+    ("closed/spot_2930v_quad.off", Scheme::CatmullClark),
+    ("closed/spot_188v_poly.off", Scheme::CatmullClark),
+    ("closed/psb_m1630_hat_562v.off", Scheme::ZhengCai),
+];
+const METHODS: [Method; 3] = [Method::Jacobi, Method::Pia, Method::Sor];
+/// Relative to the diagonal of the bounding box.
+const TOLERANCE: f64 = 1e-10;
+const LIMIT: usize = 10_000;
+/// Sweeps of a quick run.
+const QUICK: usize = 1;
+
+fn run(context: &mut Context) -> Result<()> {
+    let mut summary = Table::new(
+        SWEEPS.id,
+        SWEEPS.title,
+        vec![
+            Column::key("mesh"),
+            Column::key("scheme"),
+            Column::key("method"),
+            Column::number("omega_critical", 1e-6, 6),
+            Column::number("omega_critical_data", 1e-4, 6),
+            Column::number("omega_first_divergence", 1e-9, 4),
+            Column::number("omega_optimal", 1e-6, 6),
+            Column::number("omega_best_on_grid", 0.051, 4),
+            Column::count("iterations_best"),
+            Column::number("rho_optimal", 1e-6, 4),
+        ],
+    );
+    summary.note(
+        "Tolerance 10⁻¹⁰ of the bounding box's diagonal, start V = P. `omega_critical` = 2/λ_max is the threshold of \
+         the matrix (D⁻¹A for Jacobi, A for PIA), `omega_critical_data` that of the eigenvectors which the data \
+         excite, `omega_first_divergence` the first ω of the grid at which the run diverged. SOR has no closed form: \
+         only its best ω on the grid is given. Each mesh has a table and a picture of its own.",
+    );
+    let mut subjects: Vec<(Subject, Scheme)> = if context.real() {
+        MODELS
+            .iter()
+            .map(|(file, scheme)| Ok((context.model(file, Boundary::Refuse)?, *scheme)))
+            .collect::<Result<_>>()?
+    } else {
+        STAND_INS.iter().map(|(name, scheme)| Ok((context.stand_in(name)?, *scheme))).collect::<Result<_>>()?
+    };
+    if context.quick {
+        subjects.truncate(QUICK);
+    }
+    for (subject, scheme) in &subjects {
+        one(context, subject, *scheme, &mut summary)?;
+    }
+    context.table(summary)
+}
+
+fn one(context: &mut Context, subject: &Subject, scheme: Scheme, summary: &mut Table) -> Result<()> {
+    let system = subject.system(scheme)?;
+    let grids: Vec<(Method, Vec<f64>)> = METHODS.iter().map(|&m| (m, study::default_grid(m))).collect();
+    let size = subject.mesh.diagonal();
+    let stop = Stop { tolerance: TOLERANCE * size, max_iterations: LIMIT };
+    let found = sweep(&system, &subject.mesh.positions, &grids, None, &stop, rounding_floor(size), &|_| {})?;
+    for &method in &METHODS {
+        let thresholds = found.thresholds.iter().find(|t| t.method == method);
+        let best = found.best(method);
+        let diverged =
+            found.rows.iter().find(|r| r.method == method && r.outcome == limitlab::solvers::Outcome::Diverged);
+        summary.push(vec![
+            subject.name.as_str().into(),
+            scheme.name().into(),
+            method.name().into(),
+            thresholds.map(|t| t.matrix.critical_omega()).into(),
+            thresholds.and_then(|t| t.data).map(|d| d.critical_omega()).into(),
+            diverged.map(|r| r.omega).into(),
+            thresholds.map(|t| t.matrix.optimal_omega()).into(),
+            best.map(|r| r.omega).into(),
+            best.map(|r| r.iterations).into(),
+            thresholds.map(|t| t.matrix.radius(t.matrix.optimal_omega())).into(),
+        ]);
+    }
+    let stem = format!("{}--{}-{scheme}", SWEEPS.id, subject.name.replace([':', ' '], "-"));
+    let title = format!("{} under {scheme}", subject.name);
+    let about = format!(
+        "{} vertices, {} faces; start V = P; tolerance 10⁻¹⁰ of the bounding box's diagonal.",
+        subject.mesh.len(),
+        subject.mesh.faces.len()
+    );
+    let table = study::table(stem.clone(), format!("ω sweep on {title}"), about, &found);
+    context.table(table)?;
+    context.figure(&stem, &study::plot(title, &METHODS, &found))
+}

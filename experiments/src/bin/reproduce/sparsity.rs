@@ -1,0 +1,60 @@
+//! The pattern of A in several vertex orders.
+
+use limitlab::Result;
+use limitlab::assemble::Scheme;
+use limitlab::mesh::order::{Order, inverse};
+use limitlab::mesh::validate::Boundary;
+use limitlab_experiments::report::{Column, Figure, SparsityPlot, Table};
+
+use crate::context::{Context, Item};
+
+pub const PATTERNS: Item = Item { id: "sparsity", title: "The pattern of A before and after reordering", run };
+
+const ORDERS: [Order; 4] = [Order::File, Order::Rcm, Order::Morton, Order::Random(1)];
+
+fn run(context: &mut Context) -> Result<()> {
+    let subject = if context.real() {
+        context.model("closed/spot_2930v_quad.off", Boundary::Refuse)?
+    } else {
+        context.stand_in("quad-sphere:4")?
+    };
+    let system = subject.system(Scheme::CatmullClark)?;
+    let mut table = Table::new(
+        PATTERNS.id,
+        PATTERNS.title,
+        vec![
+            Column::key("mesh"),
+            Column::key("order"),
+            Column::text("vertices"),
+            Column::text("entries"),
+            Column::text("bandwidth"),
+        ],
+    );
+    table.note("Bandwidth: the largest |i − j| of an entry, vertices numbered in the order.");
+    let mut panels = Vec::new();
+    for order in ORDERS {
+        let place = inverse(&order.order(&subject.mesh, &subject.topology.incidence));
+        let pattern = system.a.pattern();
+        let entries = || {
+            (0..system.len()).flat_map(|i| {
+                let place = &place;
+                pattern.row(i).iter().map(move |&j| (place[i], place[j as usize]))
+            })
+        };
+        let bandwidth = entries().map(|(i, j)| i.abs_diff(j)).max().unwrap_or(0);
+        table.push(vec![
+            subject.name.as_str().into(),
+            order.to_string().into(),
+            system.len().to_string().into(),
+            pattern.columns().len().to_string().into(),
+            bandwidth.to_string().into(),
+        ]);
+        let caption = format!("{order} order, bandwidth {bandwidth}");
+        panels.push(SparsityPlot::new(caption, system.len(), entries()));
+    }
+    context.table(table)?;
+    let mut figure = Figure::row(panels);
+    figure.columns = 2;
+    (figure.width, figure.height) = (560, 600);
+    context.figure(PATTERNS.id, &figure.title(format!("{} under catmull-clark", subject.name)))
+}

@@ -1,0 +1,129 @@
+//! Local edits beside solving anew, and the decay of the inverse that they live on.
+
+use std::time::Instant;
+
+use glam::DVec3;
+use limitlab::Result;
+use limitlab::analysis::interval::interval;
+use limitlab::analysis::spectrum::Operator as Which;
+use limitlab::assemble::{Operator, Scheme};
+use limitlab::mesh::fronts::in_fronts;
+use limitlab::mesh::{Mesh, Topology};
+use limitlab::solvers::local::{Editor, decay};
+use limitlab::solvers::{Stop, mixed};
+use limitlab_experiments::report::{Column, Table};
+
+/// Rings that the table of the decay shows.
+const RINGS: usize = 20;
+
+/// An empty table of edits.
+pub fn edits_table(tol: f64) -> Table {
+    let mut table = Table::new(
+        "scaling-edits",
+        "Local edits beside solving anew",
+        vec![
+            Column::key("scheme"),
+            Column::key("mesh"),
+            Column::key("points_moved"),
+            Column::count("vertices"),
+            Column::number("vertices_touched", 0.05, 6),
+            Column::number("relaxations", 0.05, 6),
+            Column::text("way"),
+            Column::time("edit_seconds"),
+            Column::time("anew_seconds"),
+            Column::time("anew_over_edit"),
+            Column::number("difference_over_tolerance", 0.5, 3),
+        ],
+    );
+    table.note(format!(
+        "Points far apart are moved by a hundredth of the bounding box's diagonal L, and control points relaxed around \
+         them until no residual is above {tol:e}·L, or all solved anew where the first relaxations tell that this takes \
+         less. Anew: mixed precision on the same operator from V = P. The difference is the largest between the two \
+         results."
+    ));
+    table
+}
+
+/// Edits of one mesh, for 1, 10, 100, … points, up to a tenth of all.
+pub fn edits(name: &str, mesh: &Mesh, scheme: Scheme, tol: f64, table: &mut Table) -> Result<Operator> {
+    let n = mesh.len();
+    let topology = Topology::new(&mesh.faces, n);
+    let fronts = in_fronts(&mesh.faces, &topology.incidence);
+    let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&fronts))?;
+    let points = fronts.there(&mesh.positions);
+    let length = mesh.diagonal();
+    let stop = Stop { tolerance: tol * length, max_iterations: 10_000 };
+    let (control, _) = mixed::solve(&operator, &points, &stop);
+    let mut editor = Editor::new(&operator, points, control);
+    for count in (0..).map(|k| 10usize.pow(k)).take_while(|c| 10 * c <= n) {
+        let shift = DVec3::new(0.01, 0.0, 0.0) * length;
+        let moves: Vec<(u32, DVec3)> =
+            (0..count).map(|k| (2 * k + 1) * n / (2 * count)).map(|v| (v as u32, editor.points()[v] + shift)).collect();
+        let start = Instant::now();
+        let edit = editor.edit(&moves, stop.tolerance, usize::MAX);
+        let edit_seconds = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let (anew, _) = mixed::solve(&operator, editor.points(), &stop);
+        let anew_seconds = start.elapsed().as_secs_f64();
+        let pairs = editor.control().iter().zip(&anew);
+        let difference = pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        table.push(vec![
+            scheme.name().into(),
+            name.into(),
+            count.to_string().into(),
+            n.into(),
+            (edit.touched as f64).into(),
+            (edit.relaxations as f64).into(),
+            (if edit.anew { "anew" } else { "local" }).into(),
+            edit_seconds.into(),
+            anew_seconds.into(),
+            (anew_seconds / edit_seconds).into(),
+            (difference / stop.tolerance).into(),
+        ]);
+    }
+    Ok(operator)
+}
+
+/// The largest entry of the middle column of A⁻¹ ring by ring, each with its ratio to the one before.
+pub fn decay_table(columns: &[(String, Operator)]) -> Result<Table> {
+    let mut table = Table::new(
+        "scaling-decay",
+        "Decay of the inverse of A from ring to ring",
+        vec![
+            Column::key("mesh"),
+            Column::key("ring"),
+            Column::number("largest_entry", 0.01, 4),
+            Column::number("ratio", 0.01, 4),
+            Column::number("bound", 0.05, 4),
+        ],
+    );
+    table.note(
+        "Largest entry of one column of A⁻¹ among the vertices of each ring of neighbours. On an infinite regular quad \
+         grid it is 3·(2 − √3)^ring under Catmull-Clark: ratio 0.2679. The bound (Demko, Moss and Smith 1984) is \
+         √(h_max/h_j)·(1+√κ)²/2·((√κ−1)/(√κ+1))^ring with κ = 1/λ_min: λ_min as proven by valences where that is \
+         positive, else as estimated.",
+    );
+    for (name, operator) in columns {
+        let vertex = operator.len() / 2;
+        let rings = decay(operator, vertex, 1e-12);
+        let proven = operator.bounds().lambda_min;
+        let least = if proven > 0.0 { proven } else { interval(operator, Which::A)?.low };
+        let root = (1.0 / least).sqrt();
+        let h = operator.weights();
+        let greatest = h.iter().copied().fold(0.0, f64::max);
+        let factor = (greatest / h[vertex]).sqrt() * 0.5 * (1.0 + root).powi(2);
+        let rate = (root - 1.0) / (root + 1.0);
+        for (ring, &entry) in rings.iter().enumerate().take(RINGS) {
+            let ratio = ring.checked_sub(1).map(|before| entry / rings[before]);
+            table.push(vec![
+                name.as_str().into(),
+                ring.to_string().into(),
+                entry.into(),
+                ratio.into(),
+                // At the vertex itself ‖A⁻¹‖ is all that is known.
+                ring.checked_sub(1).map(|_| factor * rate.powi(ring as i32)).into(),
+            ]);
+        }
+    }
+    Ok(table)
+}

@@ -1,0 +1,522 @@
+//! How time and memory grow with the mesh: `scaling` writes `scaling.{md,csv,png}`, `scaling-threads`, `scaling-profile`,
+//! `scaling-edits`, `scaling-steps` and `scaling-decay.{md,csv}`.
+
+mod baseline;
+mod edits;
+mod machine;
+mod profile;
+mod steps;
+mod threads;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Parser;
+use glam::DVec3;
+use serde_json::json;
+
+use limitlab::analysis::spectrum::spectrum;
+use limitlab::assemble::{LimitSystem, Operator, Scheme};
+use limitlab::error::{Error, Result};
+use limitlab::interpolate::automatic::{control_points, renumbered};
+use limitlab::mesh::colours::in_colours;
+use limitlab::mesh::fronts::in_fronts;
+use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
+use limitlab::mesh::noise::add_noise;
+use limitlab::mesh::order::{Numbering, Order};
+use limitlab::mesh::validate::{Boundary, validate};
+use limitlab::mesh::{Faces, Incidence, Mesh, Topology, builtin::builtin, io};
+use limitlab::solvers::chebyshev::Chebyshev;
+use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
+use limitlab::solvers::gauss_seidel::{by_colours, in_waves};
+use limitlab::solvers::iteration::Iterate;
+use limitlab::solvers::{Method, Report, Setup, Stop, run, solve};
+use limitlab_experiments::cli::{self, CommonFlags, List, Printer, Progress, number};
+use limitlab_experiments::report::{Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette};
+
+/// Measures time, memory and iterations of the methods over growing meshes, from faces in memory to control points,
+/// everything counted.
+#[derive(Parser)]
+#[command(name = "scaling", version)]
+struct Arguments {
+    /// Numbers of vertices
+    #[arg(long, value_name = "N,N,…", default_value = "1000,10000,100000,1000000")]
+    sizes: List<usize>,
+    /// Schemes
+    #[arg(long, value_name = "NAME,…", default_value = "catmull-clark,loop,sqrt3,nasri,zheng-cai")]
+    scheme: List<Scheme>,
+    /// Cholesky up to this many vertices
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    most_cholesky: usize,
+    /// LU up to this many vertices: it takes 4.5 GB at a million
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    most_lu: usize,
+    /// Methods with a stored matrix up to this many vertices
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    most_stored: usize,
+    /// Local edits, and the decay of the inverse, up to this many vertices
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    most_edits: usize,
+    /// Stop at max_i ‖p_i − (A v)_i‖ ≤ T·L, L the diagonal of the bounding box
+    #[arg(long, value_name = "T", default_value_t = 1e-10, value_parser = cli::positive)]
+    tol: f64,
+    /// Runs of which the fastest counts, where a run takes less than a second; more where it takes milliseconds
+    #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
+    runs: u16,
+    /// Vertices of the profile's mesh; 0 for no profile
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    profile: usize,
+    /// Vertices of the meshes for one thread beside all; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    gains: usize,
+    /// Vertices of the meshes for the steps around the solve; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 300_000)]
+    steps: usize,
+    /// Folder for the CSV, Markdown and PNG files
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// Print one JSON object on standard output, and nothing else there: all tables
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    common: CommonFlags,
+}
+
+/// The smallest mesh that every generator makes.
+const LEAST: usize = 100;
+/// Vertices of the mesh that the interval of Chebyshev iterations is estimated on.
+const ESTIMATE: usize = 4000;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    cli::exit(|| {
+        arguments.common.apply()?;
+        limitlab::output::create_dir(&arguments.out)?;
+        measure(&arguments)
+    })
+}
+
+fn measure(arguments: &Arguments) -> Result<()> {
+    let threads = rayon::current_num_threads();
+    let bandwidth = machine::triad();
+    let mut printer = Printer::new(arguments.json);
+    let mut table = Table::new(
+        "scaling",
+        "Time and memory from faces in memory to control points",
+        vec![
+            Column::key("scheme"),
+            Column::key("mesh"),
+            Column::key("order"),
+            Column::key("method"),
+            Column::count("vertices"),
+            Column::count("iterations"),
+            Column::text("status"),
+            Column::time("seconds"),
+            Column::time("solve_seconds"),
+            Column::time("nanoseconds_per_vertex"),
+            Column::time("peak_megabytes"),
+        ],
+    );
+    table.note(format!(
+        "{threads} threads, STREAM triad {:.1} GB/s in this run. Noise 0.1 on every mesh; start V = P; stop at max_i ‖p_i − \
+         (A v)_i‖ ≤ {:e}·L. Seconds count topology, order, set-up and solve; the memory is the most heap that is held \
+         at once beyond the mesh. Order random: vertices and faces shuffled.",
+        bandwidth / 1e9,
+        arguments.tol
+    ));
+    table.note(
+        "plain-chebyshev is the yardstick: index-only, double precision, one pass over the arrays an operation, no \
+         renumbering. \"File to file\" is auto with all that `interpolate` does beside: reading, validation, writing, of \
+         binary PLY.",
+    );
+    let mut panels = Vec::new();
+    for &scheme in &arguments.scheme.0 {
+        panels.extend(of_scheme(arguments, scheme, bandwidth, &mut table)?);
+    }
+    if !panels.is_empty() {
+        let rows = panels.len() as u32 / 2;
+        let mut figure = Figure::row(panels);
+        figure.columns = 2;
+        (figure.width, figure.height) = (900, 40 + 230 * rows);
+        figure.render()?.save(&arguments.out.join("scaling.png"))?;
+    }
+    local_edits(arguments, &mut printer)?;
+    if arguments.steps >= LEAST {
+        steps::steps(arguments.steps, &arguments.out, &mut printer)?;
+    }
+    let all = rayon::current_num_threads();
+    if arguments.gains >= LEAST && all > 1 {
+        threads::gains(arguments, all, &mut printer)?;
+    }
+    if arguments.profile >= LEAST {
+        let name = family(Scheme::CatmullClark, arguments.profile);
+        let mesh = noisy(&name)?;
+        let profile = profile::profile(&name, &mesh, Scheme::CatmullClark, all)?;
+        profile.write(&arguments.out)?;
+        printer.table(&profile)?;
+    }
+    printer.table(&table)?;
+    arguments.common.remark(format_args!("tables and plot: {}", arguments.out.display()));
+    printer.finish(json!({ "threads": threads, "triad_bytes_per_second": number(bandwidth) }))
+}
+
+/// Local edits on the meshes of all schemes and sizes, and the decay on the largest.
+fn local_edits(arguments: &Arguments, printer: &mut Printer) -> Result<()> {
+    let mut sizes = arguments.sizes.0.clone();
+    sizes.retain(|&n| n <= arguments.most_edits);
+    let Some(&last) = sizes.last() else {
+        return Ok(());
+    };
+    let mut table = edits::edits_table(arguments.tol);
+    let mut largest = Vec::new();
+    for &scheme in &arguments.scheme.0 {
+        for &n in &sizes {
+            let name = family(scheme, n);
+            let mesh = noisy(&name)?;
+            let operator = edits::edits(&name, &mesh, scheme, arguments.tol, &mut table)?;
+            if n == last {
+                largest.push((format!("{name}, {scheme}"), operator));
+            }
+        }
+    }
+    table.write(&arguments.out)?;
+    edits::decay_table(&largest)?.write(&arguments.out)?;
+    printer.table(&table)
+}
+
+/// The built-in mesh of about `n` vertices that suits the scheme.
+fn family(scheme: Scheme, n: usize) -> String {
+    let n = n.max(LEAST);
+    match scheme {
+        Scheme::CatmullClark => format!("irregular-quad:{}", n & !1),
+        Scheme::Loop | Scheme::Sqrt3 => format!("irregular-tri:{n}"),
+        Scheme::Nasri | Scheme::ZhengCai => format!("irregular-poly:{n}"),
+    }
+}
+
+fn noisy(name: &str) -> Result<Mesh> {
+    let mut mesh = builtin(name)?;
+    add_noise(&mut mesh, 0.1, 1);
+    Ok(mesh)
+}
+
+/// A way from faces to control points.
+#[derive(Clone, Copy, PartialEq)]
+enum Way {
+    Auto,
+    /// As `interpolate` does: read, validate, solve, write.
+    Files,
+    Plain,
+    Free(Method),
+    /// Gauss-Seidel on the operator in fronts.
+    Waves,
+    /// Gauss-Seidel on the operator by colours.
+    Colours,
+    Stored(Method),
+}
+
+impl Way {
+    const ALL: [Way; 12] = [
+        Way::Auto,
+        Way::Files,
+        Way::Plain,
+        Way::Free(Method::Chebyshev),
+        Way::Free(Method::Cg),
+        Way::Waves,
+        Way::Colours,
+        Way::Stored(Method::Chebyshev),
+        Way::Stored(Method::GaussSeidel),
+        Way::Stored(Method::PcgIc0),
+        Way::Stored(Method::Cholesky),
+        Way::Stored(Method::Lu),
+    ];
+
+    fn name(self) -> String {
+        match self {
+            Way::Auto => "auto".into(),
+            Way::Files => "auto (file to file)".into(),
+            Way::Plain => "plain-chebyshev".into(),
+            Way::Free(method) => format!("{method} (matrix-free)"),
+            Way::Waves => format!("{} (in waves)", Method::GaussSeidel),
+            Way::Colours => format!("{} (by colours)", Method::GaussSeidel),
+            Way::Stored(method) => method.name().into(),
+        }
+    }
+
+    fn most(self, arguments: &Arguments) -> usize {
+        match self {
+            Way::Stored(Method::Cholesky) => arguments.most_cholesky,
+            Way::Stored(Method::Lu) => arguments.most_lu,
+            Way::Stored(_) => arguments.most_stored,
+            _ => usize::MAX,
+        }
+    }
+}
+
+/// Time per vertex of one way over the sizes.
+struct Curve {
+    way: Way,
+    random: bool,
+    points: Vec<(f64, f64)>,
+}
+
+struct Outcome {
+    iterations: usize,
+    status: &'static str,
+    solve_seconds: f64,
+}
+
+/// Where the interval of Chebyshev iterations starts, by a small mesh.
+fn estimate(scheme: Scheme) -> Result<f64> {
+    let small = noisy(&family(scheme, ESTIMATE))?;
+    let topology = Topology::new(&small.faces, small.len());
+    let system = LimitSystem::new(&small, &topology, scheme)?;
+    Ok(0.98 * spectrum(&system)?.a.min)
+}
+
+fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut Table) -> Result<[LinePlot; 2]> {
+    let estimate = estimate(scheme)?;
+    let mut curves: Vec<Curve> = Vec::new();
+    let mut bound = Vec::new();
+    let progress = Progress::open(scheme.name(), arguments.common.quiet);
+    for &n in &arguments.sizes.0 {
+        let name = family(scheme, n);
+        let good = noisy(&name)?;
+        for random in [false, true] {
+            let scattered;
+            let mesh = if random {
+                let topology = Topology::new(&good.faces, good.len());
+                let order = Order::Random(7).order(&good, &topology.incidence);
+                scattered = shuffle_faces(&permute_vertices(&good, &order), 7);
+                &scattered
+            } else {
+                &good
+            };
+            for way in Way::ALL {
+                if n > way.most(arguments) {
+                    continue;
+                }
+                progress.message(format!("{name}: {}", way.name()));
+                let Some((seconds, outcome, memory)) = timed(arguments, mesh, scheme, way, estimate)? else {
+                    continue;
+                };
+                progress.step();
+                table.push(vec![
+                    scheme.name().into(),
+                    name.clone().into(),
+                    if random { "random" } else { "good" }.into(),
+                    way.name().into(),
+                    mesh.len().into(),
+                    outcome.iterations.into(),
+                    outcome.status.into(),
+                    seconds.into(),
+                    outcome.solve_seconds.into(),
+                    (1e9 * seconds / mesh.len() as f64).into(),
+                    (memory as f64 / 1e6).into(),
+                ]);
+                // A run of hours may be stopped: what was measured is kept.
+                table.write(&arguments.out)?;
+                let at = (mesh.len() as f64, 1e9 * seconds / mesh.len() as f64);
+                let known = curves.iter_mut().find(|c| c.way == way && c.random == random);
+                match known {
+                    Some(curve) => curve.points.push(at),
+                    None => curves.push(Curve { way, random, points: vec![at] }),
+                }
+                if way == Way::Free(Method::Chebyshev) && !random {
+                    // What a fused iteration in double precision must move, as often.
+                    let bytes = 4.0 * 24.0 + 37.0;
+                    bound.push((at.0, 1e9 * bytes * outcome.iterations as f64 / bandwidth));
+                }
+            }
+        }
+    }
+    drop(progress);
+    Ok([false, true].map(|random| plot(scheme, random, &curves, &bound)))
+}
+
+/// Time per vertex over the number of vertices, in one of the two orders. The legend stands beside the second.
+fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) -> LinePlot {
+    let look = |way: Way| match way {
+        Way::Auto => (palette(0), Marker::Circle),
+        Way::Files => (Colour(0, 0, 110), Marker::Triangle),
+        Way::Plain => (palette(1), Marker::Square),
+        Way::Free(Method::Chebyshev) => (palette(2), Marker::Circle),
+        Way::Free(_) => (palette(3), Marker::Diamond),
+        Way::Waves => (palette(5), Marker::Circle),
+        Way::Colours => (Colour(140, 86, 75), Marker::Circle),
+        Way::Stored(Method::Chebyshev) => (palette(4), Marker::Square),
+        Way::Stored(Method::GaussSeidel) => (Colour(160, 160, 0), Marker::Square),
+        Way::Stored(Method::PcgIc0) => (palette(6), Marker::Diamond),
+        Way::Stored(Method::Cholesky) => (Colour(100, 100, 100), Marker::Triangle),
+        Way::Stored(_) => (Colour(170, 170, 170), Marker::InvertedTriangle),
+    };
+    let mut series: Vec<Series> = curves
+        .iter()
+        .filter(|c| c.random == random)
+        .map(|c| {
+            let (colour, marker) = look(c.way);
+            let name = if random { c.way.name() } else { String::new() };
+            Series::line(name, c.points.iter().copied()).colour(colour).marker(marker).dash(Dash::Solid)
+        })
+        .collect();
+    if bound.len() > 1 {
+        let name = if random { "bandwidth bound" } else { "" };
+        series.push(Series::line(name, bound.iter().copied()).colour(Colour(0, 0, 0)).dash(Dash::Dotted));
+    }
+    LinePlot {
+        title: format!("{scheme}, {} order", if random { "random" } else { "good" }),
+        x_label: "vertices".into(),
+        y_label: "nanoseconds a vertex".into(),
+        x_scale: Scale::Log,
+        y_scale: Scale::Log,
+        y_range: Some((30.0, 3e4)),
+        series,
+        ..LinePlot::default()
+    }
+}
+
+/// Seconds that runs take at least together, where one takes less.
+const SHORT: f64 = 0.03;
+
+/// The fastest of several runs, with the memory of the first.
+fn timed(
+    arguments: &Arguments,
+    mesh: &Mesh,
+    scheme: Scheme,
+    way: Way,
+    estimate: f64,
+) -> Result<Option<(f64, Outcome, usize)>> {
+    let paths = ["points", "control"].map(|name| arguments.out.join(format!("scaling-{name}.ply")));
+    if way == Way::Files {
+        io::write(&paths[0], mesh, None)?;
+    }
+    let once = || {
+        let start = Instant::now();
+        let outcome = match way {
+            Way::Files => Some(file_to_file(&paths, scheme, arguments.tol)?),
+            _ => go(mesh, scheme, way, estimate, arguments.tol)?,
+        };
+        Ok::<_, Error>(outcome.map(|o| (start.elapsed().as_secs_f64(), o)))
+    };
+    let (first, memory) = machine::peak_memory(once);
+    let Some((mut seconds, mut outcome)) = first? else {
+        return Ok(None);
+    };
+    // A run of less than a millisecond finds cold caches and sleeping threads, if it comes alone.
+    let runs = match seconds {
+        s if s > 1.0 => 1,
+        s => usize::from(arguments.runs).max((SHORT / s) as usize),
+    };
+    for _ in 1..runs {
+        if let Some((again, o)) = once()?
+            && again < seconds
+        {
+            (seconds, outcome) = (again, o);
+        }
+    }
+    if way == Way::Files {
+        for path in &paths {
+            std::fs::remove_file(path).map_err(|e| Error::io(path, "remove", e))?;
+        }
+    }
+    Ok(Some((seconds, outcome, memory)))
+}
+
+/// From the points in one file to the control points in another.
+fn file_to_file([from, to]: &[PathBuf; 2], scheme: Scheme, tol: f64) -> Result<Outcome> {
+    let mesh = io::read(from)?.mesh;
+    let name = from.display().to_string();
+    let stop = Stop { tolerance: tol * mesh.diagonal(), max_iterations: 10_000 };
+    let found = match renumbered(&mesh) {
+        Some(moved) => {
+            let report = validate(&moved.mesh, None, Boundary::Refuse);
+            moved.control_points(Some(&report.into_topology(&name)?), scheme, &stop)?
+        }
+        None => {
+            let topology = validate(&mesh, None, Boundary::Refuse).into_topology(&name)?;
+            control_points(&mesh, Some(&topology), scheme, &stop)?
+        }
+    };
+    let (iterations, status) = (found.report.iterations, found.report.outcome.name());
+    io::write(to, &Mesh::new(found.points, mesh.faces), None)?;
+    Ok(Outcome { iterations, status, solve_seconds: found.solve_seconds })
+}
+
+type Number = fn(&Faces, &Incidence) -> Numbering;
+type Sweeps = fn(&Operator, &[DVec3], f64, &Stop) -> (Vec<DVec3>, Report);
+
+/// One run from faces in memory to control points; `None` if the way does not suit the mesh.
+fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<Option<Outcome>> {
+    let points = &mesh.positions;
+    let stop = Stop { tolerance: tol * mesh.diagonal(), max_iterations: 10_000 };
+    let start = |seconds: &mut f64, since: Instant| *seconds = since.elapsed().as_secs_f64();
+    let mut solve_seconds = 0.0;
+    let outcome = match way {
+        // Not from faces in memory.
+        Way::Files => return Ok(None),
+        Way::Auto => {
+            let found = control_points(mesh, None, scheme, &stop)?;
+            Outcome {
+                iterations: found.report.iterations,
+                status: found.report.outcome.name(),
+                solve_seconds: found.solve_seconds,
+            }
+        }
+        Way::Plain => {
+            let Some(plain) = baseline::Plain::new(mesh, scheme) else {
+                return Ok(None);
+            };
+            let since = Instant::now();
+            let (_, iterations, converged) =
+                plain.chebyshev(points, (estimate, 1.0), stop.tolerance, stop.max_iterations);
+            start(&mut solve_seconds, since);
+            Outcome { iterations, status: if converged { "converged" } else { "max-iterations" }, solve_seconds }
+        }
+        Way::Waves | Way::Colours => {
+            let topology = Topology::new(&mesh.faces, mesh.len());
+            let (number, sweeps): (Number, Sweeps) = match way {
+                Way::Waves => (in_fronts, in_waves),
+                _ => (in_colours, by_colours),
+            };
+            let numbering = number(&mesh.faces, &topology.incidence);
+            let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&numbering))?;
+            let since = Instant::now();
+            let moved = numbering.there(points);
+            let (control, report) = sweeps(&operator, &moved, 1.0, &stop);
+            numbering.back(&control);
+            start(&mut solve_seconds, since);
+            Outcome { iterations: report.iterations, status: report.outcome.name(), solve_seconds }
+        }
+        Way::Free(method) => {
+            let topology = Topology::new(&mesh.faces, mesh.len());
+            let operator = Operator::new(&mesh.faces, &topology, scheme)?;
+            let since = Instant::now();
+            let mut iterate: Box<dyn Iterate> = if method == Method::Cg {
+                let h = Preconditioner::weights(&operator);
+                Box::new(ConjugateGradient::new(&operator, points, h))
+            } else {
+                Box::new(Chebyshev::new(&operator, points, (estimate, 1.0)))
+            };
+            let report = solve(iterate.as_mut(), &stop, &mut |_| std::ops::ControlFlow::Continue(()));
+            start(&mut solve_seconds, since);
+            Outcome { iterations: report.iterations, status: report.outcome.name(), solve_seconds }
+        }
+        Way::Stored(method) => {
+            let topology = Topology::new(&mesh.faces, mesh.len());
+            let system = LimitSystem::new(mesh, &topology, scheme)?;
+            let setup = match method {
+                Method::Chebyshev => Setup::Chebyshev { spectrum: (estimate, 1.0) },
+                Method::GaussSeidel => Setup::Sor { omega: 1.0, order: None },
+                Method::PcgIc0 => Setup::PcgIc0,
+                Method::Lu => Setup::Lu,
+                _ => Setup::Cholesky,
+            };
+            let since = Instant::now();
+            let solution = run(&system, points, setup, &stop);
+            start(&mut solve_seconds, since);
+            Outcome { iterations: solution.report.iterations, status: solution.report.outcome.name(), solve_seconds }
+        }
+    };
+    Ok(Some(outcome))
+}

@@ -1,0 +1,181 @@
+//! The steps around the solve: topology, validation, explicit assembly, refinement, files.
+
+use std::path::Path;
+use std::time::Instant;
+
+use limitlab::Result;
+use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::error::Error;
+use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
+use limitlab::mesh::order::Order;
+use limitlab::mesh::validate::{Boundary, validate};
+use limitlab::mesh::{Mesh, Topology, io};
+use limitlab::subdivide::{Refinement, sqrt3, unified_sqrt3};
+use limitlab_experiments::cli::Printer;
+use limitlab_experiments::report::{Cell, Column, Table};
+
+use super::noisy;
+use super::threads::on_threads;
+
+/// Runs of which the fastest counts.
+const RUNS: usize = 3;
+
+/// Measures all steps at about `n` vertices and writes the table to `folder`, which also takes the mesh files for a
+/// while.
+pub fn steps(n: usize, folder: &Path, printer: &mut Printer) -> Result<()> {
+    let mut table = Table::new(
+        "scaling-steps",
+        "The steps around the solve",
+        vec![
+            Column::key("step"),
+            Column::key("scheme"),
+            Column::key("mesh"),
+            Column::key("order"),
+            Column::key("threads"),
+            Column::count("vertices"),
+            Column::count("new_vertices"),
+            Column::time("seconds"),
+            Column::time("nanoseconds_per_vertex"),
+            Column::time("megabytes_per_second"),
+        ],
+    );
+    table.note(
+        "Memory to memory but for the files; the fastest of three runs. Refinement: from a validated mesh with its \
+         topology to the refined mesh with its topology, nanoseconds per new vertex; \"from faces\" finds the topology \
+         of the coarse mesh too, not validated. Assembly: from faces to A and M. Files: positions with all 17 digits; PLY is binary.",
+    );
+    let quads = noisy(&format!("irregular-quad:{}", n & !1))?;
+    let triangles = noisy(&format!("irregular-tri:{n}"))?;
+    let polygons = noisy(&format!("irregular-poly:{n}"))?;
+    let mut threads = vec![1, rayon::current_num_threads()];
+    threads.dedup();
+    for (name, good) in [("quad", quads), ("tri", triangles), ("poly", polygons)] {
+        let topology = Topology::new(&good.faces, good.len());
+        let order = Order::Random(7).order(&good, &topology.incidence);
+        let random = shuffle_faces(&permute_vertices(&good, &order), 7);
+        for (order, mesh) in [("good", &good), ("random", &random)] {
+            for &threads in &threads {
+                let mut rows = Rows {
+                    table: &mut table,
+                    mesh,
+                    keys: [format!("irregular-{name}:{n}"), order.into(), threads.to_string()],
+                };
+                on_threads(threads, || rows.measure(folder))??;
+            }
+        }
+    }
+    table.write(folder)?;
+    printer.table(&table)
+}
+
+/// The rows of one mesh and number of threads.
+struct Rows<'a> {
+    table: &'a mut Table,
+    mesh: &'a Mesh,
+    /// Mesh, order, threads.
+    keys: [String; 3],
+}
+
+impl Rows<'_> {
+    fn measure(&mut self, folder: &Path) -> Result<()> {
+        let mesh = self.mesh;
+        self.plain("topology", "", || Ok(Topology::new(&mesh.faces, mesh.len())))?;
+        self.plain("validation", "", || validate(mesh, None, Boundary::Refuse).into_topology("mesh"))?;
+        let triangles = mesh.faces.uniform_size() == Some(3);
+        for scheme in Scheme::ALL {
+            if scheme.needs_triangles() == triangles {
+                self.plain("assembly", scheme.name(), || {
+                    let topology = Topology::new(&mesh.faces, mesh.len());
+                    LimitSystem::new(mesh, &topology, scheme)
+                })?;
+            }
+        }
+        for scheme in Refinement::ALL {
+            let of_any = matches!(scheme, Refinement::CatmullClark | Refinement::DooSabin);
+            if of_any != triangles {
+                self.refinement(scheme.name(), |mesh, topology| {
+                    let fine = scheme.refine(mesh, topology)?;
+                    let topology = scheme.refined_topology(mesh, topology, &fine);
+                    Ok((fine, topology))
+                })?;
+            }
+        }
+        if triangles {
+            let alpha = vec![0.5; mesh.len()];
+            self.refinement("unified-sqrt3", |mesh, topology| {
+                let (fine, _) = unified_sqrt3::refine(mesh, topology, &alpha)?;
+                let topology = sqrt3::refined_topology(mesh, topology, &fine);
+                Ok((fine, topology))
+            })?;
+        }
+        if self.keys[1] == "good" && mesh.faces.uniform_size().is_some() {
+            for ending in ["off", "obj", "ply"] {
+                self.files(&folder.join(format!("scaling-steps.{ending}")), ending)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn plain<T>(&mut self, step: &str, scheme: &str, work: impl Fn() -> Result<T>) -> Result<()> {
+        let (seconds, _) = fastest(work)?;
+        self.push(step, scheme, self.mesh.len(), seconds, None);
+        Ok(())
+    }
+
+    fn refinement(&mut self, scheme: &str, step: impl Fn(&Mesh, &Topology) -> Result<(Mesh, Topology)>) -> Result<()> {
+        let mesh = self.mesh;
+        let topology = validate(mesh, None, Boundary::Refuse).into_topology("mesh")?;
+        let (seconds, (fine, _)) = fastest(|| step(mesh, &topology))?;
+        self.push("refinement", scheme, fine.len(), seconds, None);
+        drop(fine);
+        let (seconds, (fine, _)) = fastest(|| step(mesh, &Topology::new(&mesh.faces, mesh.len())))?;
+        self.push("refinement, from faces", scheme, fine.len(), seconds, None);
+        Ok(())
+    }
+
+    fn files(&mut self, path: &Path, ending: &str) -> Result<()> {
+        let (seconds, ()) = fastest(|| io::write(path, self.mesh, None))?;
+        let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len() as f64;
+        let n = self.mesh.len();
+        let step = format!("write {ending}");
+        self.push(&step, "", n, seconds, Some(bytes / seconds));
+        let (seconds, _) = fastest(|| io::read(path))?;
+        let step = format!("read {ending}");
+        self.push(&step, "", n, seconds, Some(bytes / seconds));
+        std::fs::remove_file(path).map_err(|e| Error::io(path, "remove", e))
+    }
+
+    fn push(&mut self, step: &str, scheme: &str, vertices: usize, seconds: f64, speed: Option<f64>) {
+        let [mesh, order, threads] = self.keys.clone();
+        let new = if vertices == self.mesh.len() { Cell::Empty } else { vertices.into() };
+        self.table.push(vec![
+            step.into(),
+            scheme.into(),
+            mesh.into(),
+            order.into(),
+            threads.into(),
+            self.mesh.len().into(),
+            new,
+            seconds.into(),
+            (1e9 * seconds / vertices as f64).into(),
+            speed.map(|s| s / 1e6).into(),
+        ]);
+    }
+}
+
+/// The fastest of some runs and the last result, whose destruction is not counted.
+fn fastest<T>(work: impl Fn() -> Result<T>) -> Result<(f64, T)> {
+    let timed = || {
+        let start = Instant::now();
+        let result = work()?;
+        Ok((start.elapsed().as_secs_f64(), result))
+    };
+    let (mut best, mut result) = timed()?;
+    for _ in 1..RUNS {
+        drop(result);
+        let seconds;
+        (seconds, result) = timed()?;
+        best = f64::min(best, seconds);
+    }
+    Ok((best, result))
+}

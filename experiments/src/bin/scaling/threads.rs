@@ -1,0 +1,164 @@
+//! One thread beside all of them: what each method gains, and what STREAM does.
+
+use std::time::Instant;
+
+use limitlab::Result;
+use limitlab::assemble::{Operator, Scheme};
+use limitlab::error::Error;
+use limitlab::mesh::colours::in_colours;
+use limitlab::mesh::fronts::in_fronts;
+use limitlab::mesh::{Mesh, Topology};
+use limitlab::solvers::Method;
+use limitlab::solvers::coloured::Coloured;
+use limitlab::solvers::system::Rows;
+use limitlab::solvers::wavefront::Wavefront;
+use limitlab_experiments::cli::Printer;
+use limitlab_experiments::report::{Column, Table};
+
+use super::machine::triad;
+use super::{Arguments, Way, estimate, family, go, noisy};
+
+/// Products or sweeps of one measurement.
+const ITERATIONS: usize = 8;
+
+/// The methods that iterate, as far as they use several threads.
+const WAYS: [Way; 7] = [
+    Way::Auto,
+    Way::Plain,
+    Way::Free(Method::Chebyshev),
+    Way::Free(Method::Cg),
+    Way::Waves,
+    Way::Colours,
+    Way::Stored(Method::Chebyshev),
+];
+
+/// Runs `work` on so many threads.
+pub fn on_threads<T: Send>(count: usize, work: impl FnOnce() -> T + Send) -> Result<T> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(count)
+        .build()
+        .map_err(|e| Error::Computation(format!("cannot start {count} threads: {e}")))?;
+    Ok(pool.install(work))
+}
+
+/// Writes the table of quads under Catmull-Clark and triangles under Loop.
+pub fn gains(arguments: &Arguments, all: usize, printer: &mut Printer) -> Result<()> {
+    let runs = usize::from(arguments.runs).max(2);
+    let mut table = Table::new(
+        "scaling-threads",
+        format!("One thread beside {all}"),
+        vec![
+            Column::key("scheme"),
+            Column::key("mesh"),
+            Column::key("method"),
+            Column::key("part"),
+            Column::time("seconds_on_one"),
+            Column::time("seconds_on_all"),
+            Column::time("gain"),
+            Column::time("gain_of_triad"),
+        ],
+    );
+    table.note(format!(
+        "Good order; the fastest of {runs} runs. Gain: seconds on one thread over seconds on {all}. STREAM's triad \
+         is measured with as many threads around each scheme's measurements: what it gains is what memory allows where \
+         memory decides. Set-up is topology, order and operator or matrix; products and sweeps are one each."
+    ));
+    for scheme in [Scheme::CatmullClark, Scheme::Loop] {
+        let name = family(scheme, arguments.gains);
+        let mesh = noisy(&name)?;
+        let before = [on_threads(1, triad)?, on_threads(all, triad)?];
+        let mut seconds = Vec::new();
+        let estimate = estimate(scheme)?;
+        for way in WAYS {
+            for part in ["whole", "set-up", "solve"] {
+                seconds.push((way.name(), part, [f64::INFINITY; 2]));
+            }
+            let first = seconds.len() - 3;
+            for _ in 0..runs {
+                for (k, count) in [1, all].into_iter().enumerate() {
+                    let parts = on_threads(count, || {
+                        let start = Instant::now();
+                        let outcome = go(&mesh, scheme, way, estimate, arguments.tol)?;
+                        let whole = start.elapsed().as_secs_f64();
+                        let solve = outcome.map_or(f64::NAN, |o| o.solve_seconds);
+                        Ok::<_, Error>([whole, whole - solve, solve])
+                    })??;
+                    for (row, part) in seconds[first..].iter_mut().zip(parts) {
+                        row.2[k] = row.2[k].min(part);
+                    }
+                }
+            }
+        }
+        for (k, count) in [1, all].into_iter().enumerate() {
+            let single = on_threads(count, || kernels(&mesh, scheme, runs))??;
+            for (name, time) in single {
+                match seconds.iter_mut().find(|row| row.0 == name) {
+                    Some(row) => row.2[k] = time,
+                    None => seconds.push((name.into(), "once", [time; 2])),
+                }
+            }
+        }
+        let after = [on_threads(1, triad)?, on_threads(all, triad)?];
+        let bandwidth = [0, 1].map(|k| before[k].max(after[k]));
+        let of_triad = bandwidth[1] / bandwidth[0];
+        table.note(format!(
+            "STREAM triad around {scheme}: {:.1} GB/s on one thread, {:.1} GB/s on {all}.",
+            bandwidth[0] / 1e9,
+            bandwidth[1] / 1e9
+        ));
+        for (method, part, [one, many]) in seconds {
+            table.push(vec![
+                scheme.name().into(),
+                name.as_str().into(),
+                method.into(),
+                part.into(),
+                one.into(),
+                many.into(),
+                (one / many).into(),
+                of_triad.into(),
+            ]);
+        }
+    }
+    table.write(&arguments.out)?;
+    printer.table(&table)
+}
+
+/// The building blocks, each with its seconds: products and sweeps in double precision, the operator.
+fn kernels(mesh: &Mesh, scheme: Scheme, runs: usize) -> Result<Vec<(&'static str, f64)>> {
+    let fastest = |work: &mut dyn FnMut()| {
+        (0..runs).fold(f64::INFINITY, |best, _| {
+            let start = Instant::now();
+            work();
+            best.min(start.elapsed().as_secs_f64())
+        })
+    };
+    let faces = &mesh.faces;
+    let topology = Topology::new(faces, mesh.len());
+    let [fronts, colours] = [in_fronts, in_colours].map(|number| number(faces, &topology.incidence));
+    let build = |numbering| Operator::in_order(faces, &topology, scheme, Some(numbering));
+    let mut built = Ok(());
+    let operator = fastest(&mut || built = build(&fronts).map(drop));
+    built?;
+    let (front, coloured) = (build(&fronts)?, build(&colours)?);
+    let points = fronts.there(&mesh.positions);
+    let mut image = points.clone();
+    let mut nothing = vec![(); mesh.len()];
+    let mut rows = Rows::new(mesh.len());
+    let product = fastest(&mut || {
+        for _ in 0..ITERATIONS {
+            rows.product(&front, &points, &mut image, &mut nothing, |_, ax, y, (), _| *y = ax);
+        }
+    });
+    let waves = Wavefront::new(&front);
+    let in_waves = fastest(&mut || waves.relax(1.0, ITERATIONS, &points, &mut image));
+    let points = colours.there(&mesh.positions);
+    let sweeps = Coloured::new(&coloured);
+    let by_colours = fastest(&mut || sweeps.relax(1.0, ITERATIONS, &points, &mut image));
+    let one = |seconds: f64| seconds / ITERATIONS as f64;
+    Ok(vec![
+        ("operator in fronts", operator),
+        ("product", one(product)),
+        ("sweep in waves", one(in_waves)),
+        ("sweep by colours", one(by_colours)),
+    ])
+}

@@ -1,0 +1,484 @@
+//! Extreme or all eigenvalues, proven bounds, singularity: `spectrum [MESH…]`.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use glam::DVec3;
+use serde_json::{Map, Value, json};
+
+use limitlab::Result;
+use limitlab::analysis::certificate::{Certificate, certify};
+use limitlab::analysis::comparison::{SOR_OMEGA, SSOR_OMEGA};
+use limitlab::analysis::dense;
+use limitlab::analysis::eigen::End;
+use limitlab::analysis::promise::{Counts, Promise};
+use limitlab::analysis::radius::{SpectralRadius, spectral_radius};
+use limitlab::analysis::singularity::{Mode, Singularity, modes};
+use limitlab::analysis::spectrum::{Ends, Estimate, Extremes, Operator, Spectrum, excited, mesh_ends};
+use limitlab::assemble::LimitSystem;
+use limitlab::assemble::bounds::SpectralBounds;
+use limitlab::solvers::Method;
+use limitlab::solvers::gauss_seidel::sweep;
+use limitlab::solvers::ssor::symmetric_sweep;
+use limitlab_experiments::cli::{self, CommonFlags, Input, MeshFlags, OutputFlags, Progress, StopFlags, number};
+use limitlab_experiments::report::series::Bars;
+use limitlab_experiments::report::{Column, Figure, LinePlot, Rule, Table};
+
+/// The ends of the spectra of A and D⁻¹A and the spectral radius of each method's error matrix, with proven bounds
+/// beside them, and whether the system is singular.
+#[derive(Parser)]
+#[command(name = "spectrum", version)]
+struct Arguments {
+    /// Mesh files (.obj, .off, .ply) or built-in names; unless told, four built-in ones with --noise 0.1
+    #[arg(value_name = "MESH")]
+    meshes: Vec<String>,
+    /// Compute all eigenvalues (up to 4000 vertices), with a histogram
+    #[arg(long)]
+    full: bool,
+    /// Compute this many modes at the lower end of A, with multiplicity
+    #[arg(long, value_name = "K", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=56))]
+    modes: u16,
+    /// Prove the ends by Cholesky factorizations of M − σH⁻¹ and the like (memory: the factor)
+    #[arg(long)]
+    certify: bool,
+    /// Leave out the spectral radii of Gauss-Seidel, SOR and SSOR, which take the longest on large meshes
+    #[arg(long)]
+    no_sweeps: bool,
+    /// Leave out what part of the spectra the points excite
+    #[arg(long)]
+    no_data: bool,
+    #[command(flatten)]
+    mesh: MeshFlags,
+    #[command(flatten)]
+    stop: StopFlags,
+    #[command(flatten)]
+    output: OutputFlags,
+    #[command(flatten)]
+    common: CommonFlags,
+}
+
+/// What `spectrum` runs on without arguments.
+const BUILT_IN: [&str; 4] = ["torus:32x32", "quad-sphere:4", "icosphere:3", "prism:9"];
+const BINS: usize = 60;
+
+fn main() -> ExitCode {
+    let mut arguments = Arguments::parse();
+    cli::exit(|| {
+        arguments.common.apply()?;
+        if arguments.meshes.is_empty() {
+            arguments.meshes = BUILT_IN.map(String::from).to_vec();
+            arguments.mesh.default_noise();
+        }
+        arguments.output.prepare()?;
+        run(&arguments)
+    })
+}
+
+/// All that is known of one mesh.
+struct Findings {
+    bounds: SpectralBounds,
+    ends: Ends,
+    full: Option<dense::Eigenvalues>,
+    sweeps: Vec<(Method, f64, SpectralRadius)>,
+    verdict: Singularity,
+    promise: Promise,
+    /// `None` where all points coincide.
+    counts: Option<Counts>,
+    data: [Option<Extremes>; 2],
+    modes: Vec<Mode>,
+    certificates: [Option<Certificate>; 4],
+}
+
+impl Findings {
+    fn spectrum(&self) -> Spectrum {
+        self.ends.spectrum()
+    }
+
+    /// Method, its parameter, the spectral radius of its error matrix or its factor per iteration.
+    fn radii(&self) -> Vec<(&'static str, String, f64)> {
+        let Spectrum { a, jacobi } = self.spectrum();
+        let mut rows = vec![
+            ("pia", "ω=1".into(), a.radius(1.0)),
+            ("w-pia", format!("ω={:.6} (optimal)", a.optimal_omega()), a.radius(a.optimal_omega())),
+            ("thall", "ω=0.5".into(), jacobi.radius(0.5)),
+            ("jacobi", "ω=1".into(), jacobi.radius(1.0)),
+            (
+                "jacobi_optimal",
+                format!("ω={:.6} (optimal)", jacobi.optimal_omega()),
+                jacobi.radius(jacobi.optimal_omega()),
+            ),
+        ];
+        for (method, omega, radius) in &self.sweeps {
+            rows.push((method.name(), format!("ω={omega}, file order"), radius.value));
+        }
+        for (name, ends) in [("chebyshev", a), ("cg", a), ("pcg-jacobi", jacobi)] {
+            let rate = if ends.min > 0.0 { ends.krylov_rate() } else { 1.0 };
+            rows.push((name, "(√κ−1)/(√κ+1)".into(), rate));
+        }
+        rows
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.mesh.print_defects(&arguments.meshes, &arguments.common)? {
+        return Ok(());
+    }
+    let mut results = Vec::new();
+    for name in &arguments.meshes {
+        let input = arguments.mesh.input(name, &arguments.common)?;
+        let findings = analyse(&input, arguments)?;
+        let out = &arguments.output.out;
+        let tables = [eigenvalue_table(&input, &findings), radius_table(&input, &findings)];
+        for table in &tables {
+            table.write(out)?;
+            if !arguments.output.json {
+                cli::print(&table.to_markdown())?;
+            }
+        }
+        if let Some(full) = &findings.full {
+            full_table(&input, full).write(out)?;
+            let png = out.join(format!("{}.png", input.stem("spectrum-histogram")));
+            histogram(&input, full, &findings.promise).render()?.save(&png)?;
+        }
+        if !findings.modes.is_empty() {
+            mode_table(&input, &findings.modes).write(out)?;
+        }
+        results.push(json(&input, &findings));
+    }
+    cli::finish(&results, &arguments.output, &arguments.common)
+}
+
+fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
+    let with_name = |e: limitlab::Error| limitlab::Error::mesh(&input.name, e.to_string());
+    // Only some of what can be asked for needs entries.
+    let explicit = arguments.full || !arguments.no_sweeps || arguments.modes > 0 || arguments.certify;
+    let system = explicit.then(|| input.system()).transpose()?;
+    let operator =
+        limitlab::assemble::Operator::new(&input.mesh.faces, input.topology(), input.scheme).map_err(with_name)?;
+    let progress = Progress::new(&input.name, 5, arguments.common.quiet);
+    let verdict = Singularity::detect(&input.mesh, input.topology(), input.scheme);
+    let promise = Promise::new(&operator.bounds());
+    let counts = match input.stop(&arguments.stop) {
+        Ok(stop) => Some(promise.counts(&operator, &input.mesh.positions, stop.tolerance)),
+        Err(error) => {
+            arguments.common.remark(format_args!("no iterations are promised: {error}"));
+            None
+        }
+    };
+    let full = match &system {
+        Some(system) if arguments.full => Some(dense::full_eigenvalues(system).map_err(with_name)?),
+        _ => None,
+    };
+    progress.step();
+    let ends = mesh_ends(&input.mesh, input.topology(), input.scheme).map_err(with_name)?;
+    if !ends.converged() {
+        arguments.common.remark(format_args!(
+            "{}: an end of the spectrum is the edge of a dense band; its error is in the table",
+            input.name
+        ));
+    }
+    progress.step();
+    let sweeps = match &system {
+        Some(system) if !arguments.no_sweeps => radii_of_sweeps(system).map_err(with_name)?,
+        _ => Vec::new(),
+    };
+    progress.step();
+    let points = &input.mesh.positions;
+    let data = if arguments.no_data {
+        [None; 2]
+    } else {
+        [
+            excited(&operator, points, Operator::A).map_err(with_name)?,
+            excited(&operator, points, Operator::Jacobi).map_err(with_name)?,
+        ]
+    };
+    let modes = match &system {
+        Some(system) if arguments.modes > 0 => {
+            let count = arguments.modes.into();
+            modes(system, Operator::A, End::Lowest, count).map_err(with_name)?
+        }
+        _ => Vec::new(),
+    };
+    progress.step();
+    let mut certificates = [None; 4];
+    if let Some(system) = system.as_ref().filter(|_| arguments.certify) {
+        let Spectrum { a, jacobi } = ends.spectrum();
+        for (slot, (which, end, estimate)) in certificates.iter_mut().zip([
+            (Operator::A, End::Lowest, a.min),
+            (Operator::A, End::Highest, a.max),
+            (Operator::Jacobi, End::Lowest, jacobi.min),
+            (Operator::Jacobi, End::Highest, jacobi.max),
+        ]) {
+            *slot = certify(system, which, end, estimate).map_err(with_name)?;
+        }
+    }
+    progress.step();
+    Ok(Findings { bounds: operator.bounds(), ends, full, sweeps, verdict, promise, counts, data, modes, certificates })
+}
+
+fn radii_of_sweeps(system: &LimitSystem) -> Result<Vec<(Method, f64, SpectralRadius)>> {
+    let zero = vec![DVec3::ZERO; system.len()];
+    let sor = |omega| spectral_radius(system, |x| sweep(system, &zero, omega, 0..zero.len(), x));
+    let ssor = spectral_radius(system, |x| {
+        symmetric_sweep(system, &zero, SSOR_OMEGA, None, x);
+    })?;
+    Ok(vec![
+        (Method::GaussSeidel, 1.0, sor(1.0)?),
+        (Method::Sor, SOR_OMEGA, sor(SOR_OMEGA)?),
+        (Method::Ssor, SSOR_OMEGA, ssor),
+    ])
+}
+
+fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
+    let mut table = Table::new(
+        input.stem("spectrum"),
+        format!("Spectrum of {} under {}", input.label, input.scheme),
+        vec![
+            Column::key("quantity"),
+            Column::number("value", 1e-7, 10),
+            Column::number("residual", 1e3, 2).floor(1e-6),
+            Column::number("error", 1e3, 2).floor(1e-6),
+            Column::text("source"),
+            Column::count("multiplicity"),
+            Column::number("equal_within", 1e-3, 1),
+            Column::number("proven_bound", 1e-9, 10),
+            Column::number("certified", 1e-6, 10),
+            Column::number("excited_by_data", 1e-3, 6),
+        ],
+    );
+    let kernel = found.verdict.kernel_dimension();
+    let mut text = format!(
+        "{} vertices, {} faces, {} components; {}",
+        input.mesh.len(),
+        input.mesh.faces.len(),
+        found.verdict.components,
+        if kernel > 0 {
+            format!(
+                "**singular**: {kernel} components (the first begins at vertex {}) have all valences 3 and a \
+                 bipartite graph, the null vectors are their ±1 colourings, and the points {} a part that no control \
+                 points reach.",
+                found.verdict.singular[0].first_vertex,
+                if found.verdict.excited { "have" } else { "do not have" }
+            )
+        } else {
+            "non-singular: no component with all valences 3 and a bipartite graph, or a scheme that never is.".into()
+        }
+    );
+    if kernel > 0 {
+        text += &format!(
+            " PIA {}; Gauss-Seidel {}; Cholesky {}.",
+            found.verdict.prediction(Method::Pia).name(),
+            found.verdict.prediction(Method::GaussSeidel).name(),
+            found.verdict.prediction(Method::Cholesky).name()
+        );
+    }
+    table.note(text);
+    table.note(format!(
+        "`residual` is ‖Sx − λx‖₂ of the symmetric matrix similar to A or D⁻¹A: an eigenvalue lies that close. `error` \
+         estimates the error of the value as the end of the spectrum. {} products of a matrix with a vector were made. \
+         `multiplicity` counts the eigenvalues that equal this \
+         end up to `equal_within`, relative, where that was decided. `proven_bound` follows from valences and face sizes alone; `certified` from a Cholesky factorization \
+         (--certify). ω of Jacobi is safe below {:.6} by proof, below {:.6} by the spectrum; of W-PIA below {:.6}.",
+        found.ends.applications,
+        found.promise.safe_omega_jacobi,
+        found.spectrum().jacobi.critical_omega(),
+        found.promise.safe_omega_pia
+    ));
+    table.note(match &found.counts {
+        Some(counts) => format!(
+            "Iterations that suffice by proof for this tolerance from V = P: PIA {}, W-PIA {}, Thall {}, Chebyshev {}.",
+            promised(counts.pia),
+            promised(counts.w_pia),
+            promised(counts.thall),
+            promised(counts.chebyshev)
+        ),
+        None => "All points coincide: no tolerance is relative to their extent, and no iterations are promised.".into(),
+    });
+    let b = &found.bounds;
+    let e = &found.ends;
+    let data = |k: usize, low: bool| found.data[k].map(|d| if low { d.min } else { d.max });
+    for (k, (name, estimate, bound, excited)) in [
+        ("lambda_min", e.lambda_min, b.lambda_min, data(0, true)),
+        ("lambda_max", e.lambda_max, b.lambda_max, data(0, false)),
+        ("jacobi_lambda_min", e.jacobi_lambda_min, b.jacobi_lambda_min, data(1, true)),
+        ("jacobi_lambda_max", e.jacobi_lambda_max, b.jacobi_lambda_max, data(1, false)),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        table.push(vec![
+            name.into(),
+            estimate.value.into(),
+            estimate.residual.into(),
+            estimate.error.into(),
+            estimate.source.name().into(),
+            estimate.multiplicity.map(|m| m.count).into(),
+            estimate.multiplicity.map(|m| m.within).into(),
+            bound.into(),
+            found.certificates[k].map(|c| c.bound).into(),
+            excited.into(),
+        ]);
+    }
+    table
+}
+
+fn promised(count: f64) -> String {
+    if count.is_finite() { count.to_string() } else { "unknown (the bound for λ_min is 0)".into() }
+}
+
+fn radius_table(input: &Input, found: &Findings) -> Table {
+    let mut table = Table::new(
+        input.stem("spectrum-rates"),
+        format!("Predicted rates on {} under {}", input.label, input.scheme),
+        vec![Column::key("method"), Column::key("parameter"), Column::number("rho", 1e-5, 6)],
+    );
+    table.note(
+        "Factors per iteration: the spectral radius of the error matrix; for Chebyshev and conjugate gradients the bound \
+         from the condition number."
+            .to_string(),
+    );
+    for (method, parameter, rho) in found.radii() {
+        table.push(vec![method.into(), parameter.into(), rho.into()]);
+    }
+    table
+}
+
+fn full_table(input: &Input, full: &dense::Eigenvalues) -> Table {
+    let mut table = Table::new(
+        input.stem("spectrum-full"),
+        format!("All eigenvalues of {} under {}", input.label, input.scheme),
+        vec![Column::key("index"), Column::number("a", 1e-9, 10), Column::number("jacobi", 1e-9, 10)],
+    );
+    for (i, (a, jacobi)) in full.a.iter().zip(&full.jacobi).enumerate() {
+        table.push(vec![i.to_string().into(), (*a).into(), (*jacobi).into()]);
+    }
+    table
+}
+
+fn mode_table(input: &Input, modes: &[Mode]) -> Table {
+    let mut columns = vec![Column::key("vertex")];
+    for k in 0..modes.len() {
+        columns.push(Column::number(format!("mode_{k}"), 1e-3, 6).floor(1e-3));
+    }
+    let mut table = Table::new(
+        input.stem("spectrum-modes"),
+        format!("Slowest modes of {} under {}", input.label, input.scheme),
+        columns,
+    );
+    let values: Vec<String> = modes.iter().map(|m| format!("{:.10}", m.eigenvalue.value)).collect();
+    table.note(format!("Eigenvectors of A, largest entry 1, of the eigenvalues {}.", values.join(", ")));
+    for v in 0..modes[0].values.len() {
+        let mut row = vec![v.to_string().into()];
+        row.extend(modes.iter().map(|m| m.values[v].into()));
+        table.push(row);
+    }
+    table
+}
+
+fn histogram(input: &Input, full: &dense::Eigenvalues, promise: &Promise) -> Figure {
+    let panel = |values: &[f64], name: &str, label: &str, bounds: Extremes| LinePlot {
+        x_label: format!("eigenvalue of {label}"),
+        y_label: "eigenvalues".into(),
+        bars: vec![Bars::histogram(name, values, BINS)],
+        vertical_lines: vec![Rule::new(bounds.min, "proven bounds"), Rule::new(bounds.max, "")],
+        ..LinePlot::default()
+    };
+    let a = LinePlot {
+        title: format!("{} under {}", input.label, input.scheme),
+        ..panel(&full.a, "A", "A (PIA, CG, Chebyshev)", promise.a)
+    };
+    let jacobi = panel(&full.jacobi, "D⁻¹A", "D⁻¹A (Jacobi)", promise.jacobi);
+    let mut figure = Figure::stack([a, jacobi]);
+    figure.share_x = false;
+    figure
+}
+
+fn json(input: &Input, found: &Findings) -> Value {
+    let e = &found.ends;
+    let Spectrum { a, jacobi } = found.spectrum();
+    let multiplicity = |e: Estimate| e.multiplicity.map(|m| json!({ "count": m.count, "within": m.within }));
+    let promised = |count: fn(&Counts) -> f64| found.counts.as_ref().map(|c| number(count(c)));
+    let mut rho = Map::new();
+    for (method, _, value) in found.radii() {
+        rho.insert(method.into(), number(value));
+    }
+    let mut object = json!({
+        "lambda_min": number(e.lambda_min.value),
+        "lambda_max": number(e.lambda_max.value),
+        "lambda_min_bound": number(found.bounds.lambda_min),
+        "jacobi_lambda_min": number(e.jacobi_lambda_min.value),
+        "jacobi_lambda_max": number(e.jacobi_lambda_max.value),
+        "jacobi_lambda_min_bound": number(found.bounds.jacobi_lambda_min),
+        "jacobi_lambda_max_bound": number(found.bounds.jacobi_lambda_max),
+        "residuals": {
+            "lambda_min": number(e.lambda_min.residual),
+            "lambda_max": number(e.lambda_max.residual),
+            "jacobi_lambda_min": number(e.jacobi_lambda_min.residual),
+            "jacobi_lambda_max": number(e.jacobi_lambda_max.residual),
+        },
+        "multiplicities": {
+            "lambda_min": multiplicity(e.lambda_min),
+            "lambda_max": multiplicity(e.lambda_max),
+            "jacobi_lambda_min": multiplicity(e.jacobi_lambda_min),
+            "jacobi_lambda_max": multiplicity(e.jacobi_lambda_max),
+        },
+        "sources": {
+            "lambda_min": e.lambda_min.source.name(),
+            "lambda_max": e.lambda_max.source.name(),
+            "jacobi_lambda_min": e.jacobi_lambda_min.source.name(),
+            "jacobi_lambda_max": e.jacobi_lambda_max.source.name(),
+        },
+        "converged": e.converged(),
+        "applications": e.applications,
+        "rho": rho,
+        "optimal_omega": {
+            "w-pia": number(a.optimal_omega()),
+            "jacobi": number(jacobi.optimal_omega()),
+        },
+        "critical_omega_jacobi": number(jacobi.critical_omega()),
+        "safe_omega_jacobi": number(found.promise.safe_omega_jacobi),
+        "promised_iterations": {
+            "pia": promised(|c| c.pia),
+            "w-pia": promised(|c| c.w_pia),
+            "thall": promised(|c| c.thall),
+            "chebyshev": promised(|c| c.chebyshev),
+        },
+        "singular": found.verdict.is_singular(),
+        "kernel_dimension": found.verdict.kernel_dimension(),
+        "kernel_excited": found.verdict.excited,
+    });
+    if let Value::Object(map) = &mut object {
+        let names = ["lambda_min", "lambda_max", "jacobi_lambda_min", "jacobi_lambda_max"];
+        let proofs: Map<String, Value> = names
+            .into_iter()
+            .zip(&found.certificates)
+            .filter_map(|(name, c)| c.map(|c| (name.to_owned(), number(c.bound))))
+            .collect();
+        if !proofs.is_empty() {
+            map.insert("certified".into(), Value::Object(proofs));
+        }
+        if found.verdict.is_singular() {
+            let all =
+                Method::ALL.iter().map(|&m| (m.name().to_owned(), Value::from(found.verdict.prediction(m).name())));
+            map.insert("predictions".into(), Value::Object(all.collect()));
+        }
+        if let Some(full) = &found.full {
+            map.insert("eigenvalues".into(), json!({ "a": full.a, "jacobi": full.jacobi }));
+        }
+        if !found.modes.is_empty() {
+            let values: Vec<Value> = found
+                .modes
+                .iter()
+                .map(|m| {
+                    json!({
+                        "value": number(m.eigenvalue.value),
+                        "residual": number(m.eigenvalue.residual),
+                        "participation": number(m.participation),
+                    })
+                })
+                .collect();
+            map.insert("modes".into(), Value::Array(values));
+        }
+    }
+    input.json(object)
+}

@@ -1,0 +1,195 @@
+//! Iterations, measured rate and predicted ρ over ω: `sweep-omega [MESH…]`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use serde_json::{Map, Value, json};
+
+use limitlab::Result;
+use limitlab::analysis::sweep::{Sweep, rounding_floor, sweep};
+use limitlab::mesh::order::Order;
+use limitlab::solvers::{Method, Stop};
+use limitlab_experiments::cli::{
+    self, CommonFlags, Grid, Input, List, MeshFlags, OutputFlags, Progress, StopFlags, number,
+};
+use limitlab_experiments::studies::sweep as study;
+
+/// Sweeps the damping ω of Jacobi, PIA and SOR: iterations to the tolerance and the measured rate, with the
+/// predicted spectral radius ρ(ω), the critical and the optimal ω beside them.
+#[derive(Parser)]
+#[command(name = "sweep-omega", version)]
+struct Arguments {
+    /// Mesh files (.obj, .off, .ply) or built-in names; unless told, four built-in ones with --noise 0.1
+    #[arg(value_name = "MESH")]
+    meshes: Vec<String>,
+    /// Methods to sweep: jacobi, pia, sor
+    #[arg(long, value_name = "NAME,…", default_value = "jacobi,pia,sor", value_parser = methods)]
+    method: List<Method>,
+    /// Values of ω from A to B, both included; unless told, 0.05 to the first value beyond each method's threshold
+    #[arg(long, value_name = "A:B:STEP")]
+    omega: Option<Grid>,
+    /// Vertex order of SOR: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
+    #[arg(long, value_name = "NAME", default_value_t = Order::File)]
+    order: Order,
+    #[command(flatten)]
+    mesh: MeshFlags,
+    #[command(flatten)]
+    stop: StopFlags,
+    #[command(flatten)]
+    output: OutputFlags,
+    #[command(flatten)]
+    common: CommonFlags,
+}
+
+/// What `sweep-omega` runs on without arguments.
+const BUILT_IN: [&str; 4] = ["torus:32x32", "quad-sphere:4", "icosphere:3", "irregular-quad:1000"];
+
+/// The methods that have an ω to sweep, as a `value_parser`.
+fn methods(text: &str) -> std::result::Result<List<Method>, String> {
+    let list: List<Method> = text.parse()?;
+    match list.0.iter().find(|m| !matches!(m, Method::Jacobi | Method::Pia | Method::Sor)) {
+        None => Ok(list),
+        Some(method) => Err(format!("{method} has no ω to sweep; choose among jacobi, pia and sor")),
+    }
+}
+
+fn main() -> ExitCode {
+    let mut arguments = Arguments::parse();
+    cli::exit(|| {
+        arguments.common.apply()?;
+        if arguments.meshes.is_empty() {
+            arguments.meshes = BUILT_IN.map(String::from).to_vec();
+            arguments.mesh.default_noise();
+        }
+        arguments.output.prepare()?;
+        run(&arguments)
+    })
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.mesh.print_defects(&arguments.meshes, &arguments.common)? {
+        return Ok(());
+    }
+    let mut results = Vec::new();
+    for name in &arguments.meshes {
+        let input = arguments.mesh.input(name, &arguments.common)?;
+        let stop = input.stop(&arguments.stop)?;
+        let table = |sweep: &Sweep| {
+            study::table(
+                input.stem("sweep-omega"),
+                format!("ω sweep on {} under {}", input.label, input.scheme),
+                format!(
+                    "{} vertices, {} faces; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:.3e} (mesh units).",
+                    input.mesh.len(),
+                    input.mesh.faces.len(),
+                    stop.tolerance * input.frame.scale()
+                ),
+                sweep,
+            )
+        };
+        let write = |sweep: &Sweep| table(sweep).write(&arguments.output.out);
+        let sweep = sweep_one(&input, arguments, &stop, &write)?;
+        write(&sweep)?;
+        let table = table(&sweep);
+        let title = format!("{} under {}", input.label, input.scheme);
+        study::plot(title, &arguments.method.0, &sweep)
+            .render()?
+            .save(&arguments.output.out.join(format!("{}.png", table.id)))?;
+        if !arguments.output.json {
+            cli::print(&table.to_markdown())?;
+        }
+        results.push(json(&input, arguments, &sweep));
+    }
+    cli::finish(&results, &arguments.output, &arguments.common)
+}
+
+/// Between two times that the rows which are there are written.
+const PAUSE: Duration = Duration::from_secs(2);
+
+/// The sweep, its errors in mesh units. What there is of a long one is written now and then, so that it may be stopped.
+fn sweep_one(
+    input: &Input,
+    arguments: &Arguments,
+    stop: &Stop,
+    write: &(dyn Fn(&Sweep) -> Result<Vec<PathBuf>> + Sync),
+) -> Result<Sweep> {
+    let system = input.system()?;
+    let order = arguments.order.order(&input.mesh, &input.topology().incidence);
+    let grids: Vec<(Method, Vec<f64>)> = arguments
+        .method
+        .0
+        .iter()
+        .map(|&m| match &arguments.omega {
+            Some(grid) => (m, grid.0.clone()),
+            None => (m, study::default_grid(m)),
+        })
+        .collect();
+    let runs = grids.iter().map(|(_, g)| g.len()).sum();
+    let progress = Progress::new(&input.name, runs, arguments.common.quiet);
+    let in_mesh_units = |mut sweep: Sweep| {
+        for row in &mut sweep.rows {
+            row.errors = row.errors * input.frame.scale();
+        }
+        sweep
+    };
+    let written = Mutex::new(Instant::now());
+    let found = sweep(
+        &system,
+        &input.mesh.positions,
+        &grids,
+        Some(&order),
+        stop,
+        rounding_floor(input.mesh.diagonal()),
+        &|so_far| {
+            progress.step();
+            let mut written = written.lock().unwrap_or_else(PoisonError::into_inner);
+            if written.elapsed() >= PAUSE {
+                // If this fails, so does the end, which says it.
+                let _ = write(&in_mesh_units(so_far.clone()));
+                *written = Instant::now();
+            }
+        },
+    )?;
+    Ok(in_mesh_units(found))
+}
+
+fn json(input: &Input, arguments: &Arguments, sweep: &Sweep) -> Value {
+    let rows: Vec<Value> = sweep
+        .rows
+        .iter()
+        .map(|row| {
+            json!({
+                "method": row.method.name(),
+                "omega": number(row.omega),
+                "iterations": row.iterations,
+                "status": row.outcome.name(),
+                "predicted_rho": number(row.predicted_rho),
+                "predicted_rho_data": row.predicted_rho_data.map(number),
+                "observed_rate": row.observed_rate.map(number),
+                "max_error": number(row.errors.max),
+            })
+        })
+        .collect();
+    let (mut best, mut critical, mut critical_data, mut optimal) = (Map::new(), Map::new(), Map::new(), Map::new());
+    for &method in &arguments.method.0 {
+        let omega = sweep.best(method).map_or(Value::Null, |r| number(r.omega));
+        best.insert(method.name().into(), omega);
+    }
+    for t in &sweep.thresholds {
+        let name = t.method.name();
+        critical.insert(name.into(), number(t.matrix.critical_omega()));
+        optimal.insert(name.into(), number(t.matrix.optimal_omega()));
+        let data = t.data.map_or(Value::Null, |d| number(d.critical_omega()));
+        critical_data.insert(name.into(), data);
+    }
+    input.json(json!({
+        "rows": rows,
+        "best": best,
+        "optimal_omega": optimal,
+        "critical_omega": critical,
+        "critical_omega_data": critical_data,
+    }))
+}

@@ -1,0 +1,300 @@
+//! MESH arguments: files or built-in names, noise, scheme, validation.
+
+use std::borrow::Cow;
+use std::path::Path;
+use std::sync::OnceLock;
+use std::time::Instant;
+
+use clap::Args;
+use glam::DVec3;
+use serde_json::{Value, json};
+
+use super::{CommonFlags, StopFlags};
+use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::error::{Error, Result, short};
+use limitlab::interpolate::automatic::{Renumbered, renumbered, require_memory};
+use limitlab::mesh::frame::Frame;
+use limitlab::mesh::io::{self, Loaded, has_mesh_ending};
+use limitlab::mesh::noise::{Noise, add_noise};
+use limitlab::mesh::validate::{Boundary, Validation, validate};
+use limitlab::mesh::{Mesh, Topology, bounding_box, builtin};
+use limitlab::solvers::Stop;
+
+/// How a mesh is read and prepared.
+#[derive(Args, Clone, Debug)]
+pub struct MeshFlags {
+    /// Scheme: catmull-clark, loop, sqrt3, nasri or zheng-cai; loop on triangles, else catmull-clark, unless told
+    #[arg(long, value_name = "NAME")]
+    pub scheme: Option<Scheme>,
+    /// Move every vertex by a Gaussian of standard deviation A × the mean edge length, from SEED (1 unless told)
+    #[arg(long, value_name = "A[:SEED]")]
+    pub noise: Option<Noise>,
+    /// An open mesh: refuse it, or treat boundary vertices as interior (loop and sqrt3 only)
+    #[arg(long, value_name = "refuse|as-interior", default_value_t = Boundary::Refuse)]
+    pub boundary: Boundary,
+    /// Print the whole report on the mesh's defects as JSON and stop
+    #[arg(long)]
+    pub defects: bool,
+}
+
+/// A valid mesh and the scheme that is meant.
+pub struct Input {
+    /// As the user named it.
+    pub name: String,
+    /// The name, with the noise if there is any: for tables and plots.
+    pub label: String,
+    /// Its positions are given in [`frame`](Self::frame).
+    pub mesh: Mesh,
+    /// Where the file's own points lie: all lengths of this mesh times [`Frame::scale`] are in mesh units.
+    pub frame: Frame,
+    topology: OnceLock<Topology>,
+    renumbered: Option<(Renumbered, Topology)>,
+    pub scheme: Scheme,
+    /// Reading the file or making the built-in mesh.
+    pub read_seconds: f64,
+    /// Validation and topology.
+    pub check_seconds: f64,
+}
+
+/// The noise that built-in meshes carry where they stand in for real ones.
+pub const STAND_IN_NOISE: Noise = Noise { amplitude: 0.1, seed: 1 };
+
+/// The size of a length in words.
+fn one_digit(x: f64) -> String {
+    short(format!("{x:.0e}").parse().unwrap_or(x))
+}
+
+impl MeshFlags {
+    /// Gives built-in meshes that stand in for real ones their noise, unless the user chose another.
+    pub fn default_noise(&mut self) {
+        self.noise.get_or_insert(STAND_IN_NOISE);
+    }
+
+    /// Reads the file, or makes the built-in mesh, called `name`.
+    ///
+    /// # Errors
+    /// As the readers; an unknown name lists the built-in ones.
+    pub fn load(&self, name: &str) -> Result<Loaded> {
+        let path = Path::new(name);
+        if has_mesh_ending(path) || path.exists() {
+            return io::read(path);
+        }
+        Ok(Loaded {
+            name: name.to_owned(),
+            mesh: builtin::builtin(name)?,
+            lines: None,
+            normals: None,
+            remarks: Vec::new(),
+        })
+    }
+
+    /// With `--defects`, prints what the validator says of the meshes, as their points were given: the report on one, or
+    /// `{"results": […]}` of several. Whether that was asked for, and the program has nothing else to do.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load); if standard output cannot be written.
+    pub fn print_defects<N: AsRef<str>>(&self, names: &[N], common: &CommonFlags) -> Result<bool> {
+        if !self.defects {
+            return Ok(false);
+        }
+        let mut results = Vec::with_capacity(names.len());
+        for name in names {
+            results.push(self.report(&self.loaded(name.as_ref(), common)?).0);
+        }
+        super::print_results(&results)?;
+        Ok(true)
+    }
+
+    /// A mesh that has been read and that memory can hold.
+    fn loaded(&self, name: &str, common: &CommonFlags) -> Result<Loaded> {
+        let loaded = self.load(name)?;
+        for remark in &loaded.remarks {
+            common.remark(format_args!("{name}: {remark}"));
+        }
+        require_memory(&loaded.mesh).map_err(|e| Error::mesh(name, e.to_string()))?;
+        Ok(loaded)
+    }
+
+    /// Loads and validates one mesh, moves its points, and settles their frame and the scheme.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load); a mesh with defects, with their counts and first places; noise, or sizes side by side,
+    /// that doubles cannot hold.
+    pub fn input(&self, name: &str, common: &CommonFlags) -> Result<Input> {
+        let start = Instant::now();
+        let loaded = self.loaded(name, common)?;
+        let read_seconds = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let (report, renumbered) = self.report(&loaded);
+        for remark in &report.remarks {
+            common.remark(format_args!("{name}: {remark}"));
+        }
+        let found = report.into_topology(name)?;
+        let Loaded { mut mesh, lines, .. } = loaded;
+        let frame = self.place(&mut mesh).map_err(|(v, what)| {
+            let line = lines.as_ref().map_or_else(String::new, |l| format!(", line {}", l.vertices[v]));
+            Error::mesh(name, format!("vertex {v}{line}: {what}"))
+        })?;
+        let (topology, renumbered) = match renumbered {
+            Some(mut renumbered) => {
+                if self.noise.is_some() || !frame.is_identity() {
+                    renumbered.mesh.positions = renumbered.numbering.there(&mesh.positions);
+                }
+                (OnceLock::new(), Some((renumbered, found)))
+            }
+            None => (OnceLock::from(found), None),
+        };
+        let scheme = self.scheme.unwrap_or_else(|| {
+            let scheme = Scheme::default_for(&mesh.faces);
+            common.remark(format_args!("{name}: scheme {scheme} (choose with --scheme)"));
+            scheme
+        });
+        let label = match self.noise {
+            Some(noise) => format!("{name} --noise {noise}"),
+            None => name.to_owned(),
+        };
+        Ok(Input {
+            name: name.to_owned(),
+            label,
+            mesh,
+            frame,
+            topology,
+            renumbered,
+            scheme,
+            read_seconds,
+            check_seconds: start.elapsed().as_secs_f64(),
+        })
+    }
+
+    /// Adds the noise to the points of a valid mesh, and takes them to their frame; or a vertex, and what is wrong there.
+    fn place(&self, mesh: &mut Mesh) -> std::result::Result<Frame, (usize, String)> {
+        if let Some(noise) = self.noise {
+            add_noise(mesh, noise.amplitude, noise.seed);
+            if let Some(v) = mesh.positions.iter().position(|p| !p.is_finite()) {
+                return Err((v, format!("--noise {noise} moves it beyond the largest double: choose a smaller one")));
+            }
+        }
+        let frame = Frame::of(&mesh.positions).map_err(|v| {
+            let what = "a coordinate is more than 10^300 times smaller than the largest of the mesh, and doubles cannot \
+                        hold both: correct it, or set it to 0";
+            (v, what.to_owned())
+        })?;
+        frame.enter(&mut mesh.positions);
+        Ok(frame)
+    }
+
+    /// The validator's report on a loaded mesh, or on this mesh renumbered.
+    fn report(&self, loaded: &Loaded) -> (Validation, Option<Renumbered>) {
+        let mesh = &loaded.mesh;
+        if let Some(moved) = renumbered(mesh) {
+            // Looking for what is not there is many times faster on a renumbered copy. What is there needs the
+            // file's own numbers.
+            let report = validate(&moved.mesh, None, self.boundary);
+            if report.is_valid() && report.remarks.is_empty() {
+                return (report, Some(moved));
+            }
+        }
+        let lines = loaded.lines.as_ref().map(|l| (l.vertices.as_slice(), l.faces.as_slice()));
+        (validate(mesh, lines, self.boundary), None)
+    }
+}
+
+impl Input {
+    /// The topology of the mesh; found when it is first asked for, if the validator looked at a renumbered mesh.
+    pub fn topology(&self) -> &Topology {
+        self.topology.get_or_init(|| Topology::new(&self.mesh.faces, self.mesh.len()))
+    }
+
+    /// The mesh along a space-filling curve and the topology of that, where the file is scattered.
+    pub fn renumbered(&self) -> Option<(&Renumbered, &Topology)> {
+        self.renumbered.as_ref().map(|(mesh, topology)| (mesh, topology))
+    }
+
+    /// When iterations on this mesh stop; the tolerance is one in its frame.
+    ///
+    /// # Errors
+    /// A relative tolerance where all points coincide.
+    pub fn stop(&self, flags: &StopFlags) -> Result<Stop> {
+        let extent = self.mesh.diagonal();
+        let tolerance = match flags.tol_absolute {
+            Some(tolerance) => (tolerance / self.frame.scale()).min(f64::MAX),
+            None if extent > 0.0 => flags.tol * extent,
+            None => {
+                let what = "all points coincide, so no tolerance can be relative to their extent: give --tol-absolute";
+                return Err(Error::mesh(&self.name, what));
+            }
+        };
+        Ok(Stop { tolerance, max_iterations: flags.max_iter })
+    }
+
+    /// The points as they were given, with their noise: in mesh units.
+    pub fn given_points(&self) -> Cow<'_, [DVec3]> {
+        let mut points = Cow::Borrowed(self.mesh.positions.as_slice());
+        if !self.frame.is_identity() {
+            self.frame.leave(points.to_mut());
+        }
+        points
+    }
+
+    /// The largest coordinate of the given points, in mesh units.
+    fn largest_coordinate(&self) -> f64 {
+        let (lo, hi) = bounding_box(&self.mesh.positions).unwrap_or_default();
+        self.frame.back(lo).abs().max(self.frame.back(hi).abs()).max_element()
+    }
+
+    /// What to know of a tolerance, in mesh units, that the digits of the coordinates cannot hold, though it can be
+    /// reached in the frame.
+    pub fn remark_on_rounding(&self, tolerance: f64) -> Option<String> {
+        let largest = self.largest_coordinate();
+        let digit = largest - largest.next_down();
+        // Control points may have a coordinate twice as large as the points.
+        (!self.frame.is_identity() && tolerance < 2.0 * digit).then(|| {
+            format!(
+                "the points lie at {} ± {}: their last digit is {digit:.1e}, the tolerance {tolerance:.1e}; results are \
+                 as near as these digits allow",
+                one_digit(largest),
+                one_digit(0.5 * self.frame.scale() * self.mesh.diagonal())
+            )
+        })
+    }
+
+    /// A stem for file names: the program's `prefix`, the mesh's own name without folder and ending, the scheme.
+    pub fn stem(&self, prefix: &str) -> String {
+        let path = Path::new(&self.name);
+        let name = if has_mesh_ending(path) { path.file_stem() } else { path.file_name() };
+        let name = name.unwrap_or_default().to_string_lossy();
+        let plain: String = name.chars().map(|c| if c.is_alphanumeric() || c == '_' { c } else { '-' }).collect();
+        format!("{prefix}-{plain}-{}", self.scheme)
+    }
+
+    /// The JSON object of one mesh: what every program tells of it, and `fields`.
+    ///
+    /// # Panics
+    /// If `fields` is not an object.
+    pub fn json(&self, fields: Value) -> Value {
+        let mut object = json!({
+            "mesh": self.name,
+            "scheme": self.scheme.name(),
+            "vertices": self.mesh.len(),
+            "faces": self.mesh.faces.len(),
+        });
+        let (Value::Object(all), Value::Object(more)) = (&mut object, fields) else {
+            panic!("the fields of a JSON object")
+        };
+        all.extend(more);
+        object
+    }
+
+    /// Assembles the limit system.
+    ///
+    /// # Errors
+    /// As [`LimitSystem::new`], with the mesh's name.
+    pub fn system(&self) -> Result<LimitSystem> {
+        LimitSystem::new(&self.mesh, self.topology(), self.scheme).map_err(|e| self.named(e))
+    }
+
+    /// An error of a computation with the mesh's name.
+    pub fn named(&self, error: Error) -> Error {
+        Error::mesh(&self.name, error.to_string())
+    }
+}

@@ -1,0 +1,291 @@
+//! What the programs share: flags, MESH names, exit status, progress. This room knows no formulas.
+
+mod input;
+mod json;
+mod process;
+mod progress;
+
+pub use input::{Input, MeshFlags, STAND_IN_NOISE};
+pub use json::print_json;
+pub use process::{exit, say};
+pub use progress::Progress;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::report::Table;
+use limitlab::error::{Error, Result};
+
+/// Flags of every program: threads and silence.
+#[derive(Args, Clone, Debug)]
+pub struct CommonFlags {
+    /// Number of threads, at most and unless told one a processor
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+    /// No remarks and no progress on standard error
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+impl CommonFlags {
+    /// Prepares the process for work: signals, then threads.
+    ///
+    /// # Errors
+    /// If threads were started before.
+    pub fn apply(&self) -> Result<()> {
+        process::heed_signals();
+        process::start_threads(self.threads, |text| self.remark(text))
+    }
+
+    /// Tells the user something on standard error, unless asked to be quiet.
+    pub fn remark(&self, text: impl std::fmt::Display) {
+        if !self.quiet {
+            say(text);
+        }
+    }
+}
+
+/// When iterations stop.
+#[derive(Args, Clone, Debug)]
+pub struct StopFlags {
+    /// Stop at max_i ‖p_i − (A v)_i‖ ≤ T·L, L the diagonal of the bounding box
+    #[arg(long, value_name = "T", default_value_t = 1e-10, value_parser = positive)]
+    pub tol: f64,
+    /// Stop at max_i ‖p_i − (A v)_i‖ ≤ T, in the units of the mesh
+    #[arg(long, value_name = "T", value_parser = positive, conflicts_with = "tol")]
+    pub tol_absolute: Option<f64>,
+    /// Iterations at most
+    #[arg(long, value_name = "K", default_value_t = 10_000)]
+    pub max_iter: usize,
+}
+
+/// Where results go.
+#[derive(Args, Clone, Debug)]
+pub struct OutputFlags {
+    /// Folder for the CSV, Markdown and PNG files
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// Print one JSON object on standard output, and nothing else there
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl OutputFlags {
+    /// Creates the folder: before the work, so that a place that cannot be written is told at once.
+    ///
+    /// # Errors
+    /// If the folder cannot be created.
+    pub fn prepare(&self) -> Result<()> {
+        limitlab::output::create_dir(&self.out)
+    }
+}
+
+/// A `value_parser`: a positive, finite number.
+pub fn positive(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+        _ => Err("a positive number is needed".into()),
+    }
+}
+
+/// A grid `A:B:STEP` with both ends, as a `value_parser`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid(pub Vec<f64>);
+
+/// Points of a grid at most: more is a slip of the step.
+const MOST_POINTS: f64 = 100_000.0;
+
+impl std::str::FromStr for Grid {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let numbers: Vec<f64> = text
+            .split(':')
+            .map(str::parse)
+            .collect::<std::result::Result<_, _>>()
+            .map_err(|_| "a grid is A:B:STEP, three numbers")?;
+        let &[from, to, step] = numbers.as_slice() else {
+            return Err("a grid is A:B:STEP, three numbers".into());
+        };
+        // Both ends belong to the grid, though (b − a)/step may round below a whole number.
+        let steps = ((to - from) / step + 1e-9).floor();
+        if !(step > 0.0 && from <= to && from > 0.0 && steps < MOST_POINTS) {
+            return Err("a grid A:B:STEP needs 0 < A ≤ B, a positive STEP and fewer than 100000 points".into());
+        }
+        let at = |k: usize| if k == 0 { from } else { fifteen_digits(from + k as f64 * step) };
+        Ok(Grid((0..=steps as usize).map(at).collect()))
+    }
+}
+
+/// What was meant by a sum of numbers that were typed: 0.05 + 15·0.05 is 0.8.
+fn fifteen_digits(x: f64) -> f64 {
+    format!("{x:.14e}").parse().unwrap_or(x)
+}
+
+/// A comma-separated list, as a `value_parser`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct List<T>(pub Vec<T>);
+
+impl<T: std::str::FromStr> std::str::FromStr for List<T>
+where
+    T::Err: std::fmt::Display,
+{
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        text.split(',')
+            .map(|item| item.trim().parse().map_err(|e: T::Err| e.to_string()))
+            .collect::<std::result::Result<_, _>>()
+            .map(List)
+    }
+}
+
+/// Prints to standard output. A reader that has gone away is no failure: the rest is not wanted.
+///
+/// # Errors
+/// Any other failure to write.
+pub fn print(text: &str) -> Result<()> {
+    use std::io::{ErrorKind, Write};
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::io("standard output".as_ref(), "write", e)),
+        _ => Ok(()),
+    }
+}
+
+/// Ends a program that took meshes: with `--json` prints the object of one mesh, or `{"results": […]}` of several;
+/// else says where the files are.
+///
+/// # Errors
+/// If standard output cannot be written.
+pub fn finish(results: &[Value], output: &OutputFlags, common: &CommonFlags) -> Result<()> {
+    common.remark(format_args!("tables and plots: {}", output.out.display()));
+    if !output.json {
+        return Ok(());
+    }
+    print_results(results)
+}
+
+/// Prints the object of one mesh, or `{"results": […]}` of several.
+fn print_results<T: Serialize>(results: &[T]) -> Result<()> {
+    match results {
+        [one] => print_json(one),
+        several => print_json(&BTreeMap::from([("results", several)])),
+    }
+}
+
+/// What a program of several tables prints on standard output: each in Markdown as soon as it is there, or with `--json`
+/// one object with all of them at the end.
+pub struct Printer {
+    json: bool,
+    tables: Vec<Value>,
+}
+
+impl Printer {
+    pub fn new(json: bool) -> Self {
+        Printer { json, tables: Vec::new() }
+    }
+
+    /// A table.
+    ///
+    /// # Errors
+    /// If standard output cannot be written.
+    pub fn table(&mut self, table: &Table) -> Result<()> {
+        if self.json {
+            self.tables.push(json!({ "id": table.id, "title": table.title, "rows": table.to_json() }));
+            return Ok(());
+        }
+        print(&table.to_markdown())
+    }
+
+    /// A page for people, which the JSON object lacks.
+    ///
+    /// # Errors
+    /// As [`table`](Self::table).
+    pub fn page(&self, text: &str) -> Result<()> {
+        if self.json { Ok(()) } else { print(text) }
+    }
+
+    /// The end: with `--json` prints the object of `fields` and `tables`.
+    ///
+    /// # Errors
+    /// As [`table`](Self::table).
+    ///
+    /// # Panics
+    /// If `fields` is not an object.
+    pub fn finish(self, mut fields: Value) -> Result<()> {
+        if !self.json {
+            return Ok(());
+        }
+        fields["tables"] = self.tables.into();
+        print_json(&fields)
+    }
+}
+
+/// A number for JSON: `null` if it is not finite.
+pub fn number(x: f64) -> Value {
+    serde_json::Number::from_f64(x).map_or(Value::Null, Value::Number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use limitlab::mesh::validate::Boundary;
+
+    #[test]
+    fn a_grid_has_both_ends_and_round_numbers() {
+        let grid: Grid = "0.05:1.2:0.05".parse().expect("a grid");
+        assert_eq!(grid.0.len(), 24);
+        assert_eq!((grid.0[0], grid.0[15], grid.0[23]), (0.05, 0.8, 1.2));
+        for (text, points) in [
+            ("1e-13:3e-13:1e-13", [1e-13, 2e-13, 3e-13]),
+            ("1e-300:3e-300:1e-300", [1e-300, 2e-300, 3e-300]),
+            ("1e297:3e297:1e297", [1e297, 2e297, 3e297]),
+        ] {
+            assert_eq!(text.parse::<Grid>().expect("a grid").0, points, "{text}");
+        }
+        assert_eq!("0.5:0.5:1".parse::<Grid>().expect("one point").0, [0.5]);
+        for bad in ["", "1", "1:2", "1:2:0", "2:1:0.1", "a:b:c", "0:1:0.1", "1:2:1e-9", "1:nan:1"] {
+            assert!(bad.parse::<Grid>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_grid_ends_before_its_end_if_the_step_does_not_divide_it() {
+        for (text, expected) in [("0.5:1:0.3", vec![0.5, 0.8]), ("1:2.9:1", vec![1.0, 2.0]), ("1:1.9:1", vec![1.0])] {
+            assert_eq!(text.parse::<Grid>().expect("a grid").0, expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_tolerance_is_relative_to_the_mesh_unless_it_is_absolute() {
+        let flags = MeshFlags { scheme: None, noise: None, boundary: Boundary::Refuse, defects: false };
+        let common = CommonFlags { threads: None, quiet: true };
+        let cube = flags.input("cube", &common).expect("valid");
+        let stop = |tol_absolute| {
+            cube.stop(&StopFlags { tol: 1e-3, tol_absolute, max_iter: 7 }).expect("a cube has an extent")
+        };
+        // The diagonal of [−1, 1]³ is √12.
+        assert!((stop(None).tolerance - 1e-3 * 12f64.sqrt()).abs() < 1e-18);
+        assert_eq!(stop(Some(1e-3)).tolerance, 1e-3);
+        assert_eq!(stop(None).max_iterations, 7);
+    }
+
+    #[test]
+    fn a_list_names_the_item_that_is_wrong() {
+        let list: List<u32> = "3, 4,5".parse().expect("three numbers");
+        assert_eq!(list.0, [3, 4, 5]);
+        assert!("3,x".parse::<List<u32>>().is_err());
+    }
+
+    #[test]
+    fn json_numbers_that_are_not_finite_are_null() {
+        assert_eq!(number(f64::NAN), Value::Null);
+        assert_eq!(number(f64::INFINITY), Value::Null);
+        assert_eq!(number(0.5).to_string(), "0.5");
+    }
+}

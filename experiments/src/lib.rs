@@ -1,0 +1,11 @@
+//! What the programs share: flags and MESH names, tables and figures, studies that several of them print.
+//!
+//! | room | holds | must not know |
+//! |---|---|---|
+//! | [`report`] | tables, comparison of tables, plots, pictures of meshes | how the numbers were computed |
+//! | [`cli`] | flags, MESH names, exit status, progress | formulas |
+//! | [`studies`] | tables and figures that more than one program makes | – |
+
+pub mod cli;
+pub mod report;
+pub mod studies;

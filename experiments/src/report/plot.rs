@@ -1,0 +1,456 @@
+//! Line plots, scatter plots and histograms on linear or logarithmic axes: how they are drawn.
+
+use super::axis::{Axis, Scale, Tick};
+use super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Dash, Marker, Point, Rect, text_width};
+use super::figure::{self, FRAME_COLOUR, FRAME_WIDTH, Slot, TEXT_COLOUR};
+use super::series::{Band, Bars, Line, PALETTE, Rule, Series, palette};
+use limitlab::Result;
+
+/// Once the colours are used up, the next round of series is dashed, then dotted, then both.
+const DASHES: [Dash; 4] = [Dash::Solid, Dash::Dashed, Dash::Dotted, Dash::DashDotted];
+
+const GRID_COLOUR: Colour = Colour(228, 228, 228);
+const BAND_COLOUR: Colour = Colour(226, 238, 246);
+
+// Lengths in points.
+const LINE_WIDTH: f64 = 1.3;
+const RULE_WIDTH: f64 = 0.9;
+const GRID_WIDTH: f64 = 0.5;
+const MARKER_RADIUS: f64 = 2.4;
+/// Markers on a line whose points are closer than this on average are thinned out to [`MARKER_GAP`].
+const MARKER_DENSE: f64 = 7.0;
+const MARKER_GAP: f64 = 36.0;
+const LEGEND_GAP: f64 = 10.0;
+const LEGEND_KEY: f64 = 24.0;
+const LEGEND_PITCH: f64 = 13.5;
+const LEGEND_SIZE: f64 = 9.0;
+const RULE_LABEL_SIZE: f64 = 9.0;
+const RULE_LABEL_ROOM: f64 = 18.0;
+/// How far a vertical line's leader reaches from the frame up to its label.
+const RULE_LEADER: f64 = 6.0;
+
+/// One pair of axes with what is drawn between them. The legend stands to the right of the frame, so that it
+/// never covers data.
+///
+/// ```
+/// use limitlab_experiments::report::{Figure, LinePlot, Scale, Series};
+///
+/// let errors = (0..60).map(|k| 0.8_f64.powi(k));
+/// let plot = LinePlot {
+///     x_label: "iteration".into(),
+///     y_label: "largest vertex error".into(),
+///     y_scale: Scale::Log,
+///     series: vec![Series::history("jacobi, ω = 0.8", errors)],
+///     ..LinePlot::default()
+/// };
+/// let image = Figure::new(plot).render()?;
+/// assert_eq!((image.width, image.height), (1800, 1140));
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LinePlot {
+    pub title: String,
+    pub x_label: String,
+    pub y_label: String,
+    pub x_scale: Scale,
+    pub y_scale: Scale,
+    /// What the x axis shows; all of the data unless told. Lines end at the frame.
+    pub x_range: Option<(f64, f64)>,
+    pub y_range: Option<(f64, f64)>,
+    /// A unit of x is as long as a unit of y, as in a plot of complex eigenvalues; the frame becomes narrower or
+    /// lower for it. For linear axes.
+    pub equal_units: bool,
+    pub series: Vec<Series>,
+    pub vertical_lines: Vec<Rule>,
+    pub horizontal_lines: Vec<Rule>,
+    pub bands: Vec<Band>,
+    pub bars: Vec<Bars>,
+}
+
+/// How a series or a set of bars looks once the automatic choices are made.
+struct Look {
+    colour: Colour,
+    dash: Option<Dash>,
+    marker: Option<Marker>,
+}
+
+/// The sample beside a name in the legend.
+enum Key {
+    Line(Look),
+    Rule(Dash, Colour),
+    Patch(Colour),
+}
+
+impl LinePlot {
+    /// The x axis: the range asked for, or one around all data.
+    pub(super) fn x_axis(&self) -> Axis {
+        if let Some(range) = self.x_range {
+            return Axis::over(self.x_scale, range);
+        }
+        let points = self.series.iter().flat_map(|s| &s.points).map(|p| p.0);
+        let rules = self.vertical_lines.iter().map(|r| r.at);
+        let bands = self.bands.iter().flat_map(|b| [b.from, b.to]);
+        let bars = self.bars.iter().flat_map(|b| b.edges.iter().copied());
+        Axis::around(self.x_scale, points.chain(rules).chain(bands).chain(bars))
+    }
+
+    fn y_axis(&self) -> Axis {
+        if let Some(range) = self.y_range {
+            return Axis::over(self.y_scale, range);
+        }
+        let points = self.series.iter().flat_map(|s| &s.points).map(|p| p.1);
+        let rules = self.horizontal_lines.iter().map(|r| r.at);
+        let bars = self.bars.iter().flat_map(|b| b.heights.iter().copied());
+        let foot = (!self.bars.is_empty()).then_some(0.0);
+        Axis::around(self.y_scale, points.chain(rules).chain(bars).chain(foot))
+    }
+
+    fn look(&self, index: usize) -> Look {
+        let series = &self.series[index];
+        Look {
+            colour: series.colour.unwrap_or(palette(index)),
+            dash: match series.line {
+                Line::Auto => Some(DASHES[index / PALETTE.len() % DASHES.len()]),
+                Line::Of(dash) => Some(dash),
+                Line::None => None,
+            },
+            marker: series.marker,
+        }
+    }
+
+    fn bar_colour(&self, index: usize) -> Colour {
+        let colour = self.bars[index].colour;
+        colour.unwrap_or(palette(self.series.len() + index))
+    }
+
+    fn legend(&self) -> Vec<(&str, Key)> {
+        let series = self.series.iter().enumerate();
+        let series = series.map(|(i, s)| (s.name.as_str(), Key::Line(self.look(i))));
+        let bars = self.bars.iter().enumerate();
+        let bars = bars.map(|(i, b)| (b.name.as_str(), Key::Patch(self.bar_colour(i))));
+        let rules = self.horizontal_lines.iter();
+        let rules = rules.map(|r| (r.label.as_str(), Key::Rule(r.dash, r.colour)));
+        let bands = self.bands.iter();
+        let bands = bands.map(|b| (b.label.as_str(), Key::Patch(BAND_COLOUR)));
+        let all = series.chain(bars).chain(rules).chain(bands);
+        all.filter(|(name, _)| !name.is_empty()).collect()
+    }
+
+    /// Whether room for labels of vertical lines is needed above the frame.
+    fn has_rule_labels(&self) -> bool {
+        self.vertical_lines.iter().any(|r| !r.label.is_empty())
+    }
+
+    /// The room above the frame, in points.
+    pub(super) fn top(&self) -> f64 {
+        let labels = if self.has_rule_labels() { RULE_LABEL_ROOM } else { 0.0 };
+        figure::title_room(&self.title) + labels
+    }
+
+    /// The room below the frame, with or without the x axis's labels.
+    pub(super) fn bottom(&self, labelled: bool) -> f64 {
+        figure::x_axis_room(&self.x_label, labelled)
+    }
+
+    /// The room to the left of a frame of this height.
+    pub(super) fn left(&self, height: f64) -> Result<f64> {
+        figure::y_axis_room(&self.y_label, &figure::y_ticks(self.y_axis(), height))
+    }
+
+    /// The room to the right of the frame: the legend's.
+    pub(super) fn right(&self) -> Result<f64> {
+        let legend = self.legend();
+        let widths = legend.iter().map(|(name, _)| text_width(name, LEGEND_SIZE));
+        let widest = widths.collect::<Result<Vec<_>>>()?;
+        let widest = widest.into_iter().reduce(f64::max);
+        Ok(widest.map_or(figure::BARE_RIGHT, |w| LEGEND_GAP + LEGEND_KEY + 6.0 + w + 4.0))
+    }
+
+    pub(super) fn draw(&self, canvas: &Canvas<'_>, slot: &Slot) -> Result<()> {
+        let (x, y) = (slot.x_axis, self.y_axis());
+        let frame = if self.equal_units { with_aspect(slot.frame, (x.hi - x.lo) / (y.hi - y.lo)) } else { slot.frame };
+        let x_ticks = figure::x_ticks(x, frame.width());
+        let y_ticks = figure::y_ticks(y, frame.height());
+        self.draw_bands(canvas, frame, x)?;
+        draw_grid(canvas, frame, &x_ticks, &y_ticks)?;
+        self.draw_bars(canvas, frame, x, y)?;
+        self.draw_rules(canvas, frame, x, y)?;
+        self.draw_series(canvas, frame, x, y)?;
+        canvas.outline(frame, FRAME_WIDTH, FRAME_COLOUR)?;
+        figure::draw_x_axis(canvas, frame, &x_ticks, &self.x_label, slot.labelled)?;
+        figure::draw_y_axis(canvas, frame, slot.left, &y_ticks, &self.y_label)?;
+        self.draw_rule_labels(canvas, frame, x)?;
+        self.draw_legend(canvas, frame)?;
+        figure::draw_title(canvas, frame, &self.title, self.top())
+    }
+
+    fn draw_bands(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis) -> Result<()> {
+        for band in &self.bands {
+            let (Some(a), Some(b)) = (x.position(band.from), x.position(band.to)) else {
+                continue;
+            };
+            let (left, right) = (a.min(b).clamp(0.0, 1.0), a.max(b).clamp(0.0, 1.0));
+            let area =
+                Rect { left: frame.left + left * frame.width(), right: frame.left + right * frame.width(), ..frame };
+            if left < right {
+                canvas.fill(area, BAND_COLOUR)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_bars(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis, y: Axis) -> Result<()> {
+        const PARTING: f64 = 0.3;
+        for (index, bars) in self.bars.iter().enumerate() {
+            assert_eq!(bars.edges.len(), bars.heights.len() + 1, "edges around bars");
+            let foot = y.position(0.0).unwrap_or(0.0).clamp(0.0, 1.0);
+            for (edges, &height) in bars.edges.windows(2).zip(&bars.heights) {
+                let places = (x.position(edges[0]), x.position(edges[1]), y.position(height));
+                let (Some(a), Some(b), Some(h)) = places else {
+                    continue; // nothing to see on a logarithmic axis
+                };
+                let (a, b, h) = (a.clamp(0.0, 1.0), b.clamp(0.0, 1.0), h.clamp(0.0, 1.0));
+                let bar = Rect {
+                    left: frame.left + a * frame.width() + PARTING,
+                    right: frame.left + b * frame.width() - PARTING,
+                    top: frame.bottom - h.max(foot) * frame.height(),
+                    bottom: frame.bottom - h.min(foot) * frame.height(),
+                };
+                if bar.left < bar.right && bar.top < bar.bottom {
+                    canvas.fill(bar, self.bar_colour(index))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_rules(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis, y: Axis) -> Result<()> {
+        for rule in &self.vertical_lines {
+            if let Some(at) = x.position(rule.at) {
+                let at = frame.left + at * frame.width();
+                let line = [(at, frame.bottom), (at, frame.top)];
+                canvas.stroke(&line, frame, RULE_WIDTH, rule.dash, rule.colour)?;
+            }
+        }
+        for rule in &self.horizontal_lines {
+            if let Some(at) = y.position(rule.at) {
+                let at = frame.bottom - at * frame.height();
+                let line = [(frame.left, at), (frame.right, at)];
+                canvas.stroke(&line, frame, RULE_WIDTH, rule.dash, rule.colour)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_series(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis, y: Axis) -> Result<()> {
+        let place = |&(px, py): &(f64, f64)| -> Option<Point> {
+            let (px, py) = (x.position(px)?, y.position(py)?);
+            Some((frame.left + px * frame.width(), frame.bottom - py * frame.height()))
+        };
+        for (index, series) in self.series.iter().enumerate() {
+            let look = self.look(index);
+            let places: Vec<Option<Point>> = series.points.iter().map(place).collect();
+            if let Some(dash) = look.dash {
+                for piece in places.split(Option::is_none) {
+                    let piece: Vec<Point> = piece.iter().copied().flatten().collect();
+                    canvas.stroke(&piece, frame, LINE_WIDTH, dash, look.colour)?;
+                }
+            }
+            if let Some(marker) = look.marker {
+                let visible = places.into_iter().flatten().filter(|&p| frame.contains(p));
+                let mut visible: Vec<Point> = visible.collect();
+                if look.dash.is_some() {
+                    visible = thinned(visible, index);
+                }
+                for at in visible {
+                    canvas.marker(at, marker, MARKER_RADIUS, look.colour)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Labels of vertical lines above the frame, moved apart where they would collide, each with a leader to
+    /// its line.
+    fn draw_rule_labels(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis) -> Result<()> {
+        let labelled = self.vertical_lines.iter().filter(|r| !r.label.is_empty());
+        let mut labels: Vec<(f64, f64, &Rule)> = Vec::new();
+        for rule in labelled {
+            if let Some(at) = x.position(rule.at).filter(|at| (0.0..=1.0).contains(at)) {
+                let width = text_width(&rule.label, RULE_LABEL_SIZE)?;
+                labels.push((frame.left + at * frame.width(), width, rule));
+            }
+        }
+        labels.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let wanted: Vec<(f64, f64)> = labels.iter().map(|l| (l.0, l.1)).collect();
+        let centres = moved_apart(&wanted, frame.left, frame.right);
+        for (&(at, _, rule), centre) in labels.iter().zip(centres) {
+            let leader = [(at, frame.top), (centre, frame.top - RULE_LEADER)];
+            let above = Rect { top: frame.top - RULE_LEADER, bottom: frame.top, ..frame };
+            canvas.stroke(&leader, above, RULE_WIDTH * 0.7, Dash::Solid, rule.colour)?;
+            let place = (centre, frame.top - RULE_LEADER - 3.5);
+            let text = &rule.label;
+            canvas.text(text, place, RULE_LABEL_SIZE, Anchor::Middle, false, rule.colour)?;
+        }
+        Ok(())
+    }
+
+    fn draw_legend(&self, canvas: &Canvas<'_>, frame: Rect) -> Result<()> {
+        let legend = self.legend();
+        let pitch = LEGEND_PITCH.min(frame.height() / legend.len().max(1) as f64);
+        let size = LEGEND_SIZE.min(0.75 * pitch);
+        let left = frame.right + LEGEND_GAP;
+        for (row, (name, key)) in legend.into_iter().enumerate() {
+            let middle = frame.top + (row as f64 + 0.5) * pitch;
+            let line = [(left, middle), (left + LEGEND_KEY, middle)];
+            let area =
+                Rect { left, right: left + LEGEND_KEY, top: middle - 0.32 * pitch, bottom: middle + 0.32 * pitch };
+            match key {
+                Key::Line(look) => {
+                    if let Some(dash) = look.dash {
+                        canvas.stroke(&line, area, LINE_WIDTH, dash, look.colour)?;
+                    }
+                    if let Some(marker) = look.marker {
+                        canvas.marker(area.centre(), marker, MARKER_RADIUS, look.colour)?;
+                    }
+                }
+                Key::Rule(dash, colour) => canvas.stroke(&line, area, RULE_WIDTH, dash, colour)?,
+                Key::Patch(colour) => canvas.fill(area, colour)?,
+            }
+            let place = (area.right + 6.0, middle + CAP_HEIGHT / 2.0 * size);
+            canvas.text(name, place, size, Anchor::Start, false, TEXT_COLOUR)?;
+        }
+        Ok(())
+    }
+}
+
+/// The largest part of `frame` whose width is `aspect` times its height, at the top left, where the axis labels
+/// and the neighbouring frames are.
+fn with_aspect(frame: Rect, aspect: f64) -> Rect {
+    let width = frame.width().min(aspect * frame.height());
+    Rect { right: frame.left + width, bottom: frame.top + width / aspect, ..frame }
+}
+
+fn draw_grid(canvas: &Canvas<'_>, frame: Rect, x: &[Tick], y: &[Tick]) -> Result<()> {
+    for tick in x.iter().filter(|t| t.label.is_some()) {
+        let at = frame.left + tick.at * frame.width();
+        canvas.upright(at, (frame.top, frame.bottom), GRID_WIDTH, GRID_COLOUR)?;
+    }
+    for tick in y.iter().filter(|t| t.label.is_some()) {
+        let at = frame.bottom - tick.at * frame.height();
+        canvas.level(at, (frame.left, frame.right), GRID_WIDTH, GRID_COLOUR)?;
+    }
+    Ok(())
+}
+
+/// The places that carry a marker: all of them, or, where they are dense, some at equal distances along the
+/// line. The first one depends on the series, so that the markers of neighbouring curves do not coincide.
+fn thinned(places: Vec<Point>, series: usize) -> Vec<Point> {
+    let step = |w: &[Point]| (w[1].0 - w[0].0).hypot(w[1].1 - w[0].1);
+    let length: f64 = places.windows(2).map(step).sum();
+    if length >= MARKER_DENSE * places.len() as f64 {
+        return places;
+    }
+    // Golden-section offsets keep any number of series apart.
+    let offset = (series as f64 * 0.618_034).fract();
+    let mut next = offset * MARKER_GAP;
+    let mut walked = 0.0;
+    let mut kept = Vec::new();
+    for (i, &at) in places.iter().enumerate() {
+        if i > 0 {
+            walked += step(&places[i - 1..=i]);
+        }
+        if walked >= next {
+            kept.push(at);
+            next = walked + MARKER_GAP;
+        }
+    }
+    kept
+}
+
+/// Centres for labels of the wanted centres (ascending) and widths, between `lo` and `hi` and without overlap, as
+/// near to the wanted ones as possible in the least-squares sense (pool adjacent violators).
+fn moved_apart(labels: &[(f64, f64)], lo: f64, hi: f64) -> Vec<f64> {
+    const PARTING: f64 = 8.0;
+    // Without the room that the labels before it take, each centre has only to be no less than the one before.
+    let mut offset = 0.0;
+    let mut offsets = Vec::with_capacity(labels.len());
+    for (i, &(_, width)) in labels.iter().enumerate() {
+        if i > 0 {
+            offset += (labels[i - 1].1 + width) / 2.0 + PARTING;
+        }
+        offsets.push(offset);
+    }
+    let mut pools: Vec<(f64, usize)> = Vec::new(); // mean and number of members
+    for (&(wanted, _), &offset) in labels.iter().zip(&offsets) {
+        let (mut mean, mut count) = (wanted - offset, 1);
+        while let Some(&(before, members)) = pools.last().filter(|p| p.0 > mean) {
+            mean = (mean * count as f64 + before * members as f64) / (count + members) as f64;
+            count += members;
+            pools.pop();
+        }
+        pools.push((mean, count));
+    }
+    let (Some(first), Some(last)) = (labels.first(), labels.last()) else {
+        return Vec::new();
+    };
+    let least = lo + first.1 / 2.0;
+    let most = (hi - last.1 / 2.0 - offset).max(least);
+    let means = pools.into_iter().flat_map(|(mean, n)| std::iter::repeat_n(mean, n));
+    let free = means.map(|mean| mean.clamp(least, most));
+    free.zip(offsets).map(|(mean, offset)| mean + offset).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_are_moved_apart_no_further_than_needed() {
+        let apart = |labels: &[(f64, f64)]| moved_apart(labels, 0.0, 200.0);
+        assert!(apart(&[]).is_empty());
+        assert_eq!(apart(&[(50.0, 20.0), (120.0, 20.0)]), [50.0, 120.0]);
+        // Two of width 20 at one place: 28 apart, around it.
+        assert_eq!(apart(&[(100.0, 20.0), (100.0, 20.0)]), [86.0, 114.0]);
+        // Three of them stay around it: the middle one where it was.
+        assert_eq!(apart(&[(100.0, 20.0), (100.0, 20.0), (100.0, 20.0)]), [72.0, 100.0, 128.0]);
+        // Held inside.
+        assert_eq!(apart(&[(0.0, 20.0)]), [10.0]);
+        assert_eq!(apart(&[(195.0, 20.0), (199.0, 20.0)]), [162.0, 190.0]);
+    }
+
+    #[test]
+    fn markers_are_thinned_only_where_dense() {
+        let sparse: Vec<Point> = (0..10).map(|i| (20.0 * f64::from(i), 0.0)).collect();
+        assert_eq!(thinned(sparse.clone(), 3), sparse);
+        let dense: Vec<Point> = (0..=360).map(|i| (f64::from(i), 0.0)).collect();
+        let kept = thinned(dense.clone(), 0);
+        assert_eq!(kept.len(), 11);
+        assert!(kept.windows(2).all(|w| w[1].0 - w[0].0 >= MARKER_GAP));
+        assert_ne!(thinned(dense, 1)[0], kept[0]);
+    }
+
+    #[test]
+    fn bars_stand_on_zero() {
+        let bars = |heights: Vec<f64>| {
+            let bars = vec![Bars { name: String::new(), edges: vec![0.0, 1.0, 2.0], heights, colour: None }];
+            LinePlot { bars, ..LinePlot::default() }.y_axis()
+        };
+        // A line through these would have an axis from 8 on, or up to −8.
+        assert_eq!(bars(vec![8.0, 10.0]).lo, 0.0);
+        assert!(bars(vec![-8.0, -10.0]).hi >= 0.0);
+    }
+
+    #[test]
+    fn sixteen_series_look_different() {
+        let plot = LinePlot {
+            series: (0..16).map(|i| Series::history(format!("{i}"), [1.0])).collect(),
+            ..LinePlot::default()
+        };
+        let looks: Vec<_> = (0..16).map(|i| plot.look(i)).map(|l| (l.colour.0, l.colour.1, l.dash)).collect();
+        for (i, look) in looks.iter().enumerate() {
+            assert!(!looks[..i].contains(look), "series {i} looks like another");
+        }
+        assert_eq!(plot.legend().len(), 16);
+    }
+}

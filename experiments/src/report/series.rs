@@ -1,0 +1,186 @@
+//! What a plot shows: named points, rules, bands and bars.
+
+use super::canvas::{Colour, Dash, Marker};
+
+/// The colours of Okabe and Ito (2008), told apart with any colour vision; their yellow is too faint on white.
+pub(super) const PALETTE: [Colour; 7] = [
+    Colour(0, 114, 178),   // blue
+    Colour(213, 94, 0),    // vermilion
+    Colour(0, 158, 115),   // bluish green
+    Colour(204, 121, 167), // reddish purple
+    Colour(230, 159, 0),   // orange
+    Colour(86, 180, 233),  // sky blue
+    Colour(0, 0, 0),
+];
+
+const MARKERS: [Marker; 7] = [
+    Marker::Circle,
+    Marker::Square,
+    Marker::Triangle,
+    Marker::Diamond,
+    Marker::InvertedTriangle,
+    Marker::Cross,
+    Marker::Plus,
+];
+
+const RULE_COLOUR: Colour = Colour(90, 90, 90);
+
+/// How the points of a [`Series`] are joined.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Line {
+    /// Solid for the first seven series of a plot, then dashed, dotted, dash-dotted.
+    #[default]
+    Auto,
+    Of(Dash),
+    None,
+}
+
+/// Named points, joined by a line or not.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Series {
+    /// What the legend says; a series without a name is not in the legend. `_{…}` and `^{…}` set subscripts and
+    /// superscripts, here and in every other text of a plot.
+    pub name: String,
+    /// In data units. A point that is not finite, or not positive on a logarithmic axis, breaks the line.
+    pub points: Vec<(f64, f64)>,
+    pub line: Line,
+    /// Where points are dense along a line, only some of them carry their marker.
+    pub marker: Option<Marker>,
+    /// By turns from a palette unless told.
+    pub colour: Option<Colour>,
+}
+
+impl Series {
+    /// Points joined by a line.
+    pub fn line(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Series { name: name.into(), points: points.into_iter().collect(), ..Series::default() }
+    }
+
+    /// A history over its index: (0, h₀), (1, h₁), …
+    pub fn history(name: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
+        let indexed = values.into_iter().enumerate();
+        Series::line(name, indexed.map(|(i, v)| (i as f64, v)))
+    }
+
+    /// Circles that are not joined.
+    pub fn scatter(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Series { line: Line::None, marker: Some(Marker::Circle), ..Series::line(name, points) }
+    }
+
+    /// The same series with this marker.
+    pub fn marker(mut self, marker: Marker) -> Self {
+        self.marker = Some(marker);
+        self
+    }
+
+    /// The same series with this line.
+    pub fn dash(mut self, dash: Dash) -> Self {
+        self.line = Line::Of(dash);
+        self
+    }
+
+    /// The same series in this colour.
+    pub fn colour(mut self, colour: Colour) -> Self {
+        self.colour = Some(colour);
+        self
+    }
+}
+
+/// The `index`-th colour of the palette, by turns: for series that belong together, such as a prediction and its
+/// measurement.
+pub fn palette(index: usize) -> Colour {
+    PALETTE[index % PALETTE.len()]
+}
+
+/// The `index`-th marker, by turns.
+pub fn marker(index: usize) -> Marker {
+    MARKERS[index % MARKERS.len()]
+}
+
+/// A line across the whole plot at one value of x or y. A vertical one has its label above the frame, a
+/// horizontal one in the legend.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rule {
+    pub at: f64,
+    pub label: String,
+    pub dash: Dash,
+    pub colour: Colour,
+}
+
+impl Rule {
+    /// A dashed grey line.
+    pub fn new(at: f64, label: impl Into<String>) -> Self {
+        Rule { at, label: label.into(), dash: Dash::Dashed, colour: RULE_COLOUR }
+    }
+}
+
+/// A shaded range of x, such as the ω for which a method converges; its label is in the legend.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Band {
+    pub from: f64,
+    pub to: f64,
+    pub label: String,
+}
+
+/// A bar over each interval between neighbouring edges.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bars {
+    pub name: String,
+    /// Ascending; one more than heights.
+    pub edges: Vec<f64>,
+    pub heights: Vec<f64>,
+    pub colour: Option<Colour>,
+}
+
+impl Bars {
+    /// Counts of `values` in `bins` intervals of one length between the least and the greatest. Values that are
+    /// not finite are left out.
+    ///
+    /// ```
+    /// use limitlab_experiments::report::series::Bars;
+    ///
+    /// let bars = Bars::histogram("eigenvalues", &[0.0, 0.1, 0.2, 1.0], 2);
+    /// assert_eq!(bars.edges, [0.0, 0.5, 1.0]);
+    /// assert_eq!(bars.heights, [3.0, 1.0]);
+    /// ```
+    ///
+    /// # Panics
+    /// If `bins` is 0.
+    pub fn histogram(name: impl Into<String>, values: &[f64], bins: usize) -> Self {
+        assert!(bins > 0, "a histogram has bins");
+        let finite = || values.iter().copied().filter(|v| v.is_finite());
+        let lo = finite().fold(f64::INFINITY, f64::min);
+        let hi = finite().fold(f64::NEG_INFINITY, f64::max);
+        let (lo, hi) = match () {
+            () if lo < hi => (lo, hi),
+            () if lo == hi => (lo - 0.5, hi + 0.5),
+            () => (0.0, 1.0),
+        };
+        let mut heights = vec![0.0; bins];
+        for v in finite() {
+            let bin = ((v - lo) / (hi - lo) * bins as f64) as usize;
+            heights[bin.min(bins - 1)] += 1.0; // the greatest value belongs to the last bin
+        }
+        Bars {
+            name: name.into(),
+            edges: (0..=bins).map(|i| lo + (hi - lo) * i as f64 / bins as f64).collect(),
+            heights,
+            colour: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn histograms_count_every_finite_value() {
+        let values = [0.25, 1.0, 0.0, f64::NAN, 0.5, 0.75, 1.0];
+        let bars = Bars::histogram("h", &values, 4);
+        assert_eq!(bars.edges, [0.0, 0.25, 0.5, 0.75, 1.0]);
+        assert_eq!(bars.heights, [1.0, 1.0, 1.0, 3.0]);
+        assert_eq!(Bars::histogram("h", &[2.0], 1).heights, [1.0]);
+        assert_eq!(Bars::histogram("h", &[], 2).heights, [0.0, 0.0]);
+    }
+}

@@ -1,0 +1,4 @@
+//! Tables and figures that more than one program makes.
+
+pub mod splitting;
+pub mod sweep;

@@ -1,0 +1,415 @@
+//! Tables and pictures of splitting matrices.
+
+use crate::report::{Column, Figure, LinePlot, Marker, Rule, Series, Table, palette};
+use limitlab::Result;
+use limitlab::analysis::splitting::row::MAP_ROUNDS;
+use limitlab::analysis::splitting::{
+    Condition, Crossing, LocalScheme, Row, SplittingMatrix, ThallTables, characteristic_map, condition_over_alpha,
+    crossings, thall_tables,
+};
+
+/// Lin and Luo's Fig. 8; where none of them is asked for, the first few are drawn.
+const DRAWN: [usize; 5] = [3, 4, 5, 7, 8];
+const MOST_DRAWN: usize = 6;
+/// Isoparametric lines from the middle to the edge of a map.
+const LINES: usize = 8;
+/// α of the condition's table, and of its plot.
+const TABLE_STEP: f64 = 0.125;
+const PLOT_STEP: f64 = 0.01;
+/// Curves in the plot of the condition.
+const PLOTTED: [usize; 8] = [3, 4, 5, 6, 8, 12, 20, 50];
+
+/// Lin and Luo's condition: where it ceases to hold, a list a valence, and samples over α.
+pub struct Sampled {
+    pub crossings: Vec<Vec<Crossing>>,
+    pub conditions: Vec<Condition>,
+}
+
+/// The condition, for √3 only.
+///
+/// # Errors
+/// If eigenvalues do not converge.
+pub fn sampled(scheme: LocalScheme, valences: &[usize]) -> Result<Option<Sampled>> {
+    let LocalScheme::Sqrt3 { .. } = scheme else {
+        return Ok(None);
+    };
+    Ok(Some(Sampled {
+        crossings: valences.iter().map(|&n| crossings(n)).collect::<Result<_>>()?,
+        conditions: condition_over_alpha(valences, &grid(TABLE_STEP))?,
+    }))
+}
+
+/// All tables about one scheme's local matrices, the summary first.
+///
+/// # Errors
+/// If eigenvalues do not converge.
+pub fn tables(scheme: LocalScheme, valences: &[usize], rows: &[Row], sampled: Option<&Sampled>) -> Result<Vec<Table>> {
+    let mut tables = vec![summary(scheme, rows), eigenvalue_table(scheme, rows), mask_table(scheme, rows)];
+    if scheme == LocalScheme::CatmullClark {
+        tables.extend(thall_report(&thall_tables()?));
+    }
+    if let Some(sampled) = sampled {
+        tables.push(condition_table(&sampled.conditions));
+        tables.push(crossing_table(valences, &sampled.crossings));
+    }
+    Ok(tables)
+}
+
+/// All pictures with the stems of their files.
+///
+/// # Errors
+/// If eigenvalues do not converge.
+pub fn figures(scheme: LocalScheme, valences: &[usize], sampled: Option<&Sampled>) -> Result<Vec<(String, Figure)>> {
+    let mut figures = Vec::new();
+    if let Some(figure) = maps(scheme, valences)? {
+        figures.push((format!("{}-maps", stem(scheme)), figure));
+    }
+    if let Some(sampled) = sampled {
+        figures.push(("splitting-sqrt3-condition".into(), condition_plot(valences, &sampled.crossings)?));
+    }
+    Ok(figures)
+}
+
+/// From 0 to 2, both included.
+fn grid(step: f64) -> Vec<f64> {
+    let steps = (2.0 / step).round() as usize;
+    (0..=steps).map(|k| 2.0 * k as f64 / steps as f64).collect()
+}
+
+fn stem(scheme: LocalScheme) -> String {
+    match scheme {
+        LocalScheme::Sqrt3 { alpha } if alpha != 0.0 => format!("splitting-sqrt3-alpha-{alpha}"),
+        _ => format!("splitting-{}", scheme.name()),
+    }
+}
+
+fn summary(scheme: LocalScheme, rows: &[Row]) -> Table {
+    let mut table = Table::new(
+        stem(scheme),
+        format!("Splitting matrices of {scheme}"),
+        vec![
+            Column::key("valence"),
+            Column::text("rings"),
+            Column::text("size"),
+            Column::number("lambda_1", 1e-9, 10),
+            Column::number("lambda_1_imaginary", 1e-9, 4),
+            Column::number("lambda_1_formula", 1e-9, 10),
+            Column::number("lambda_3_modulus", 1e-9, 6),
+            Column::number("eigenvalue_error", 1e-2, 2),
+            Column::number("limit_mask_vertex", 1e-9, 6),
+            Column::number("limit_mask_error", 1e-2, 2),
+            Column::number("tangent_mask_distance", 1e-2, 2),
+            Column::number("residual_right", 1e-2, 2),
+            Column::number("residual_left", 1e-2, 2),
+            Column::text("pair_leads"),
+            Column::text("map_regular"),
+            Column::text("map_injective"),
+            Column::number("map_least_sine", 1e-6, 4),
+        ],
+    );
+    table.note(
+        "Each matrix is read off from the refinement of unit vectors on a star; `rings` is the least number on which it \
+         closes. `lambda_1` has the largest modulus after λ_0 = 1. Errors are the largest deviations from the closed \
+         forms (all eigenvalues; the limit mask, sum 1), `tangent_mask_distance` is that of the closed-form mask from \
+         the computed left eigenspace of λ_1 = λ_2, relative; residuals are the largest entries of S·X − X·(XᵀSX) over \
+         all invariant subspaces. `pair_leads`: 1 > λ_1 = λ_2 > λ_3 with a real pair of frequency 1; where it does not, the \
+         characteristic map of that pair says nothing about the surface.",
+    );
+    table.note(format!(
+        "A characteristic map is refined {MAP_ROUNDS} times. It counts as regular if the angle at every corner of every \
+         face is counter-clockwise (sine > 1e-6; the least is shown), which makes the Jacobian of every face positive, \
+         and as injective if moreover its outermost ring goes counter-clockwise about the middle exactly once. Without \
+         entry: the leading pair of frequency 1 is complex and there is no map."
+    ));
+    for row in rows {
+        let yes = |b: bool| if b { "yes" } else { "no" };
+        table.push(vec![
+            row.valence.into(),
+            row.rings.into(),
+            row.eigenvalues.len().into(),
+            row.lambda_subdominant.re.into(),
+            row.lambda_subdominant.im.abs().into(),
+            row.lambda_subdominant_formula.into(),
+            row.eigenvalues.get(3).map(|z| z.norm()).into(),
+            row.eigenvalue_error.into(),
+            row.limit_mask[0].into(),
+            row.limit_mask_error.into(),
+            row.tangent_mask_distance.into(),
+            row.residual_right.into(),
+            row.residual_left.into(),
+            yes(row.pair_leads).into(),
+            row.map.as_ref().map(|m| yes(m.regular)).into(),
+            row.map.as_ref().map(|m| yes(m.injective)).into(),
+            row.map.as_ref().map(|m| m.least_sine).into(),
+        ]);
+    }
+    table
+}
+
+fn eigenvalue_table(scheme: LocalScheme, rows: &[Row]) -> Table {
+    let mut table = Table::new(
+        format!("{}-eigenvalues", stem(scheme)),
+        format!("Eigenvalues of the splitting matrices of {scheme}"),
+        vec![
+            Column::key("valence"),
+            Column::key("index"),
+            Column::number("real", 1e-7, 10),
+            Column::number("imaginary", 1e-7, 10),
+        ],
+    );
+    table.note("All of them with their multiplicities, by falling modulus.");
+    for row in rows {
+        for (index, z) in row.eigenvalues.iter().enumerate() {
+            table.push(vec![row.valence.into(), index.into(), z.re.into(), z.im.into()]);
+        }
+    }
+    table
+}
+
+fn mask_table(scheme: LocalScheme, rows: &[Row]) -> Table {
+    let mut table = Table::new(
+        format!("{}-masks", stem(scheme)),
+        format!("Limit and tangent masks of {scheme}"),
+        vec![
+            Column::key("valence"),
+            Column::key("position"),
+            Column::number("limit", 1e-9, 8),
+            Column::number("tangent_cosine", 1e-9, 8),
+            Column::number("tangent_sine", 1e-9, 8),
+        ],
+    );
+    table.note(format!("Positions: {}.", order(scheme)));
+    for row in rows {
+        for (i, &limit) in row.limit_mask.iter().enumerate() {
+            let tangent = |k: usize| row.tangent_masks.as_ref().map(|masks| masks[k][i]);
+            table.push(vec![
+                row.valence.into(),
+                scheme.layout().label(row.valence, i).into(),
+                limit.into(),
+                tangent(0).into(),
+                tangent(1).into(),
+            ]);
+        }
+    }
+    table
+}
+
+/// How the positions of a star are named.
+fn order(scheme: LocalScheme) -> &'static str {
+    match scheme {
+        LocalScheme::DooSabin => "sector:i,j is the corner of a sector's grid about the face, 0,0 on the face itself",
+        _ => {
+            "v the middle, sector:i,j the vertex i edges along the sector's first edge and then j towards the next \
+             sector's"
+        }
+    }
+}
+
+/// The characteristic maps side by side; none if no valence has one.
+fn maps(scheme: LocalScheme, valences: &[usize]) -> Result<Option<Figure>> {
+    let mut drawn: Vec<usize> = valences.iter().copied().filter(|n| DRAWN.contains(n)).collect();
+    if drawn.is_empty() {
+        drawn = valences.iter().copied().take(MOST_DRAWN).collect();
+    }
+    let mut panels = Vec::new();
+    for n in drawn {
+        let matrix = SplittingMatrix::new(scheme, n)?;
+        let Ok(lambda) = matrix.leading_pair() else {
+            continue;
+        };
+        let net = characteristic_map(scheme, n, scheme.map_rings())?.refine(MAP_ROUNDS)?;
+        let check = net.check();
+        let verdict = match (matrix.pair_leads()?, check.regular, check.injective) {
+            (false, ..) => "not subdominant",
+            (_, true, true) => "regular, injective",
+            (_, true, false) => "regular, not injective",
+            _ => "not regular",
+        };
+        let joined = |lines: Vec<Vec<(f64, f64)>>| {
+            let gap = (f64::NAN, f64::NAN);
+            lines.into_iter().flat_map(move |line| line.into_iter().chain([gap]))
+        };
+        // As far as a line of every family goes all around.
+        let step = (net.rings / LINES).max(1);
+        let middle_face = 1 - scheme.layout().centre();
+        let net = net.inner((net.rings - middle_face) / step * step + middle_face);
+        panels.push(LinePlot {
+            title: format!("n = {n}, λ = {lambda:.4}: {verdict}"),
+            equal_units: true,
+            series: vec![
+                Series::line("", joined(net.lines(step))).colour(palette(0)),
+                // Only the lines between sectors.
+                Series::line("", joined(net.lines(net.rings + 1))).colour(palette(1)),
+            ],
+            ..LinePlot::default()
+        });
+    }
+    if panels.is_empty() {
+        return Ok(None);
+    }
+    let columns = panels.len().min(3);
+    let lines = panels.len().div_ceil(columns);
+    let mut figure = Figure::row(panels).title(format!("Characteristic maps of {scheme}"));
+    figure.columns = columns;
+    figure.width = 300 * columns as u32;
+    figure.height = 310 * lines as u32 + 24;
+    Ok(Some(figure))
+}
+
+fn thall_report(tables: &ThallTables) -> [Table; 3] {
+    let mut entries = Table::new(
+        "splitting-thall",
+        "Thall's splitting matrices and masks, entry by entry",
+        vec![
+            Column::key("place"),
+            Column::key("valence"),
+            Column::key("item"),
+            Column::number("printed", 1e-12, 10),
+            Column::number("computed", 1e-9, 10),
+            Column::text("agrees"),
+        ],
+    );
+    entries.note(
+        "S and masks in Thall's order v, f_1…f_n, e_1…e_n. Tables II and III are compared with his formulas for c_2 and \
+         c_3 under the index map of §4.1 (Table II is scaled by 4). Agreement: to 1e-12.",
+    );
+    for e in &tables.entries {
+        let agrees = (e.printed - e.computed).abs() < 1e-12;
+        entries.push(vec![
+            e.place.into(),
+            e.valence.into(),
+            e.item.clone().into(),
+            e.printed.into(),
+            e.computed.into(),
+            if agrees { "yes" } else { "no" }.into(),
+        ]);
+    }
+    let mut members = Table::new(
+        "splitting-thall-membership",
+        "Printed tangent masks and the left eigenspace of λ_2 = λ_3",
+        vec![
+            Column::key("place"),
+            Column::key("valence"),
+            Column::key("mask"),
+            Column::number("distance", 1e-6, 4),
+            Column::number("distance_edges_scaled", 1e-6, 4),
+        ],
+    );
+    members.note(
+        "Relative distance ‖v − QQᵀv‖/‖v‖ of the mask from the eigenspace; then the same with the edge weights \
+         multiplied by A_n.",
+    );
+    for m in &tables.memberships {
+        members.push(vec![
+            m.place.into(),
+            m.valence.into(),
+            m.mask.clone().into(),
+            m.distance.into(),
+            m.distance_scaled.into(),
+        ]);
+    }
+    let mut normals = Table::new(
+        "splitting-thall-normals",
+        "Which way m_2 × m_3 points",
+        vec![Column::key("place"), Column::key("valence"), Column::key("masks"), Column::number("sine", 1e-9, 4)],
+    );
+    normals.note("The sine of the angle from m_2 to m_3 on a counter-clockwise planar star: positive is outward.");
+    for o in &tables.orientations {
+        normals.push(vec![o.place.into(), o.valence.into(), o.masks.into(), o.sine.into()]);
+    }
+    [entries, members, normals]
+}
+
+fn condition_table(sampled: &[Condition]) -> Table {
+    let mut columns = vec![Column::key("valence"), Column::key("alpha")];
+    for k in 1..=4 {
+        columns.push(Column::number(format!("lambda_{k}_modulus"), 1e-6, 6));
+    }
+    columns.push(Column::number("margin", 1e-6, 4));
+    columns.push(Column::text("holds"));
+    columns.push(Column::text("third_equals_fourth"));
+    let mut table = Table::new("splitting-sqrt3-condition", "Lin and Luo's eigenvalue condition over α", columns);
+    table.note(
+        "S̃ = R·S·S on three rings. The condition: λ_0 = 1 > λ_1 = λ_2 > λ_3, a real pair of frequency 1 leading; `margin` is \
+         the modulus of that pair less the largest other. The paper (§6) states it for all α in [0, 2], and λ_3 = λ_4 \
+         beside it for n > 3.",
+    );
+    for c in sampled {
+        let yes = |b: bool| if b { "yes" } else { "no" };
+        let mut row = vec![c.valence.into(), c.alpha.to_string().into()];
+        row.extend(c.lambda.iter().map(|z| z.norm().into()));
+        row.extend([c.margin.into(), yes(c.holds).into(), yes(c.third_equals_fourth).into()]);
+        table.push(row);
+    }
+    table
+}
+
+fn crossing_table(valences: &[usize], crossings: &[Vec<Crossing>]) -> Table {
+    let mut table = Table::new(
+        "splitting-sqrt3-crossings",
+        "Where Lin and Luo's eigenvalue condition ceases to hold",
+        vec![
+            Column::key("valence"),
+            Column::number("alpha", 1e-6, 8),
+            Column::text("above"),
+            Column::text("frequency"),
+        ],
+    );
+    table.note(
+        "`frequency` is that of the eigenvalue that meets λ_1 there: 0 for rotation-invariant ones. Found between \
+         neighbours of 401 values of α, then by bisection. Without α: it holds on all of [0, 2].",
+    );
+    for (&n, found) in valences.iter().zip(crossings) {
+        if found.is_empty() {
+            table.push(vec![n.into(), None::<f64>.into(), "holds".into(), "".into()]);
+        }
+        for c in found {
+            let above = if c.holds_above { "holds" } else { "fails" };
+            table.push(vec![n.into(), c.alpha.into(), above.into(), c.frequency.into()]);
+        }
+    }
+    table
+}
+
+fn condition_plot(valences: &[usize], crossings: &[Vec<Crossing>]) -> Result<Figure> {
+    let mut plotted: Vec<usize> = valences.iter().copied().filter(|n| PLOTTED.contains(n)).collect();
+    if plotted.is_empty() {
+        plotted = valences.iter().copied().take(MOST_DRAWN).collect();
+    }
+    let conditions = condition_over_alpha(&plotted, &grid(PLOT_STEP))?;
+    let curve = |&n: &usize| {
+        let own = conditions.iter().filter(move |c| c.valence == n);
+        Series::line(format!("n = {n}"), own.map(|c| (c.alpha, c.margin)))
+    };
+    let margins = LinePlot {
+        title: "The condition holds above 0".into(),
+        x_label: "α".into(),
+        y_label: "|λ_{1}| − largest other modulus".into(),
+        x_range: Some((0.0, 2.0)),
+        series: plotted.iter().map(curve).collect(),
+        horizontal_lines: vec![Rule::new(0.0, "")],
+        ..LinePlot::default()
+    };
+    let points = |frequency: usize| {
+        let all = crossings.iter().flatten().filter(move |c| c.frequency == frequency);
+        all.map(|c| (c.valence as f64, c.alpha))
+    };
+    let mut series = vec![
+        Series::scatter("frequency 0", points(0)),
+        Series::scatter("frequency 2", points(2)).marker(Marker::Square),
+    ];
+    series.retain(|s| !s.points.is_empty());
+    let first = LinePlot {
+        title: "Where it ceases to hold, and which eigenvalue meets λ_{1} there".into(),
+        x_label: "valence n".into(),
+        y_label: "α".into(),
+        x_range: Some((valences[0] as f64 - 1.0, valences[valences.len() - 1] as f64 + 1.0)),
+        y_range: Some((0.0, 2.05)),
+        series,
+        ..LinePlot::default()
+    };
+    let mut figure = Figure::stack([margins, first]).title("Lin and Luo's eigenvalue condition, blended √3");
+    figure.share_x = false;
+    figure.height = 520;
+    Ok(figure)
+}

@@ -1,0 +1,125 @@
+//! The table and the picture of an ω sweep.
+
+use crate::cli::Grid;
+use crate::report::{Column, Figure, LinePlot, Marker, Rule, Scale, Series, Table, palette};
+use limitlab::analysis::sweep::Sweep;
+use limitlab::error::short;
+use limitlab::solvers::{Method, Outcome};
+
+/// The grids unless told: Jacobi's reaches beyond 2/λ_max(D⁻¹A) on regular quads, the others over all of (0, 2].
+pub fn default_grid(method: Method) -> Vec<f64> {
+    let text = if method == Method::Jacobi { "0.05:1.2:0.05" } else { "0.05:2:0.05" };
+    text.parse::<Grid>().map(|g| g.0).unwrap_or_default()
+}
+
+/// One row a method and ω. `about` says which mesh, start and tolerance.
+pub fn table(id: String, title: String, about: String, sweep: &Sweep) -> Table {
+    let mut table = Table::new(
+        id,
+        title,
+        vec![
+            Column::key("method"),
+            Column::key("omega"),
+            Column::text("status"),
+            Column::count("iterations"),
+            Column::number("predicted_rho", 1e-4, 4),
+            Column::number("predicted_rho_data", 1e-3, 4),
+            Column::number("observed_rate", 1e-2, 4),
+            Column::number("max_error", 1e-2, 3),
+        ],
+    );
+    table.note(format!(
+        "{about} `predicted_rho` is the spectral radius of the error matrix, `predicted_rho_data` the same over the \
+         eigenvectors that the data excite, `observed_rate` the factor per iteration fitted to the tail of the \
+         history."
+    ));
+    for t in &sweep.thresholds {
+        let mut text = format!(
+            "{}: eigenvalues in [{:.6}, {:.6}], ω_crit = {:.6}, ω_opt = {:.6} with ρ = {:.6}",
+            t.method,
+            t.matrix.min,
+            t.matrix.max,
+            t.matrix.critical_omega(),
+            t.matrix.optimal_omega(),
+            t.matrix.radius(t.matrix.optimal_omega())
+        );
+        if let Some(data) = t.data {
+            text += &format!(
+                "; the data excite [{:.6}, {:.6}], so ω_crit = {:.6} for this run",
+                data.min,
+                data.max,
+                data.critical_omega()
+            );
+        }
+        if let Some(best) = sweep.best(t.method) {
+            text += &format!("; best on the grid: ω = {} with {} iterations", short(best.omega), best.iterations);
+        }
+        table.note(text + ".");
+    }
+    for row in &sweep.rows {
+        table.push(vec![
+            row.method.name().into(),
+            short(row.omega).into(),
+            row.outcome.name().into(),
+            row.iterations.into(),
+            row.predicted_rho.into(),
+            row.predicted_rho_data.into(),
+            row.observed_rate.into(),
+            row.errors.max.into(),
+        ]);
+    }
+    table
+}
+
+/// Iterations above, rates below, over ω.
+pub fn plot(title: String, methods: &[Method], sweep: &Sweep) -> Figure {
+    let mut iterations = LinePlot {
+        title,
+        x_label: "ω".into(),
+        y_label: "iterations to converge".into(),
+        y_scale: Scale::Log,
+        ..LinePlot::default()
+    };
+    let mut rates = LinePlot {
+        x_label: "ω".into(),
+        y_label: "factor per iteration".into(),
+        y_range: Some((0.0, 1.5)),
+        horizontal_lines: vec![Rule::new(1.0, "")],
+        ..LinePlot::default()
+    };
+    for (k, &method) in methods.iter().enumerate() {
+        let colour = palette(k);
+        let rows = || sweep.rows.iter().filter(move |r| r.method == method);
+        let converged = Outcome::Converged;
+        iterations.series.push(
+            Series::line(
+                method.name(),
+                rows().filter(|r| r.outcome == converged).map(|r| (r.omega, r.iterations as f64)),
+            )
+            .marker(Marker::Circle)
+            .colour(colour),
+        );
+        rates.series.push(
+            Series::line(format!("{method}: predicted ρ(ω)"), rows().map(|r| (r.omega, r.predicted_rho)))
+                .colour(colour),
+        );
+        rates.series.push(
+            Series::scatter(
+                format!("{method}: measured"),
+                rows().filter_map(|r| r.observed_rate.map(|rate| (r.omega, rate))),
+            )
+            .colour(colour),
+        );
+    }
+    for t in &sweep.thresholds {
+        if t.method == Method::Jacobi {
+            for (at, label) in
+                [(t.matrix.optimal_omega(), "Jacobi ω_{opt}"), (t.matrix.critical_omega(), "Jacobi ω_{crit}")]
+            {
+                iterations.vertical_lines.push(Rule::new(at, label));
+                rates.vertical_lines.push(Rule::new(at, ""));
+            }
+        }
+    }
+    Figure::stack([iterations, rates])
+}

@@ -1,0 +1,45 @@
+//! The program `spectrum`: the fields of its JSON, its files, its limits.
+
+#[test]
+fn the_program_prints_the_agreed_fields() {
+    let out = tempfile::tempdir().expect("a folder");
+    let spectrum = |arguments: &[&str]| {
+        assert_cmd::Command::new(env!("CARGO_BIN_EXE_spectrum"))
+            .args(arguments)
+            .args(["--json", "--quiet", "--out"])
+            .arg(out.path())
+            .output()
+            .expect("the program runs")
+    };
+    let done = spectrum(&["torus:10x8", "--full", "--certify", "--modes", "3"]);
+    assert!(done.status.success());
+    let json: serde_json::Value = serde_json::from_slice(&done.stdout).expect("one JSON object");
+    let close = |field: &serde_json::Value, expected: f64| {
+        let value = field.as_f64().expect("a number");
+        assert!((value - expected).abs() < 1e-9, "{value} {expected}");
+    };
+    close(&json["lambda_min"], 1.0 / 9.0);
+    close(&json["lambda_max"], 1.0);
+    close(&json["lambda_min_bound"], 1.0 / 9.0);
+    close(&json["jacobi_lambda_min"], 0.25);
+    close(&json["jacobi_lambda_max"], 2.25);
+    close(&json["rho"]["pia"], 8.0 / 9.0);
+    close(&json["rho"]["thall"], 7.0 / 8.0);
+    close(&json["rho"]["jacobi_optimal"], 0.8);
+    close(&json["optimal_omega"]["w-pia"], 1.8);
+    close(&json["optimal_omega"]["jacobi"], 0.8);
+    close(&json["critical_omega_jacobi"], 8.0 / 9.0);
+    assert_eq!(json["singular"], false);
+    assert_eq!(json["kernel_dimension"], 0);
+    assert_eq!(json["eigenvalues"]["a"].as_array().map(Vec::len), Some(80));
+    assert!(out.path().join("spectrum-histogram-torus-10x8-catmull-clark.png").is_file());
+
+    let done = spectrum(&["cube"]);
+    let json: serde_json::Value = serde_json::from_slice(&done.stdout).expect("one JSON object");
+    assert_eq!((&json["singular"], &json["kernel_dimension"]), (&true.into(), &1.into()));
+
+    let refused = spectrum(&["torus:70x70", "--full"]);
+    assert_eq!(refused.status.code(), Some(1));
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(message.starts_with("error: torus:70x70") && message.lines().count() == 1);
+}

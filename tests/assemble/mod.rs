@@ -1,0 +1,8 @@
+//! The limit systems held against brute-force subdivision, the formulas through other libraries, identities, closed
+//! forms and dense eigenvalues; their files against other readers.
+
+mod brute_force;
+mod files;
+mod formulas;
+mod refusals;
+mod spectra;

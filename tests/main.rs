@@ -1,0 +1,13 @@
+//! The tests of the library, one program.
+
+mod assemble;
+mod common;
+mod files;
+mod fuzz;
+mod meshes;
+mod operator;
+mod pipelines;
+mod solvers;
+mod spectra;
+mod splitting;
+mod subdivide;

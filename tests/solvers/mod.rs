@@ -1,0 +1,11 @@
+//! The methods held against manufactured solutions, direct solves, loops made by hand with dense matrices, closed-form
+//! rates; and what they say of singular systems and other impossible tasks.
+
+mod handmade;
+mod invariance;
+mod outcomes;
+mod predictions;
+mod rates;
+mod setups;
+mod singular;
+mod solutions;
