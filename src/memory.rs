@@ -31,7 +31,7 @@ pub(crate) fn require(bytes: u64, what: impl FnOnce() -> String, advice: &'stati
 /// Passes if a small computation finds room: that is looked at once, by the program.
 ///
 /// # Errors
-/// As [`require`].
+/// [`Error::Memory`] with the bytes needed and available.
 pub fn require_small() -> Result<()> {
     require(SMALL, || "the program".into(), "raise the limit (ulimit -v)")
 }
