@@ -18,6 +18,10 @@ pub fn vertex_marks(text: &str, vertices: usize) -> Result<Vec<bool>> {
     let path = Path::new(text);
     let is_file = path.is_file();
     let bytes = if is_file { read(path)? } else { text.into() };
+    if !is_file && let Some(at) = text.find('#') {
+        let what = format!("{} would be a comment in a file, and {} is none", quoted(&bytes[at..]), quoted(&bytes));
+        return Err(Error::Unknown(what));
+    }
     let mut s = Scanner::new(&bytes, path);
     let mut marks = vec![false; vertices];
     loop {
@@ -146,6 +150,8 @@ mod tests {
             (0..10).filter(|&v| marks[v]).collect()
         };
         assert_eq!(marked("0, 3..5,9"), [0, 3, 4, 5, 9]);
+        let comment = vertex_marks("1 #2.txt", 10).unwrap_err().to_string();
+        assert_eq!(comment, "\"#2.txt\" would be a comment in a file, and \"1 #2.txt\" is none");
         let listed = file("# chosen\n0 3..5 # a range\n\n9\n");
         assert_eq!(marked(listed.path().to_str().unwrap()), [0, 3, 4, 5, 9]);
         let refused = |text: &str| vertex_marks(text, 10).unwrap_err().to_string();
