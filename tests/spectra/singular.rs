@@ -1,0 +1,148 @@
+//! Which systems are singular, and what methods do on them.
+
+use super::{assemble, named};
+use glam::DVec3;
+use limitlab::analysis::singularity::{Prediction, Singularity, numerical_kernel_dimension};
+use limitlab::analysis::{comparison, dense};
+use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::mesh::noise::add_noise;
+use limitlab::mesh::{Faces, Mesh, Topology, generate};
+use limitlab::solvers::{Method, Outcome, Setup, Stop, run};
+
+#[test]
+fn the_detective_knows_its_suspects() {
+    let kernel = |name: &str| {
+        let mesh = named(name);
+        let topology = Topology::new(&mesh.faces, mesh.len());
+        let verdict = Singularity::detect(&mesh, &topology, Scheme::CatmullClark);
+        let system = assemble(&mesh, Scheme::CatmullClark);
+        let by_numbers = numerical_kernel_dimension(&system).expect("small enough");
+        assert_eq!(verdict.kernel_dimension(), by_numbers, "{name}");
+        // The null vectors are null vectors.
+        let x: Vec<f64> = verdict.colouring.iter().map(|&c| f64::from(c)).collect();
+        for i in 0..mesh.len() {
+            assert!(system.m.row_times_scalar(i, &x).abs() < 1e-12, "{name} {i}");
+        }
+        by_numbers
+    };
+    assert_eq!(kernel("cube"), 1);
+    assert_eq!(kernel("truncated-octahedron"), 1);
+    assert_eq!(kernel("cubes:7"), 7);
+    assert_eq!(kernel("cubes:200"), 200);
+    for k in 3..12 {
+        assert_eq!(kernel(&format!("prism:{k}")), usize::from(k % 2 == 0));
+    }
+    for name in ["tetrahedron", "dodecahedron", "torus:6x8", "quad-sphere:1"] {
+        assert_eq!(kernel(name), 0, "{name}");
+    }
+    // A singular and a regular component.
+    let mesh = generate::union(&[named("prism:6"), named("torus:5x5"), named("prism:5")]);
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    let verdict = Singularity::detect(&mesh, &topology, Scheme::CatmullClark);
+    assert_eq!((verdict.components, verdict.kernel_dimension()), (3, 1));
+    assert_eq!(verdict.singular[0].vertices, 12);
+    assert!(verdict.colouring[12..].iter().all(|&c| c == 0));
+    for scheme in [Scheme::Nasri, Scheme::ZhengCai] {
+        assert!(!Singularity::detect(&mesh, &topology, scheme).is_singular());
+    }
+}
+
+/// A cube with one corner moved by δ has a part δ/8 along ±1, which no control points reach.
+#[test]
+fn a_part_out_of_reach_is_told_from_rounding() {
+    let verdict = |mesh: &Mesh| {
+        let topology = Topology::new(&mesh.faces, mesh.len());
+        Singularity::detect(mesh, &topology, Scheme::CatmullClark)
+    };
+    for size in [1.0, 1e-6, 1e6] {
+        let mut cube = named("cube");
+        cube.positions.iter_mut().for_each(|p| *p *= size);
+        for moved in [1e-2, 1e-4, 1e-6, 1e-9, 1e-12] {
+            let mut mesh = cube.clone();
+            mesh.positions[5].y += moved * size;
+            let found = verdict(&mesh);
+            assert!(found.excited, "{moved:e} of {size:e}");
+            let part = found.singular[0].unreachable;
+            assert!((part.length() - moved * size / 8.0).abs() < 1e-15 * size, "{moved:e} of {size:e}: {part}");
+            if moved >= 1e-9 {
+                // What is left of the error at the end, at every vertex.
+                let stop = Stop { tolerance: 1e-3 * moved * size, max_iterations: 1000 };
+                let system = assemble(&mesh, Scheme::CatmullClark);
+                let report = run(&system, &mesh.positions, Setup::Pia { omega: 1.0 }, &stop).report;
+                assert_ne!(report.outcome, Outcome::Converged);
+                assert!((report.last().mean / part.length() - 1.0).abs() < 1e-3, "{moved:e} of {size:e}");
+            }
+        }
+        // Turned, so that the coordinates are rounded.
+        let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -0.7);
+        cube.positions.iter_mut().for_each(|p| *p = turn * *p);
+        assert!(!verdict(&cube).excited, "{size:e}");
+    }
+    assert!(!verdict(&named("prism:1000")).excited);
+}
+
+#[test]
+fn methods_do_on_singular_meshes_what_was_predicted() {
+    for name in ["cube", "prism:8", "truncated-octahedron", "cubes:3"] {
+        for excited in [false, true] {
+            let mut mesh = named(name);
+            if excited {
+                add_noise(&mut mesh, 0.1, 1);
+            }
+            let topology = Topology::new(&mesh.faces, mesh.len());
+            let verdict = Singularity::detect(&mesh, &topology, Scheme::CatmullClark);
+            assert!(verdict.is_singular());
+            assert_eq!(verdict.excited, excited, "{name}");
+            let system = assemble(&mesh, Scheme::CatmullClark);
+            let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 2000 };
+            let spectrum = || limitlab::analysis::spectrum::spectrum(&system);
+            for method in Method::ALL {
+                let mut setup = comparison::standard_setup(&system, method, None, &spectrum).expect("dense spectra");
+                if let Setup::Chebyshev { spectrum } = &mut setup {
+                    let all = dense::eigenvalues(&system).expect("small").a;
+                    spectrum.0 = all.into_iter().find(|&l| l > 1e-10).expect("not all zero");
+                }
+                let solution = run(&system, &mesh.positions, setup, &stop);
+                let outcome = solution.report.outcome;
+                let prediction = verdict.prediction(method);
+                let expected = match prediction {
+                    Prediction::Converges => panic!("{name} is singular"),
+                    Prediction::Refuses => outcome == Outcome::Singular,
+                    // Without fill the incomplete factor may break down: a result of its own.
+                    _ if method == Method::PcgIc0 && outcome == Outcome::Breakdown => true,
+                    Prediction::Drifts => outcome != Outcome::Converged,
+                    Prediction::MinimumNorm | Prediction::SomeSolution => outcome == Outcome::Converged,
+                };
+                assert!(expected, "{name} {method} {outcome:?}, {prediction:?}");
+                if prediction == Prediction::MinimumNorm {
+                    let part: DVec3 = verdict
+                        .colouring
+                        .iter()
+                        .zip(&solution.points)
+                        .zip(&system.h)
+                        .map(|((&c, &v), h)| f64::from(c) * v / *h)
+                        .sum();
+                    assert!(part.length() < 1e-8, "{name} {method}: {part}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn two_quads_back_to_back_have_a_negative_eigenvalue() {
+    let positions = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+    let mesh = Mesh::new(positions, Faces::from_lists([[0u32, 1, 2, 3], [3, 2, 1, 0]]));
+    let topology = Topology::new(&mesh.faces, mesh.len());
+    let system = LimitSystem::with_masks(&mesh, &topology, &Scheme::CatmullClark).expect("small");
+    let all = dense::eigenvalues(&system).expect("small");
+    assert!((all.a[0] + 1.0 / 7.0).abs() < 1e-14, "{:?}", all.a);
+    assert!(system.bounds.lambda_min <= all.a[0] + 1e-14);
+    assert!(system.bounds.jacobi_lambda_min <= all.jacobi[0] + 1e-14);
+    // PIA diverges from a start that has a part in that mode.
+    let mut points = mesh.positions.clone();
+    points[0].z += 0.1;
+    let stop = Stop { tolerance: 1e-10, max_iterations: 2000 };
+    let report = run(&system, &points, Setup::Pia { omega: 1.0 }, &stop).report;
+    assert_eq!(report.outcome, Outcome::Diverged);
+}
