@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3};
 use limitlab::assemble::{LimitSystem, Scheme};
 use limitlab::interpolate::normals::{Rotation, rotate_rings};
 use limitlab::interpolate::thall::*;
-use limitlab::mesh::{Faces, Mesh, builtin};
+use limitlab::mesh::{Faces, Mesh, Topology, builtin};
 use limitlab::solvers::iteration::Iterate;
 use limitlab::solvers::{Outcome, Setup, Stop, run, run_watched, solve};
 use limitlab::subdivide::{Refinement, catmull_clark};
@@ -278,8 +278,7 @@ fn attributes_stay_creep_or_interpolate() {
     let stop = Stop { tolerance: 1e-13, max_iterations: 10 };
     let control = run(&system, &values, Setup::Lu, &stop).points;
     let refined = Mesh::new(refine(control, AttributeRule::Scheme), fine.faces);
-    let limits =
-        catmull_clark::limit_positions(&refined, &limitlab::mesh::Topology::new(&refined.faces, refined.len()))
-            .unwrap();
+    let fine = Topology::new(&refined.faces, refined.len());
+    let limits = catmull_clark::limit_positions(&refined, &fine).unwrap();
     assert!(distance(&limits[..mesh.len()], &values) < 1e-10);
 }

@@ -1,6 +1,7 @@
 //! Every method on every scheme: a solution chosen beforehand, a direct solve, a second library, a conserved sum.
 
 use glam::DVec3;
+use limitlab::analysis::dense::gaussian_elimination;
 use limitlab::assemble::Scheme;
 use limitlab::solvers::{Outcome, Setup, Stop};
 use nalgebra::DMatrix;
@@ -43,6 +44,9 @@ fn every_method_finds_the_solution_chosen_beforehand() {
                 let error = distance(&solution.points, &exact);
                 assert!(error <= allowed, "{what}: {error:e} > {allowed:e}");
             }
+            let allowed = tol::solution(&system, lambda_min, STOP.tolerance, 1.0);
+            let error = distance(&gaussian_elimination(&system, &points), &exact);
+            assert!(error <= allowed, "dense elimination, {scheme}, seed {seed}: {error:e} > {allowed:e}");
         }
     }
     assert!(runs > 1500, "{runs} runs");

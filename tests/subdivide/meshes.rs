@@ -1,16 +1,14 @@
 //! Small closed meshes with known shapes, irregular ones from a seed, and what the tests ask of a mesh.
 
 use glam::DVec3;
-use limitlab::mesh::{Faces, Mesh, Topology};
+use limitlab::mesh::{Faces, Mesh};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+pub use crate::common::meshes::{distance, topology};
+
 fn mesh(points: Vec<DVec3>, faces: &[Vec<u32>]) -> Mesh {
     Mesh::new(points, Faces::from_lists(faces))
-}
-
-pub fn topology(mesh: &Mesh) -> Topology {
-    Topology::new(&mesh.faces, mesh.len())
 }
 
 fn on_circle(k: u32, j: u32, z: f64) -> DVec3 {
@@ -184,13 +182,6 @@ pub fn star(mesh: &Mesh, v: usize) -> Star {
         }
     }
     star
-}
-
-/// The largest distance between points of the same index.
-pub fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    let distances = a.iter().zip(b).map(|(p, q)| (*p - *q).length());
-    distances.fold(0.0, f64::max)
 }
 
 /// That the mesh is closed, each vertex has one umbrella, and V − E + F is `euler`.
