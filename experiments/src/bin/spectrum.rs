@@ -65,11 +65,7 @@ fn main() -> ExitCode {
     let mut arguments = Arguments::parse();
     cli::exit(|| {
         arguments.common.apply()?;
-        if arguments.meshes.is_empty() {
-            arguments.meshes = BUILT_IN.map(String::from).to_vec();
-            arguments.mesh.default_noise();
-        }
-        arguments.output.prepare()?;
+        arguments.mesh.or_built_in(&mut arguments.meshes, &BUILT_IN);
         run(&arguments)
     })
 }
@@ -123,6 +119,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     if arguments.mesh.print_defects(&arguments.meshes, &arguments.common)? {
         return Ok(());
     }
+    arguments.output.prepare()?;
     let mut results = Vec::new();
     for name in &arguments.meshes {
         let input = arguments.mesh.input(name, &arguments.common)?;

@@ -65,9 +65,12 @@ fn one_digit(x: f64) -> String {
 }
 
 impl MeshFlags {
-    /// Gives built-in meshes that stand in for real ones their noise, unless the user chose another.
-    pub fn default_noise(&mut self) {
-        self.noise.get_or_insert(STAND_IN_NOISE);
+    /// Built-in meshes where none is named, with the noise of real ones unless the user chose another.
+    pub fn or_built_in(&mut self, names: &mut Vec<String>, built_in: &[&str]) {
+        if names.is_empty() {
+            names.extend(built_in.iter().map(|name| (*name).to_owned()));
+            self.noise.get_or_insert(STAND_IN_NOISE);
+        }
     }
 
     /// Reads the file, or makes the built-in mesh, called `name`.

@@ -386,6 +386,14 @@ fn defects_are_printed_as_json() {
         assert_eq!(json(&output)["valid"], true);
     }
     assert_eq!(below(folder.path()).iter().filter(|n| n.ends_with("obj")).count(), 1);
+    // Of several meshes one object, and no folder for files that there are not.
+    for program in [COMPARE, SPECTRUM, SWEEP] {
+        let output = run_on(program, folder.path(), "x.obj", &["cube", "--defects"]);
+        assert_done(&output, program);
+        let results = json(&output)["results"].as_array().unwrap().clone();
+        assert_eq!(results.iter().map(|report| report["valid"] == true).collect::<Vec<_>>(), [false, true]);
+        assert!(!folder.path().join("result").exists());
+    }
 }
 
 #[test]
