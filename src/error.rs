@@ -31,6 +31,10 @@ pub enum Error {
         available: u64,
         advice: &'static str,
     },
+    /// A matrix of somebody else that cannot be taken over: not square, unsorted, too large, not symmetric, no positive
+    /// diagonal.
+    #[error("{0}")]
+    Matrix(String),
     /// A computation that has no result to give.
     #[error("{0}")]
     Computation(String),

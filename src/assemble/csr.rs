@@ -120,6 +120,31 @@ impl Csr {
         (0..self.len()).into_par_iter().with_min_len(CHUNK).map(|i| self.get(i, i)).collect()
     }
 
+    /// The transposed matrix. O(N + entries).
+    pub fn transpose(&self) -> Csr {
+        let n = self.len();
+        // `next[j + 1]` is where the next entry of row j goes, and ends as where row j + 1 begins.
+        let mut next = vec![0u32; n + 2];
+        for &j in self.pattern.columns() {
+            next[j as usize + 2] += 1;
+        }
+        for j in 2..n + 2 {
+            next[j] += next[j - 1];
+        }
+        let mut columns = vec![0; self.values.len()];
+        let mut values = vec![0.0; self.values.len()];
+        for i in 0..n {
+            for (j, a) in self.row(i) {
+                let place = next[j + 1] as usize;
+                columns[place] = i as u32;
+                values[place] = a;
+                next[j + 1] += 1;
+            }
+        }
+        next.pop();
+        Csr::new(Arc::new(Pattern::new(next, columns)), values)
+    }
+
     /// `diag(scale) · self`, on the same pattern.
     ///
     /// # Panics

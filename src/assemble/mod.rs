@@ -4,6 +4,7 @@
 
 pub mod bounds;
 mod codes;
+pub mod convert;
 pub mod csr;
 pub mod matrix_market;
 pub mod operator;

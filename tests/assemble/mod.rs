@@ -2,6 +2,7 @@
 //! forms and dense eigenvalues; their files against other readers.
 
 mod brute_force;
+mod convert;
 mod files;
 mod formulas;
 mod refusals;
