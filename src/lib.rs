@@ -19,6 +19,7 @@ mod pages;
 mod prefetch;
 pub mod solvers;
 pub mod subdivide;
+mod text;
 
 pub use error::{Error, Result};
 

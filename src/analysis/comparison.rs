@@ -3,12 +3,14 @@
 
 use glam::DVec3;
 
+use super::own::{Named, Own};
 use super::predict::predicted_rate;
 use super::rate::observed_rate;
 use super::spectrum::Spectrum;
 use super::sweep::rounding_floor;
 use crate::assemble::LimitSystem;
 use crate::error::Result;
+use crate::mesh::diagonal;
 use crate::solvers::{Method, Setup, Solution, Stop, run};
 
 /// A method with its parameter in words: a line of a comparison.
@@ -24,7 +26,8 @@ pub struct Entry<'a> {
 /// What came of it.
 #[derive(Clone, Debug)]
 pub struct Row {
-    pub method: Method,
+    pub method: Named,
+    /// Empty for methods of the caller's own.
     pub variant: &'static str,
     pub parameter: String,
     pub solution: Solution,
@@ -39,13 +42,16 @@ pub struct Row {
 pub const SOR_OMEGA: f64 = 1.1;
 /// ω of `ssor` and of the preconditioner `pcg-ssor`, where the symmetric sweep is little sensitive to it.
 pub const SSOR_OMEGA: f64 = 1.0;
-/// An estimated λ_min below this is taken for 0: the matrix is singular for all that iterations can tell.
+/// An estimated λ_min below this part of λ_max is taken for 0: the matrix is singular for all that iterations can tell.
 const VANISHING: f64 = 1e-9;
-/// Where a Chebyshev interval starts if λ_min vanishes: modes beneath are left nearly as they are, which is right
+/// The part of λ_max where a Chebyshev interval starts if λ_min vanishes: modes beneath are left nearly as they are, which is right
 /// where the data do not excite them. Tuned on singular meshes: lower costs iterations, higher leaves out modes.
 const LOWEST: f64 = 1e-3;
 /// The part of an estimated λ_min that a Chebyshev interval starts from: Ritz values lie above the eigenvalue.
 const SAFETY: f64 = 0.98;
+/// An estimated λ_max is exceeded by this part of it, where no smaller bound is proven: it has an error, and modes above
+/// the interval grow.
+const EXCESS: f64 = 1e-6;
 
 /// The set-up that is meant by a method's name alone: Jacobi and W-PIA at their best ω, Chebyshev with the proven
 /// interval where that is positive, else with an estimated one. `spectrum` is asked only where it is needed.
@@ -72,7 +78,7 @@ pub fn standard_setup<'a>(
         Method::Chebyshev if system.bounds.lambda_min > 0.0 => {
             Setup::Chebyshev { spectrum: (system.bounds.lambda_min, system.bounds.lambda_max) }
         }
-        Method::Chebyshev => estimated_chebyshev(&spectrum()?),
+        Method::Chebyshev => estimated_chebyshev(system, &spectrum()?),
         Method::Cg => Setup::Cg,
         Method::PcgJacobi => Setup::PcgJacobi,
         Method::PcgSsor => Setup::PcgSsor { omega: SSOR_OMEGA },
@@ -80,9 +86,10 @@ pub fn standard_setup<'a>(
     })
 }
 
-fn estimated_chebyshev(spectrum: &Spectrum) -> Setup<'static> {
-    let lowest = if spectrum.a.min < VANISHING { LOWEST } else { SAFETY * spectrum.a.min };
-    Setup::Chebyshev { spectrum: (lowest, 1.0) }
+fn estimated_chebyshev(system: &LimitSystem, spectrum: &Spectrum) -> Setup<'static> {
+    let highest = system.bounds.lambda_max.min((1.0 + EXCESS) * spectrum.a.max);
+    let lowest = if spectrum.a.min < VANISHING * highest { LOWEST * highest } else { SAFETY * spectrum.a.min };
+    Setup::Chebyshev { spectrum: (lowest, highest) }
 }
 
 /// The method that `auto` stands for: Chebyshev with proven bounds where the one for λ_min is positive (no inner
@@ -128,7 +135,7 @@ pub fn entries<'a>(
             }
             Method::Cg => lines.push(entry(method, "on M itself", Setup::PlainCg)),
             Method::Chebyshev if proven => {
-                lines.push(entry(method, "estimated", estimated_chebyshev(spectrum)));
+                lines.push(entry(method, "estimated", estimated_chebyshev(system, spectrum)));
             }
             _ => {}
         }
@@ -162,7 +169,10 @@ fn four_digits(x: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
-/// Runs the lines one after the other, so that their times are comparable. `done` is called after each.
+/// Runs the lines, then the methods of the caller's [own], one after the other, so that their times are comparable.
+/// `done` is called after each.
+///
+/// [own]: super::own
 ///
 /// # Errors
 /// If an eigenvalue computation for a prediction does not converge.
@@ -174,21 +184,24 @@ pub fn compare(
     spectrum: &Spectrum,
     points: &[DVec3],
     entries: &[Entry],
+    own: &[Own],
     stop: &Stop,
-    diagonal: f64,
     done: &mut dyn FnMut(),
 ) -> Result<Vec<Row>> {
-    let floor = rounding_floor(diagonal);
-    entries
+    let floor = rounding_floor(diagonal(points));
+    let observed_rate = |solution: &Solution| {
+        let maxima: Vec<f64> = solution.report.history.iter().map(|e| e.max).collect();
+        observed_rate(&maxima, floor)
+    };
+    let ours = entries
         .iter()
         .map(|entry| {
             let solution = run(system, points, entry.setup, stop);
-            let maxima: Vec<f64> = solution.report.history.iter().map(|e| e.max).collect();
-            let observed_rate = (!entry.method.is_direct()).then(|| observed_rate(&maxima, floor)).flatten();
+            let observed_rate = (!entry.method.is_direct()).then(|| observed_rate(&solution)).flatten();
             let predicted_rate = predicted_rate(system, spectrum, entry.setup)?;
             done();
             Ok(Row {
-                method: entry.method,
+                method: Named::Ours(entry.method),
                 variant: entry.variant,
                 parameter: entry.parameter.clone(),
                 solution,
@@ -196,5 +209,18 @@ pub fn compare(
                 predicted_rate,
             })
         })
-        .collect()
+        .collect::<Result<Vec<Row>>>()?;
+    let theirs = own.iter().map(|own| {
+        let solution = own.run(system, points, stop);
+        done();
+        Row {
+            method: Named::Own(own.name.clone()),
+            variant: "",
+            parameter: own.parameter.clone(),
+            observed_rate: observed_rate(&solution),
+            predicted_rate: None,
+            solution,
+        }
+    });
+    Ok(ours.into_iter().chain(theirs).collect())
 }

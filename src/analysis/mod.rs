@@ -11,6 +11,7 @@ pub mod interval;
 pub mod lanczos;
 pub mod lines;
 pub mod order_study;
+pub mod own;
 pub mod predict;
 pub mod promise;
 pub mod radius;

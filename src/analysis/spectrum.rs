@@ -201,8 +201,13 @@ pub fn ends(system: &LimitSystem) -> Result<Ends> {
             applications: 0,
         });
     }
-    let (signs, components) = alternating(&system.m);
-    let known = Known { bounds: system.bounds, signs, alternation_is_all: false, components };
+    let components = components(&system.m);
+    let known = Known {
+        bounds: system.bounds,
+        signs: alternating(&system.m),
+        alternation_is_all: false,
+        components: system.m.values().iter().all(|&v| v >= 0.0).then_some(components),
+    };
     known.ends(system, |_, _| Ok(None))
 }
 
@@ -240,7 +245,7 @@ pub fn mesh_ends(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Result<End
         bounds: operator.bounds(),
         signs: fronts.there(&signs),
         alternation_is_all: alternation_is_all(&mesh.faces, scheme),
-        components: topology.components(&mesh.faces).1,
+        components: Some(topology.components(&mesh.faces).1),
     };
     let mut ends = known.ends(&operator, |which, end| {
         let found = bracket(&mesh.faces, topology, scheme, which, end, ACCURACY)?;
@@ -313,7 +318,8 @@ struct Known {
     signs: Vec<f64>,
     /// Whether nothing else attains the lower bounds on a connected mesh.
     alternation_is_all: bool,
-    components: usize,
+    /// The number of components of a matrix without negative entries; `None` for others.
+    components: Option<usize>,
 }
 
 impl Known {
@@ -324,12 +330,15 @@ impl Known {
         let a = self.operator_ends(
             &Matrix { system, which: Operator::A },
             (b.lambda_min, b.lambda_max),
+            b.lambda_max,
             &enclose,
             &mut applications,
         )?;
         let jacobi = self.operator_ends(
             &Matrix { system, which: Operator::Jacobi },
             (b.jacobi_lambda_min, b.jacobi_lambda_max),
+            // D⁻¹A has a diagonal of ones, whatever the scale of A.
+            1.0,
             &enclose,
             &mut applications,
         )?;
@@ -342,12 +351,13 @@ impl Known {
         })
     }
 
-    /// Both ends of one operator: by a vector that attains a proven bound, else enclosed, else by Lanczos, where a
+    /// Both ends of one operator of eigenvalues of size `scale`: by a vector that attains a proven bound, else enclosed, else by Lanczos, where a
     /// less accurate enclosure may still tell the multiplicity.
     fn operator_ends<T: Scalar>(
         &self,
         matrix: &Matrix<'_, T>,
         (least, greatest): (f64, f64),
+        scale: f64,
         enclose: &impl Fn(Operator, End) -> Result<Option<Estimate>>,
         applications: &mut usize,
     ) -> Result<(Estimate, Estimate)> {
@@ -356,16 +366,17 @@ impl Known {
             *applications += 1;
             let (value, residual) = rayleigh(matrix, x);
             // Within rounding of the bound, as a value and as an eigenvector.
-            let rounding = 64.0 * f64::EPSILON;
-            let attains = (value - bound).abs() <= rounding && residual <= rounding.sqrt() * 1e-3;
+            let relative = 64.0 * f64::EPSILON;
+            let rounding = relative * scale;
+            let attains = (value - bound).abs() <= rounding && residual <= relative.sqrt() * 1e-3 * scale;
             attains.then_some(Estimate { value, residual, error: rounding, source: Source::Proven, multiplicity })
         };
-        let once = exactly(self.components);
-        let low = attained(least, &self.signs, self.alternation_is_all.then_some(once));
-        // No entry is negative and rows of A sum to 1: a positive eigenvector belongs to the largest eigenvalue, once
-        // in each component (Perron, Frobenius).
+        let once = self.components.map(exactly);
+        let low = attained(least, &self.signs, once.filter(|_| self.alternation_is_all));
+        // Where no entry is negative, a positive eigenvector belongs to the largest eigenvalue, once in each component
+        // (Perron, Frobenius).
         let constant = vec![1.0; self.signs.len()];
-        let high = attained(greatest, &constant, Some(once));
+        let high = attained(greatest, &constant, once);
         let mut iterate = |end: End, known: Option<Estimate>| -> Result<Estimate> {
             if let Some(known) = known {
                 return Ok(known);
@@ -374,16 +385,17 @@ impl Known {
             if let Some(enclosed) = enclosed.filter(|e| e.error <= 1.01 * ACCURACY * e.value.abs()) {
                 return Ok(enclosed);
             }
-            let (ends, start) = match end {
-                End::Lowest => {
-                    let mut rng = ChaCha8Rng::seed_from_u64(0x5370_6563);
-                    let random = || rng.random_range(-1.0..1.0);
-                    let start = std::iter::repeat_with(random).take(matrix.len());
-                    (lanczos::Wanted::Lowest, start.collect())
-                }
+            let ends = match end {
+                End::Lowest => lanczos::Wanted::Lowest,
+                End::Highest => lanczos::Wanted::Highest,
+            };
+            let start = if end == End::Highest && self.components.is_some() {
                 // Positive, so with a part in the positive eigenvector that belongs to the largest eigenvalue of each
                 // component; and of all the symmetries that this one has, which leaves fewer values near it.
-                End::Highest => (lanczos::Wanted::Highest, constant.clone()),
+                constant.clone()
+            } else {
+                let mut rng = ChaCha8Rng::seed_from_u64(0x5370_6563);
+                std::iter::repeat_with(|| rng.random_range(-1.0..1.0)).take(matrix.len()).collect()
             };
             let limits = lanczos::Limits { tolerance: ACCURACY, max_steps: STEPS, least_weight: 0.0, ends };
             let run = lanczos::extremes(matrix, start, limits)?;
@@ -405,10 +417,8 @@ impl Known {
 }
 
 /// A sign for every vertex, alternating along the heaviest couplings of each row in a breadth-first search: the
-/// two-colouring of the edges' graph on quads, where an edge couples four times as much as a face's diagonal. And
-/// the number of components.
-fn alternating(m: &Csr) -> (Vec<f64>, usize) {
-    let mut components = 0;
+/// two-colouring of the edges' graph on quads, where an edge couples four times as much as a face's diagonal.
+fn alternating(m: &Csr) -> Vec<f64> {
     let mut sign = vec![0.0; m.len()];
     let mut queue: Vec<u32> = Vec::with_capacity(m.len());
     for seed in 0..m.len() {
@@ -416,7 +426,6 @@ fn alternating(m: &Csr) -> (Vec<f64>, usize) {
             continue;
         }
         sign[seed] = 1.0;
-        components += 1;
         let mut next = queue.len();
         queue.push(seed as u32);
         while let Some(&i) = queue.get(next) {
@@ -432,7 +441,30 @@ fn alternating(m: &Csr) -> (Vec<f64>, usize) {
             }
         }
     }
-    (sign, components)
+    sign
+}
+
+/// The number of sets of rows that no entry couples to each other.
+fn components(m: &Csr) -> usize {
+    let mut count = 0;
+    let mut seen = vec![false; m.len()];
+    let mut waiting = Vec::new();
+    for seed in 0..m.len() {
+        if seen[seed] {
+            continue;
+        }
+        seen[seed] = true;
+        count += 1;
+        waiting.push(seed);
+        while let Some(i) = waiting.pop() {
+            for (j, _) in m.row(i).filter(|e| e.1 != 0.0) {
+                if !std::mem::replace(&mut seen[j], true) {
+                    waiting.push(j);
+                }
+            }
+        }
+    }
+    count
 }
 
 /// The ends of the part of the spectrum that the run from V = P excites: Lanczos from the first differences

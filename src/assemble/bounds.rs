@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::csr::Csr;
 use super::scheme::{Scheme, loop_beta, sqrt3_beta};
 
 /// Entries of one task.
@@ -14,7 +15,8 @@ pub struct SpectralBounds {
     /// A lower bound of the smallest eigenvalue of A. 0 says: non-negative, no more (a vertex of valence 3 under
     /// Catmull-Clark); negative: nothing is proven about the sign.
     pub lambda_min: f64,
-    /// The largest eigenvalue of A, attained by the constant vector.
+    /// An upper bound of the largest eigenvalue of A; of a scheme's matrix the eigenvalue itself, attained by the constant
+    /// vector.
     pub lambda_max: f64,
     /// A lower bound of the smallest eigenvalue of D⁻¹A, of the sign of `lambda_min` where that is not negative.
     pub jacobi_lambda_min: f64,
@@ -37,6 +39,48 @@ impl SpectralBounds {
         }
     }
 
+    /// Gershgorin's bounds for A = H·M and D⁻¹A, H = diag(h) positive, M any symmetric matrix with a positive diagonal.
+    ///
+    /// A is similar to S = H^½ M H^½, so its eigenvalues are real and each lies in a disc around some a_ii with the sum
+    /// of |entries| beside the diagonal as radius: of the rows of A, of its columns, and of the rows of S alike (S has
+    /// the spectrum of both). So of the three, whose radii are `h_i Σ|m_ij|`, `Σ h_j|m_ij|` and `√h_i Σ √h_j|m_ij|`, the
+    /// best bound holds on either side. D⁻¹A is similar to Dm^-½ M Dm^-½, Dm = diag M: the same with 1/m_ii for h_i. All
+    /// radii are widened by more than rounding can have taken from them. O(entries).
+    ///
+    /// With h = 1, rows and columns are the same; for rows of A that sum to 1 without a negative entry this is
+    /// [`gershgorin`](Self::gershgorin) of the diagonal but for the last digits.
+    ///
+    /// # Panics
+    /// If there is not one weight a row.
+    ///
+    /// ```
+    /// use limitlab::assemble::bounds::SpectralBounds;
+    /// use limitlab::assemble::Csr;
+    /// use nalgebra_sparse::{CooMatrix, CsrMatrix};
+    ///
+    /// // −x'' on four points: eigenvalues 2 − 2 cos(kπ/5).
+    /// let mut m = CooMatrix::new(4, 4);
+    /// for i in 0..4 {
+    ///     m.push(i, i, 2.0);
+    ///     if i > 0 {
+    ///         m.push(i, i - 1, -1.0);
+    ///         m.push(i - 1, i, -1.0);
+    ///     }
+    /// }
+    /// let m = Csr::try_from(&CsrMatrix::from(&m))?;
+    /// let bounds = SpectralBounds::of_parts(&[1.0; 4], &m);
+    /// assert!((bounds.lambda_max - 4.0).abs() < 1e-13 && bounds.lambda_min.abs() < 1e-13);
+    /// assert!((bounds.jacobi_lambda_max - 2.0).abs() < 1e-13);
+    /// # Ok::<(), limitlab::Error>(())
+    /// ```
+    pub fn of_parts(h: &[f64], m: &Csr) -> Self {
+        assert_eq!(h.len(), m.len(), "one weight a row");
+        let (lambda_min, lambda_max) = discs(h, m);
+        let inverse: Vec<f64> = m.diagonal().iter().map(|d| 1.0 / d).collect();
+        let (jacobi_lambda_min, jacobi_lambda_max) = discs(&inverse, m);
+        SpectralBounds { lambda_min, lambda_max, jacobi_lambda_min, jacobi_lambda_max }
+    }
+
     /// The bounds on a closed mesh. All schemes have `M ⪰ H⁻¹ diag(b)` with b_i = [`lambda_min_at`] of the valence,
     /// so `λ(A) ≥ min b_i` and, D being `H diag M`, `λ(D⁻¹A) ≥ min b_i/a_ii`. O(N).
     pub fn closed(scheme: Scheme, valences: &[u32], triangles_only: bool, diagonal: &[f64]) -> Self {
@@ -53,6 +97,38 @@ impl SpectralBounds {
         bounds.jacobi_lambda_min = jacobi.min(bounds.jacobi_lambda_max);
         bounds
     }
+}
+
+/// The least and the greatest eigenvalue that Gershgorin's discs allow diag(h)·M to have.
+fn discs(h: &[f64], m: &Csr) -> (f64, f64) {
+    let roots: Vec<f64> = h.iter().map(|h| h.sqrt()).collect();
+    let ends = |i: usize| {
+        let (mut centre, mut by_row, mut by_column, mut symmetric) = (0.0, 0.0, 0.0, 0.0);
+        for (j, value) in m.row(i) {
+            if i == j {
+                centre = h[i] * value;
+            } else {
+                by_row += value.abs();
+                by_column += h[j] * value.abs();
+                symmetric += roots[j] * value.abs();
+            }
+        }
+        let count = m.row(i).len() as f64;
+        [h[i] * by_row, by_column, roots[i] * symmetric].map(|radius| {
+            let rounding = (count + 8.0) * f64::EPSILON * (radius + centre.abs());
+            [centre - radius - rounding, centre + radius + rounding]
+        })
+    };
+    // f64::min and max would drop a NaN.
+    let least = |a: f64, b: f64| if a.is_nan() || a <= b { a } else { b };
+    let greatest = |a: f64, b: f64| if a.is_nan() || a >= b { a } else { b };
+    let all = (0..m.len()).into_par_iter().with_min_len(CHUNK).map(ends).reduce(
+        || [[f64::INFINITY, f64::NEG_INFINITY]; 3],
+        |a, b| std::array::from_fn(|k| [least(a[k][0], b[k][0]), greatest(a[k][1], b[k][1])]),
+    );
+    let best =
+        |end: fn(&[f64; 2]) -> f64, choose: fn(f64, f64) -> f64| all.iter().map(end).reduce(choose).unwrap_or(0.0);
+    (best(|e| e[0], f64::max), best(|e| e[1], f64::min))
 }
 
 /// What a vertex of valence n ≥ 3 allows λ_min(A) to be on a closed mesh.

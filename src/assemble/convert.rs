@@ -32,7 +32,7 @@ use faer::Index;
 use faer::sparse::{SparseColMat, SparseRowMat, SymbolicSparseColMat, SymbolicSparseRowMat};
 use nalgebra_sparse::CsrMatrix;
 
-use super::csr::{Csr, Pattern};
+use super::csr::{Csr, Pattern, too_many};
 use crate::error::{Error, Result};
 
 /// Refuses shapes and sizes that [`Csr`] cannot hold.
@@ -41,9 +41,7 @@ pub(super) fn check_size(rows: usize, columns: usize, entries: usize) -> Result<
         return Err(Error::Matrix(format!("a matrix of {rows} rows and {columns} columns: it must be square")));
     }
     if rows.max(entries) > u32::MAX as usize {
-        return Err(Error::Matrix(format!(
-            "a matrix of {rows} rows and {entries} entries: 32-bit indices hold 4294967295 of either, no more"
-        )));
+        return Err(too_many(rows.max(entries)));
     }
     Ok(())
 }
@@ -206,7 +204,7 @@ mod tests {
         check_size(most, most, most).unwrap();
         for (n, entries) in [(most + 1, 0), (2, most + 1)] {
             let error = check_size(n, n, entries).unwrap_err().to_string();
-            assert!(error.ends_with("32-bit indices hold 4294967295 of either, no more"), "{error}");
+            assert!(error.ends_with("32-bit indices hold 4294967295, no more"), "{error}");
         }
     }
 }

@@ -5,6 +5,8 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::error::{Error, Result};
+
 /// Rows of one task.
 const CHUNK: usize = 4096;
 
@@ -77,6 +79,26 @@ impl Csr {
     pub fn new(pattern: Arc<Pattern>, values: Vec<f64>) -> Self {
         assert_eq!(pattern.columns.len(), values.len(), "one value for every entry");
         Csr { pattern, values }
+    }
+
+    /// The matrix of these rows, each of ascending (column, value).
+    ///
+    /// # Errors
+    /// More than 2³² − 1 entries.
+    ///
+    /// # Panics
+    /// If the columns of a row do not ascend within the matrix.
+    pub(super) fn from_sorted_rows<R: Iterator<Item = (u32, f64)>>(rows: impl Iterator<Item = R>) -> Result<Csr> {
+        let (mut offsets, mut columns, mut values) = (vec![0u32], Vec::new(), Vec::new());
+        for row in rows {
+            for (j, value) in row {
+                columns.push(j);
+                values.push(value);
+            }
+            let end = u32::try_from(columns.len()).map_err(|_| too_many(columns.len()))?;
+            offsets.push(end);
+        }
+        Ok(Csr::new(Arc::new(Pattern::new(offsets, columns)), values))
     }
 
     /// The number of rows N.
@@ -205,4 +227,9 @@ impl Csr {
         let columns = &self.pattern.columns[range.clone()];
         columns.iter().zip(&self.values[range]).map(|(&j, &a)| a * x[j as usize]).sum()
     }
+}
+
+/// The error of so many rows or entries.
+pub(super) fn too_many(count: usize) -> Error {
+    Error::Matrix(format!("a matrix with {count} rows or entries: 32-bit indices hold 4294967295, no more"))
 }

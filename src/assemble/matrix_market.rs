@@ -1,9 +1,13 @@
-//! Matrix Market export: coordinate format for sparse matrices, array format for vectors and points.
+//! Matrix Market files (Boisvert, Pozo, Remington, NIST 1996): coordinate format for sparse matrices, array format for
+//! vectors and points; the [reader](mod@read) takes what other programs write too.
+
+pub mod read;
 
 use std::io::{self, Write};
 
 use glam::DVec3;
 
+pub use self::read::{is_missing, read_matrix, read_points, read_system, read_vector};
 use super::csr::Csr;
 
 /// Writes `matrix` as `matrix coordinate real general`, entries by rows, 17 significant digits.

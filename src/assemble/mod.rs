@@ -1,5 +1,5 @@
 //! From a mesh to its limit system `A V = P`: the schemes as four small functions, one generic assembler into
-//! own compressed sparse rows, proven bounds from valences and face sizes, Matrix Market export.
+//! own compressed sparse rows, proven bounds from valences and face sizes, Matrix Market files; systems of other origin.
 //! This room knows no solvers.
 
 pub mod bounds;
@@ -8,6 +8,7 @@ pub mod convert;
 pub mod csr;
 pub mod matrix_market;
 pub mod operator;
+mod parts;
 pub mod polygons;
 mod rows;
 pub mod scheme;

@@ -18,18 +18,18 @@ const CHUNK: usize = 8192;
 /// The limit system `A V = P` of one mesh: `A = H·M` explicitly, with both factors.
 ///
 /// V and P are N×3. `M V = H⁻¹P` is the same system with a symmetric matrix; for Zheng-Cai it is their Eq. 6,
-/// entry by entry (right-hand side `2m·I`).
+/// entry by entry (right-hand side `2m·I`). A system of other origin is made [from its parts](Self::from_parts).
 #[derive(Clone, Debug)]
 pub struct LimitSystem {
     /// The diagonal of H, positive.
     pub h: Vec<f64>,
     /// M, symmetric to the last bit.
     pub m: Csr,
-    /// A = H·M; every row sums to 1.
+    /// A = H·M; every row sums to 1 if it is that of a scheme.
     pub a: Csr,
     /// diag A.
     pub diagonal: Vec<f64>,
-    /// What valences and face sizes prove about the spectrum of A.
+    /// What is proven about the spectrum of A: by valences and face sizes, or by the entries.
     pub bounds: SpectralBounds,
 }
 

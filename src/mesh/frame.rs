@@ -48,7 +48,18 @@ impl Frame {
             let within = (0.5 * middle).min(2.0 * middle) <= lo && hi <= (0.5 * middle).max(2.0 * middle);
             if within && middle.abs() >= FAR * reach { middle } else { 0.0 }
         };
-        let centre = DVec3::new(centre(0), centre(1), centre(2));
+        Frame::around(DVec3::new(centre(0), centre(1), centre(2)), points, (lo, hi))
+    }
+
+    /// As [`of`](Self::of), without another origin: for data that are no places, whose sums need not stay where they are.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn of_size(points: &[DVec3]) -> Result<Frame, usize> {
+        bounding_box(points).map_or(Ok(Frame::IDENTITY), |ends| Frame::around(DVec3::ZERO, points, ends))
+    }
+
+    fn around(centre: DVec3, points: &[DVec3], (lo, hi): (DVec3, DVec3)) -> Result<Frame, usize> {
         let largest = (lo - centre).abs().max((hi - centre).abs()).max_element();
         let scale = if largest == 0.0 || ORDINARY.contains(&largest) { 1.0 } else { magnitude(largest) };
         let frame = Frame { centre, scale };

@@ -20,7 +20,6 @@ mod obj_normals;
 pub mod off;
 pub mod order;
 pub mod ply;
-pub(crate) mod text;
 pub mod topology;
 pub mod validate;
 pub mod vertex_data;
@@ -213,11 +212,16 @@ impl Mesh {
         self.positions.is_empty()
     }
 
-    /// The diagonal of the axis-parallel bounding box: the length L that relative tolerances refer to. Points
-    /// that are not finite do not count; 0 for no points.
+    /// The [`diagonal`] of its positions.
     pub fn diagonal(&self) -> f64 {
-        bounding_box(&self.positions).map_or(0.0, |(lo, hi)| frame::distance(lo, hi))
+        diagonal(&self.positions)
     }
+}
+
+/// The diagonal of the axis-parallel bounding box of points: the length L that relative tolerances refer to. Points
+/// that are not finite do not count; 0 for no points.
+pub fn diagonal(points: &[DVec3]) -> f64 {
+    bounding_box(points).map_or(0.0, |(lo, hi)| frame::distance(lo, hi))
 }
 
 /// The corners of the smallest axis-parallel box around all finite points.

@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::Mesh;
 use super::io::{Builder, Lines, Loaded, check_normals, write_rows};
 use super::magic::other_kind;
-use super::text::{Scanner, continues_line, leading_digits, push_point, push_unsigned};
+use crate::text::{Scanner, continues_line, leading_digits, push_point, push_unsigned};
 use crate::{Error, Result};
 
 /// Statements that are read over, by what they are about.

@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::obj::{corner_references, skip_blanks, skip_statement};
-use super::text::Scanner;
+use crate::text::Scanner;
 use crate::{Error, Result};
 
 /// The normal of each of the `vertices`, zero for one without; as in the file, not normalised. `None` if no corner has

@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::Mesh;
 use super::io::{Builder, Lines, Loaded, check_normals, write_rows};
 use super::magic::other_kind;
-use super::text::{Scanner, push_point, push_unsigned, quoted};
+use crate::text::{Scanner, push_point, push_unsigned, quoted};
 use crate::{Error, Result};
 
 /// What a vertex holds besides its position, by the letters before `OFF`.

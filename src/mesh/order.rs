@@ -85,13 +85,29 @@ impl fmt::Display for Order {
 }
 
 impl Order {
+    /// The numbers below `count` in this order, if it goes by the numbers alone.
+    pub fn of_numbers(&self, count: usize) -> Option<Vec<u32>> {
+        let file = 0..count as u32;
+        match *self {
+            Order::File => Some(file.collect()),
+            Order::Reverse => Some(file.rev().collect()),
+            Order::Random(seed) => {
+                let mut order: Vec<u32> = file.collect();
+                order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+                Some(order)
+            }
+            Order::Bfs | Order::Rcm | Order::Morton | Order::Valence | Order::Multicolour => None,
+        }
+    }
+
     /// The vertices of `mesh` in this order. O(corners), but for the sort of `Morton` and, within the
     /// neighbours of each vertex, of `Rcm`.
     pub fn order(&self, mesh: &Mesh, incidence: &Incidence) -> Vec<u32> {
+        if let Some(order) = self.of_numbers(mesh.len()) {
+            return order;
+        }
         let file = 0..mesh.len() as u32;
         match *self {
-            Order::File => file.collect(),
-            Order::Reverse => file.rev().collect(),
             Order::Bfs => breadth_first(&mesh.faces, incidence),
             Order::Rcm => reverse_cuthill_mckee(&mesh.faces, incidence),
             Order::Morton => morton(&mesh.positions),
@@ -106,11 +122,7 @@ impl Order {
                 order.sort_by_key(|&v| colour[v as usize]);
                 order
             }
-            Order::Random(seed) => {
-                let mut order: Vec<u32> = file.collect();
-                order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
-                order
-            }
+            Order::File | Order::Reverse | Order::Random(_) => unreachable!("these go by the numbers"),
         }
     }
 }

@@ -7,8 +7,8 @@ use glam::DVec3;
 
 use super::Mesh;
 use super::io::{Builder, Lines, Loaded, check_normals};
-use super::text::Scanner;
 use crate::Result;
+use crate::text::Scanner;
 
 mod header;
 mod values;

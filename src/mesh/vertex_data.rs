@@ -6,8 +6,8 @@ use glam::DVec3;
 
 use super::io::{self, has_mesh_ending};
 use super::magic;
-use super::text::{Scanner, quoted};
 use crate::error::{Error, Result};
+use crate::text::{Scanner, quoted};
 
 /// Reads `LIST|FILE` of vertices: numbers and ranges `A..B` (both ends included), separated by commas or white
 /// space; in a file `#` starts a comment. One mark a vertex comes back.

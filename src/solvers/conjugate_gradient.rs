@@ -56,7 +56,7 @@ pub struct ConjugateGradient<'a, S> {
     next_rho: Option<f64>,
     recursive: Option<Errors>,
     /// An estimate of how far rounding has taken the recurrence from the true residual since the last product:
-    /// each update of V by d leaves a few ε‖d‖₂, as ‖A‖_∞ = 1. Large where V grows: on singular systems.
+    /// each update of V by d leaves a few ελ_max‖d‖₂. Large where V grows: on singular systems.
     drift: f64,
     rows: Rows,
 }
@@ -203,7 +203,7 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
         }
         self.rho = Some(rho);
         self.recursive = Some(totals.errors);
-        self.drift += 4.0 * f64::EPSILON * alpha * squares.dot.sqrt();
+        self.drift += 4.0 * f64::EPSILON * self.system.lambda_max() * alpha * squares.dot.sqrt();
         Ok(())
     }
 

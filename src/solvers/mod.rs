@@ -17,6 +17,6 @@ pub mod ssor;
 pub mod system;
 pub mod wavefront;
 
-pub use iteration::{Errors, Iterate, Outcome, Report, Step, Stop, solve};
+pub use iteration::{Errors, Failure, Iterate, Outcome, Report, Step, Stop, solve};
 pub use method::{Method, Setup, Solution, run, run_watched};
 pub use system::System;

@@ -8,8 +8,7 @@ use rayon::prelude::*;
 use super::iteration::Errors;
 use crate::assemble::{LimitSystem, Operator};
 
-/// The matrix A of a limit system: A = H·M with H = diag(weights) positive, M symmetric, and rows of A that sum
-/// to 1.
+/// The matrix A of a limit system: A = H·M with H = diag(weights) positive and M symmetric.
 pub trait System: Sync {
     /// The number of unknown points N.
     fn len(&self) -> usize;
@@ -23,6 +22,9 @@ pub trait System: Sync {
 
     /// The diagonal of A.
     fn diagonal(&self) -> &[f64];
+
+    /// An upper bound of the eigenvalues of A, which tells its scale: 1 for a scheme's matrix, whose rows sum to 1.
+    fn lambda_max(&self) -> f64;
 
     /// Row `i` of the product, (A x)_i. In-place relaxation calls it while `x` changes.
     fn row(&self, i: usize, x: &[DVec3]) -> DVec3;
@@ -62,6 +64,10 @@ impl System for LimitSystem {
         &self.diagonal
     }
 
+    fn lambda_max(&self) -> f64 {
+        self.bounds.lambda_max
+    }
+
     #[inline]
     fn row(&self, i: usize, x: &[DVec3]) -> DVec3 {
         self.a.row_times(i, x)
@@ -79,6 +85,10 @@ impl System for Operator {
 
     fn diagonal(&self) -> &[f64] {
         Operator::diagonal(self)
+    }
+
+    fn lambda_max(&self) -> f64 {
+        self.bounds().lambda_max
     }
 
     #[inline]

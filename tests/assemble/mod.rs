@@ -5,5 +5,6 @@ mod brute_force;
 mod convert;
 mod files;
 mod formulas;
+mod matrix_market;
 mod refusals;
 mod spectra;

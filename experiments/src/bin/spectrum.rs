@@ -1,4 +1,4 @@
-//! Extreme or all eigenvalues, proven bounds, singularity: `spectrum [MESH…]`.
+//! Extreme or all eigenvalues, proven bounds, singularity: `spectrum [MESH|SYSTEM_DIR…]`.
 
 use std::process::ExitCode;
 
@@ -11,26 +11,32 @@ use limitlab::analysis::certificate::{Certificate, certify};
 use limitlab::analysis::comparison::{SOR_OMEGA, SSOR_OMEGA};
 use limitlab::analysis::dense;
 use limitlab::analysis::eigen::End;
+use limitlab::analysis::lanczos::Scalar;
 use limitlab::analysis::promise::{Counts, Promise};
 use limitlab::analysis::radius::{SpectralRadius, spectral_radius};
 use limitlab::analysis::singularity::{Mode, Singularity, modes};
-use limitlab::analysis::spectrum::{Ends, Estimate, Extremes, Operator, Spectrum, excited, mesh_ends};
+use limitlab::analysis::spectrum::{Ends, Estimate, Extremes, Operator, Spectrum, ends, excited, mesh_ends};
 use limitlab::assemble::LimitSystem;
 use limitlab::assemble::bounds::SpectralBounds;
-use limitlab::solvers::Method;
+use limitlab::solvers::direct::SINGULAR;
 use limitlab::solvers::gauss_seidel::sweep;
 use limitlab::solvers::ssor::symmetric_sweep;
-use limitlab_experiments::cli::{self, CommonFlags, Input, MeshFlags, OutputFlags, Progress, StopFlags, number};
+use limitlab::solvers::{Method, Stop, System};
+use limitlab_experiments::cli::{
+    self, CommonFlags, Given, Input, MeshFlags, OutputFlags, Progress, StopFlags, Subject, number,
+};
 use limitlab_experiments::report::series::Bars;
 use limitlab_experiments::report::{Column, Figure, LinePlot, Rule, Table};
 
 /// The ends of the spectra of A and D⁻¹A and the spectral radius of each method's error matrix, with proven bounds
-/// beside them, and whether the system is singular.
+/// beside them, and whether the system is singular. A folder is taken for a system of anybody, as `compare-solvers` does:
+/// then the bounds are those of its entries, and singular is what rounding cannot tell from it.
 #[derive(Parser)]
 #[command(name = "spectrum", version)]
 struct Arguments {
-    /// Mesh files (.obj, .off, .ply) or built-in names; unless told, four built-in ones with --noise 0.1
-    #[arg(value_name = "MESH")]
+    /// Mesh files (.obj, .off, .ply), built-in names, or folders with M.mtx, H.mtx and P.mtx; unless told, four
+    /// built-in ones with --noise 0.1
+    #[arg(value_name = "MESH|SYSTEM_DIR")]
     meshes: Vec<String>,
     /// Compute all eigenvalues (up to 4000 vertices), with a histogram
     #[arg(long)]
@@ -70,13 +76,14 @@ fn main() -> ExitCode {
     })
 }
 
-/// All that is known of one mesh.
+/// All that is known of one mesh, or of a system without one.
 struct Findings {
     bounds: SpectralBounds,
     ends: Ends,
     full: Option<dense::Eigenvalues>,
     sweeps: Vec<(Method, f64, SpectralRadius)>,
-    verdict: Singularity,
+    /// What theory says of a mesh.
+    verdict: Option<Singularity>,
     promise: Promise,
     /// `None` where all points coincide.
     counts: Option<Counts>,
@@ -88,6 +95,22 @@ struct Findings {
 impl Findings {
     fn spectrum(&self) -> Spectrum {
         self.ends.spectrum()
+    }
+
+    /// How many null vectors there are: by theory on a mesh, else as far as rounding tells.
+    fn kernel_dimension(&self, n: usize) -> Option<usize> {
+        match &self.verdict {
+            Some(verdict) => Some(verdict.kernel_dimension()),
+            None if self.is_singular(n) => self.ends.lambda_min.multiplicity.map(|m| m.count),
+            None => Some(0),
+        }
+    }
+
+    fn is_singular(&self, n: usize) -> bool {
+        match &self.verdict {
+            Some(verdict) => verdict.is_singular(),
+            None => self.ends.lambda_min.value.abs() <= SINGULAR * n as f64 * f64::EPSILON * self.bounds.lambda_max,
+        }
     }
 
     /// Method, its parameter, the spectral radius of its error matrix or its factor per iteration.
@@ -122,10 +145,18 @@ fn run(arguments: &Arguments) -> Result<()> {
     arguments.output.prepare()?;
     let mut results = Vec::new();
     for name in &arguments.meshes {
-        let input = arguments.mesh.input(name, &arguments.common)?;
-        let findings = analyse(&input, arguments)?;
+        let (subject, findings, n) = match arguments.mesh.given(name)? {
+            Some(given) => {
+                let findings = analyse_given(&given, arguments)?;
+                (given.subject, findings, given.points.len())
+            }
+            None => {
+                let input = arguments.mesh.input(name, &arguments.common)?;
+                (input.subject(), analyse(&input, arguments)?, input.mesh.len())
+            }
+        };
         let out = &arguments.output.out;
-        let tables = [eigenvalue_table(&input, &findings), radius_table(&input, &findings)];
+        let tables = [eigenvalue_table(&subject, &findings, n), radius_table(&subject, &findings)];
         for table in &tables {
             table.write(out)?;
             if !arguments.output.json {
@@ -133,72 +164,57 @@ fn run(arguments: &Arguments) -> Result<()> {
             }
         }
         if let Some(full) = &findings.full {
-            full_table(&input, full).write(out)?;
-            let png = out.join(format!("{}.png", input.stem("spectrum-histogram")));
-            histogram(&input, full, &findings.promise).render()?.save(&png)?;
+            full_table(&subject, full).write(out)?;
+            let png = out.join(format!("{}.png", subject.stem("spectrum-histogram")));
+            histogram(&subject, full, &findings.promise).render()?.save(&png)?;
         }
         if !findings.modes.is_empty() {
-            mode_table(&input, &findings.modes).write(out)?;
+            mode_table(&subject, &findings.modes).write(out)?;
         }
-        results.push(json(&input, &findings));
+        results.push(json(&subject, &findings, n));
     }
     cli::finish(&results, &arguments.output, &arguments.common)
 }
 
-fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
-    let with_name = |e: limitlab::Error| limitlab::Error::mesh(&input.name, e.to_string());
-    // Only some of what can be asked for needs entries.
-    let explicit = arguments.full || !arguments.no_sweeps || arguments.modes > 0 || arguments.certify;
-    let system = explicit.then(|| input.system()).transpose()?;
-    let operator =
-        limitlab::assemble::Operator::new(&input.mesh.faces, input.topology(), input.scheme).map_err(with_name)?;
-    let progress = Progress::new(&input.name, 5, arguments.common.quiet);
-    let verdict = Singularity::detect(&input.mesh, input.topology(), input.scheme);
-    let promise = Promise::new(&operator.bounds());
-    let counts = match input.stop(&arguments.stop) {
-        Ok(stop) => Some(promise.counts(&operator, &input.mesh.positions, stop.tolerance)),
+/// All findings: from `acting`, and where entries are asked for, from `system`, which is the same with entries.
+fn analyse_any(
+    system: Option<&LimitSystem>,
+    acting: &(impl System + Scalar),
+    points: &[DVec3],
+    parts: Parts,
+    progress: &Progress,
+    arguments: &Arguments,
+) -> Result<Findings> {
+    let Parts { name, bounds, verdict, stop, ends } = parts;
+    let promise = Promise::new(&bounds);
+    let counts = match stop {
+        Ok(stop) => Some(promise.counts(acting, points, stop.tolerance)),
         Err(error) => {
             arguments.common.remark(format_args!("no iterations are promised: {error}"));
             None
         }
     };
-    let full = match &system {
-        Some(system) if arguments.full => Some(dense::full_eigenvalues(system).map_err(with_name)?),
-        _ => None,
-    };
+    let full = system.filter(|_| arguments.full).map(dense::full_eigenvalues).transpose()?;
     progress.step();
-    let ends = mesh_ends(&input.mesh, input.topology(), input.scheme).map_err(with_name)?;
+    let ends = ends()?;
     if !ends.converged() {
         arguments.common.remark(format_args!(
-            "{}: an end of the spectrum is the edge of a dense band; its error is in the table",
-            input.name
+            "{name}: an end of the spectrum is the edge of a dense band; its error is in the table"
         ));
     }
     progress.step();
-    let sweeps = match &system {
-        Some(system) if !arguments.no_sweeps => radii_of_sweeps(system).map_err(with_name)?,
-        _ => Vec::new(),
-    };
+    let sweeps = system.filter(|_| !arguments.no_sweeps).map(radii_of_sweeps).transpose()?.unwrap_or_default();
     progress.step();
-    let points = &input.mesh.positions;
     let data = if arguments.no_data {
         [None; 2]
     } else {
-        [
-            excited(&operator, points, Operator::A).map_err(with_name)?,
-            excited(&operator, points, Operator::Jacobi).map_err(with_name)?,
-        ]
+        [excited(acting, points, Operator::A)?, excited(acting, points, Operator::Jacobi)?]
     };
-    let modes = match &system {
-        Some(system) if arguments.modes > 0 => {
-            let count = arguments.modes.into();
-            modes(system, Operator::A, End::Lowest, count).map_err(with_name)?
-        }
-        _ => Vec::new(),
-    };
+    let count = arguments.modes.into();
+    let modes = system.filter(|_| count > 0).map(|s| modes(s, Operator::A, End::Lowest, count)).transpose()?;
     progress.step();
     let mut certificates = [None; 4];
-    if let Some(system) = system.as_ref().filter(|_| arguments.certify) {
+    if let Some(system) = system.filter(|_| arguments.certify) {
         let Spectrum { a, jacobi } = ends.spectrum();
         for (slot, (which, end, estimate)) in certificates.iter_mut().zip([
             (Operator::A, End::Lowest, a.min),
@@ -206,11 +222,48 @@ fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
             (Operator::Jacobi, End::Lowest, jacobi.min),
             (Operator::Jacobi, End::Highest, jacobi.max),
         ]) {
-            *slot = certify(system, which, end, estimate).map_err(with_name)?;
+            *slot = certify(system, which, end, estimate)?;
         }
     }
     progress.step();
-    Ok(Findings { bounds: operator.bounds(), ends, full, sweeps, verdict, promise, counts, data, modes, certificates })
+    let modes = modes.unwrap_or_default();
+    Ok(Findings { bounds, ends, full, sweeps, verdict, promise, counts, data, modes, certificates })
+}
+
+/// What is known otherwise of a mesh and of a system without one.
+struct Parts<'a> {
+    name: &'a str,
+    bounds: SpectralBounds,
+    verdict: Option<Singularity>,
+    stop: Result<Stop>,
+    ends: &'a dyn Fn() -> Result<Ends>,
+}
+
+fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
+    // Only some of what can be asked for needs entries.
+    let explicit = arguments.full || !arguments.no_sweeps || arguments.modes > 0 || arguments.certify;
+    let system = explicit.then(|| input.system()).transpose()?;
+    let (mesh, topology) = (&input.mesh, input.topology());
+    let operator =
+        limitlab::assemble::Operator::new(&mesh.faces, topology, input.scheme).map_err(|e| input.named(e))?;
+    let progress = Progress::new(&input.name, 5, arguments.common.quiet);
+    let parts = Parts {
+        name: &input.name,
+        bounds: operator.bounds(),
+        verdict: Some(Singularity::detect(mesh, topology, input.scheme)),
+        stop: input.stop(&arguments.stop),
+        ends: &|| mesh_ends(mesh, topology, input.scheme),
+    };
+    analyse_any(system.as_ref(), &operator, &mesh.positions, parts, &progress, arguments).map_err(|e| input.named(e))
+}
+
+fn analyse_given(given: &Given, arguments: &Arguments) -> Result<Findings> {
+    let Given { subject, system, points, .. } = given;
+    let progress = Progress::new(&subject.name, 5, arguments.common.quiet);
+    let stop = given.stop(&arguments.stop);
+    let parts = Parts { name: &subject.name, bounds: system.bounds, verdict: None, stop, ends: &|| ends(system) };
+    let found = analyse_any(Some(system), system, points, parts, &progress, arguments);
+    found.map_err(|e| limitlab::Error::mesh(&subject.name, e.to_string()))
 }
 
 fn radii_of_sweeps(system: &LimitSystem) -> Result<Vec<(Method, f64, SpectralRadius)>> {
@@ -226,10 +279,10 @@ fn radii_of_sweeps(system: &LimitSystem) -> Result<Vec<(Method, f64, SpectralRad
     ])
 }
 
-fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
+fn eigenvalue_table(subject: &Subject, found: &Findings, n: usize) -> Table {
     let mut table = Table::new(
-        input.stem("spectrum"),
-        format!("Spectrum of {} under {}", input.label, input.scheme),
+        subject.stem("spectrum"),
+        format!("Spectrum of {}", subject.title),
         vec![
             Column::key("quantity"),
             Column::number("value", 1e-7, 10),
@@ -243,40 +296,18 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
             Column::number("excited_by_data", 1e-3, 6),
         ],
     );
-    let kernel = found.verdict.kernel_dimension();
-    let mut text = format!(
-        "{} vertices, {} faces, {} components; {}",
-        input.mesh.len(),
-        input.mesh.faces.len(),
-        found.verdict.components,
-        if kernel > 0 {
-            format!(
-                "**singular**: {kernel} components (the first begins at vertex {}) have all valences 3 and a \
-                 bipartite graph, the null vectors are their ±1 colourings, and the points {} a part that no control \
-                 points reach.",
-                found.verdict.singular[0].first_vertex,
-                if found.verdict.excited { "have" } else { "do not have" }
-            )
-        } else {
-            "non-singular: no component with all valences 3 and a bipartite graph, or a scheme that never is.".into()
-        }
-    );
-    if kernel > 0 {
-        text += &format!(
-            " PIA {}; Gauss-Seidel {}; Cholesky {}.",
-            found.verdict.prediction(Method::Pia).name(),
-            found.verdict.prediction(Method::GaussSeidel).name(),
-            found.verdict.prediction(Method::Cholesky).name()
-        );
-    }
-    table.note(text);
+    table.note(match &found.verdict {
+        Some(verdict) => format!("{}, {}", subject.size, of_a_mesh(verdict)),
+        None => format!("{}; {}", subject.size, of_a_system(found, n)),
+    });
     table.note(format!(
         "`residual` is ‖Sx − λx‖₂ of the symmetric matrix similar to A or D⁻¹A: an eigenvalue lies that close. `error` \
          estimates the error of the value as the end of the spectrum. {} products of a matrix with a vector were made. \
          `multiplicity` counts the eigenvalues that equal this \
-         end up to `equal_within`, relative, where that was decided. `proven_bound` follows from valences and face sizes alone; `certified` from a Cholesky factorization \
+         end up to `equal_within`, relative, where that was decided. `proven_bound` follows from {}; `certified` from a Cholesky factorization \
          (--certify). ω of Jacobi is safe below {:.6} by proof, below {:.6} by the spectrum; of W-PIA below {:.6}.",
         found.ends.applications,
+        if found.verdict.is_some() { "valences and face sizes alone" } else { "the entries (Gershgorin)" },
         found.promise.safe_omega_jacobi,
         found.spectrum().jacobi.critical_omega(),
         found.promise.safe_omega_pia
@@ -319,14 +350,54 @@ fn eigenvalue_table(input: &Input, found: &Findings) -> Table {
     table
 }
 
+/// The components of a mesh, and what theory says of its system.
+fn of_a_mesh(verdict: &Singularity) -> String {
+    let kernel = verdict.kernel_dimension();
+    let mut text = format!(
+        "{} components; {}",
+        verdict.components,
+        if kernel > 0 {
+            format!(
+                "**singular**: {kernel} components (the first begins at vertex {}) have all valences 3 and a \
+                 bipartite graph, the null vectors are their ±1 colourings, and the points {} a part that no control \
+                 points reach.",
+                verdict.singular[0].first_vertex,
+                if verdict.excited { "have" } else { "do not have" }
+            )
+        } else {
+            "non-singular: no component with all valences 3 and a bipartite graph, or a scheme that never is.".into()
+        }
+    );
+    if kernel > 0 {
+        text += &format!(
+            " PIA {}; Gauss-Seidel {}; Cholesky {}.",
+            verdict.prediction(Method::Pia).name(),
+            verdict.prediction(Method::GaussSeidel).name(),
+            verdict.prediction(Method::Cholesky).name()
+        );
+    }
+    text
+}
+
+/// What the computed spectrum says of a system without a mesh.
+fn of_a_system(found: &Findings, n: usize) -> &'static str {
+    if found.is_singular(n) {
+        "**singular** to rounding: λ_min is below 4·N·ε·λ_max."
+    } else if found.ends.lambda_min.value < 0.0 {
+        "**indefinite**: λ_min is negative, and the methods for positive definite matrices need not converge."
+    } else {
+        "positive definite, as far as the computed λ_min tells."
+    }
+}
+
 fn promised(count: f64) -> String {
     if count.is_finite() { count.to_string() } else { "unknown (the bound for λ_min is 0)".into() }
 }
 
-fn radius_table(input: &Input, found: &Findings) -> Table {
+fn radius_table(subject: &Subject, found: &Findings) -> Table {
     let mut table = Table::new(
-        input.stem("spectrum-rates"),
-        format!("Predicted rates on {} under {}", input.label, input.scheme),
+        subject.stem("spectrum-rates"),
+        format!("Predicted rates on {}", subject.title),
         vec![Column::key("method"), Column::key("parameter"), Column::number("rho", 1e-5, 6)],
     );
     table.note(
@@ -340,10 +411,10 @@ fn radius_table(input: &Input, found: &Findings) -> Table {
     table
 }
 
-fn full_table(input: &Input, full: &dense::Eigenvalues) -> Table {
+fn full_table(subject: &Subject, full: &dense::Eigenvalues) -> Table {
     let mut table = Table::new(
-        input.stem("spectrum-full"),
-        format!("All eigenvalues of {} under {}", input.label, input.scheme),
+        subject.stem("spectrum-full"),
+        format!("All eigenvalues of {}", subject.title),
         vec![Column::key("index"), Column::number("a", 1e-9, 10), Column::number("jacobi", 1e-9, 10)],
     );
     for (i, (a, jacobi)) in full.a.iter().zip(&full.jacobi).enumerate() {
@@ -352,16 +423,12 @@ fn full_table(input: &Input, full: &dense::Eigenvalues) -> Table {
     table
 }
 
-fn mode_table(input: &Input, modes: &[Mode]) -> Table {
+fn mode_table(subject: &Subject, modes: &[Mode]) -> Table {
     let mut columns = vec![Column::key("vertex")];
     for k in 0..modes.len() {
         columns.push(Column::number(format!("mode_{k}"), 1e-3, 6).floor(1e-3));
     }
-    let mut table = Table::new(
-        input.stem("spectrum-modes"),
-        format!("Slowest modes of {} under {}", input.label, input.scheme),
-        columns,
-    );
+    let mut table = Table::new(subject.stem("spectrum-modes"), format!("Slowest modes of {}", subject.title), columns);
     let values: Vec<String> = modes.iter().map(|m| format!("{:.10}", m.eigenvalue.value)).collect();
     table.note(format!("Eigenvectors of A, largest entry 1, of the eigenvalues {}.", values.join(", ")));
     for v in 0..modes[0].values.len() {
@@ -372,7 +439,7 @@ fn mode_table(input: &Input, modes: &[Mode]) -> Table {
     table
 }
 
-fn histogram(input: &Input, full: &dense::Eigenvalues, promise: &Promise) -> Figure {
+fn histogram(subject: &Subject, full: &dense::Eigenvalues, promise: &Promise) -> Figure {
     let panel = |values: &[f64], name: &str, label: &str, bounds: Extremes| LinePlot {
         x_label: format!("eigenvalue of {label}"),
         y_label: "eigenvalues".into(),
@@ -380,17 +447,14 @@ fn histogram(input: &Input, full: &dense::Eigenvalues, promise: &Promise) -> Fig
         vertical_lines: vec![Rule::new(bounds.min, "proven bounds"), Rule::new(bounds.max, "")],
         ..LinePlot::default()
     };
-    let a = LinePlot {
-        title: format!("{} under {}", input.label, input.scheme),
-        ..panel(&full.a, "A", "A (PIA, CG, Chebyshev)", promise.a)
-    };
+    let a = LinePlot { title: subject.title.clone(), ..panel(&full.a, "A", "A (PIA, CG, Chebyshev)", promise.a) };
     let jacobi = panel(&full.jacobi, "D⁻¹A", "D⁻¹A (Jacobi)", promise.jacobi);
     let mut figure = Figure::stack([a, jacobi]);
     figure.share_x = false;
     figure
 }
 
-fn json(input: &Input, found: &Findings) -> Value {
+fn json(subject: &Subject, found: &Findings, n: usize) -> Value {
     let e = &found.ends;
     let Spectrum { a, jacobi } = found.spectrum();
     let multiplicity = |e: Estimate| e.multiplicity.map(|m| json!({ "count": m.count, "within": m.within }));
@@ -440,9 +504,9 @@ fn json(input: &Input, found: &Findings) -> Value {
             "thall": promised(|c| c.thall),
             "chebyshev": promised(|c| c.chebyshev),
         },
-        "singular": found.verdict.is_singular(),
-        "kernel_dimension": found.verdict.kernel_dimension(),
-        "kernel_excited": found.verdict.excited,
+        "singular": found.is_singular(n),
+        "kernel_dimension": found.kernel_dimension(n),
+        "kernel_excited": found.verdict.as_ref().map(|v| v.excited),
     });
     if let Value::Object(map) = &mut object {
         let names = ["lambda_min", "lambda_max", "jacobi_lambda_min", "jacobi_lambda_max"];
@@ -454,9 +518,8 @@ fn json(input: &Input, found: &Findings) -> Value {
         if !proofs.is_empty() {
             map.insert("certified".into(), Value::Object(proofs));
         }
-        if found.verdict.is_singular() {
-            let all =
-                Method::ALL.iter().map(|&m| (m.name().to_owned(), Value::from(found.verdict.prediction(m).name())));
+        if let Some(verdict) = found.verdict.as_ref().filter(|v| v.is_singular()) {
+            let all = Method::ALL.iter().map(|&m| (m.name().to_owned(), Value::from(verdict.prediction(m).name())));
             map.insert("predictions".into(), Value::Object(all.collect()));
         }
         if let Some(full) = &found.full {
@@ -477,5 +540,5 @@ fn json(input: &Input, found: &Findings) -> Value {
             map.insert("modes".into(), Value::Array(values));
         }
     }
-    input.json(object)
+    subject.json(object)
 }

@@ -1,4 +1,4 @@
-//! Iterations, measured rate and predicted ρ over ω: `sweep-omega [MESH…]`.
+//! Iterations, measured rate and predicted ρ over ω: `sweep-omega [MESH|SYSTEM_DIR…]`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -11,19 +11,21 @@ use serde_json::{Map, Value, json};
 use limitlab::Result;
 use limitlab::analysis::sweep::{Sweep, rounding_floor, sweep};
 use limitlab::mesh::order::Order;
-use limitlab::solvers::{Method, Stop};
+use limitlab::solvers::Method;
 use limitlab_experiments::cli::{
-    self, CommonFlags, Grid, Input, List, MeshFlags, OutputFlags, Progress, StopFlags, number,
+    self, CommonFlags, Grid, List, MeshFlags, OutputFlags, Problem, Progress, StopFlags, number,
 };
 use limitlab_experiments::studies::sweep as study;
 
 /// Sweeps the damping ω of Jacobi, PIA and SOR: iterations to the tolerance and the measured rate, with the
-/// predicted spectral radius ρ(ω), the critical and the optimal ω beside them.
+/// predicted spectral radius ρ(ω), the critical and the optimal ω beside them. A folder is taken for a system of anybody,
+/// as `compare-solvers` does.
 #[derive(Parser)]
 #[command(name = "sweep-omega", version)]
 struct Arguments {
-    /// Mesh files (.obj, .off, .ply) or built-in names; unless told, four built-in ones with --noise 0.1
-    #[arg(value_name = "MESH")]
+    /// Mesh files (.obj, .off, .ply), built-in names, or folders with M.mtx, H.mtx and P.mtx; unless
+    /// told, four built-in ones with --noise 0.1
+    #[arg(value_name = "MESH|SYSTEM_DIR")]
     meshes: Vec<String>,
     /// Methods to sweep: jacobi, pia, sor
     #[arg(long, value_name = "NAME,…", default_value = "jacobi,pia,sor", value_parser = methods)]
@@ -72,33 +74,31 @@ fn run(arguments: &Arguments) -> Result<()> {
     arguments.output.prepare()?;
     let mut results = Vec::new();
     for name in &arguments.meshes {
-        let input = arguments.mesh.input(name, &arguments.common)?;
-        let stop = input.stop(&arguments.stop)?;
+        let problem = arguments.mesh.problem(name, &arguments.stop, arguments.order, &arguments.common)?;
         let table = |sweep: &Sweep| {
             study::table(
-                input.stem("sweep-omega"),
-                format!("ω sweep on {} under {}", input.label, input.scheme),
+                problem.subject.stem("sweep-omega"),
+                format!("ω sweep on {}", problem.subject.title),
                 format!(
-                    "{} vertices, {} faces; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:.3e} (mesh units).",
-                    input.mesh.len(),
-                    input.mesh.faces.len(),
-                    stop.tolerance * input.frame.scale()
+                    "{}; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:.3e} ({}).",
+                    problem.subject.size,
+                    problem.stop.tolerance * problem.scale,
+                    problem.subject.unit
                 ),
                 sweep,
             )
         };
         let write = |sweep: &Sweep| table(sweep).write(&arguments.output.out);
-        let sweep = sweep_one(&input, arguments, &stop, &write)?;
+        let sweep = sweep_one(&problem, arguments, &write)?;
         write(&sweep)?;
         let table = table(&sweep);
-        let title = format!("{} under {}", input.label, input.scheme);
-        study::plot(title, &arguments.method.0, &sweep)
+        study::plot(problem.subject.title.clone(), &arguments.method.0, &sweep)
             .render()?
             .save(&arguments.output.out.join(format!("{}.png", table.id)))?;
         if !arguments.output.json {
             cli::print(&table.to_markdown())?;
         }
-        results.push(json(&input, arguments, &sweep));
+        results.push(json(&problem, arguments, &sweep));
     }
     cli::finish(&results, &arguments.output, &arguments.common)
 }
@@ -106,15 +106,12 @@ fn run(arguments: &Arguments) -> Result<()> {
 /// Between two times that the rows which are there are written.
 const PAUSE: Duration = Duration::from_secs(2);
 
-/// The sweep, its errors in mesh units. What there is of a long one is written now and then, so that it may be stopped.
+/// The sweep, its errors in the units of the files. What there is of a long one is written now and then, so that it may be stopped.
 fn sweep_one(
-    input: &Input,
+    problem: &Problem,
     arguments: &Arguments,
-    stop: &Stop,
     write: &(dyn Fn(&Sweep) -> Result<Vec<PathBuf>> + Sync),
 ) -> Result<Sweep> {
-    let system = input.system()?;
-    let order = arguments.order.order(&input.mesh, &input.topology().incidence);
     let grids: Vec<(Method, Vec<f64>)> = arguments
         .method
         .0
@@ -125,35 +122,35 @@ fn sweep_one(
         })
         .collect();
     let runs = grids.iter().map(|(_, g)| g.len()).sum();
-    let progress = Progress::new(&input.name, runs, arguments.common.quiet);
-    let in_mesh_units = |mut sweep: Sweep| {
+    let progress = Progress::new(&problem.subject.name, runs, arguments.common.quiet);
+    let in_units_of_files = |mut sweep: Sweep| {
         for row in &mut sweep.rows {
-            row.errors = row.errors * input.frame.scale();
+            row.errors = row.errors * problem.scale;
         }
         sweep
     };
     let written = Mutex::new(Instant::now());
     let found = sweep(
-        &system,
-        &input.mesh.positions,
+        &problem.system,
+        &problem.points,
         &grids,
-        Some(&order),
-        stop,
-        rounding_floor(input.mesh.diagonal()),
+        Some(&problem.order),
+        &problem.stop,
+        rounding_floor(problem.diagonal()),
         &|so_far| {
             progress.step();
             let mut written = written.lock().unwrap_or_else(PoisonError::into_inner);
             if written.elapsed() >= PAUSE {
                 // If this fails, so does the end, which says it.
-                let _ = write(&in_mesh_units(so_far.clone()));
+                let _ = write(&in_units_of_files(so_far.clone()));
                 *written = Instant::now();
             }
         },
     )?;
-    Ok(in_mesh_units(found))
+    Ok(in_units_of_files(found))
 }
 
-fn json(input: &Input, arguments: &Arguments, sweep: &Sweep) -> Value {
+fn json(problem: &Problem, arguments: &Arguments, sweep: &Sweep) -> Value {
     let rows: Vec<Value> = sweep
         .rows
         .iter()
@@ -182,7 +179,7 @@ fn json(input: &Input, arguments: &Arguments, sweep: &Sweep) -> Value {
         let data = t.data.map_or(Value::Null, |d| number(d.critical_omega()));
         critical_data.insert(name.into(), data);
     }
-    input.json(json!({
+    problem.subject.json(json!({
         "rows": rows,
         "best": best,
         "optimal_omega": optimal,

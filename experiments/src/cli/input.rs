@@ -79,6 +79,11 @@ impl MeshFlags {
     /// As the readers; an unknown name lists the built-in ones.
     pub fn load(&self, name: &str) -> Result<Loaded> {
         let path = Path::new(name);
+        if path.is_dir() {
+            let what = "it is a folder, and a mesh is needed: a file, or a built-in name (a folder is a system if it holds \
+                        M.mtx and P.mtx; compare-solvers, sweep-omega and spectrum take it)";
+            return Err(Error::mesh(name, what));
+        }
         if has_mesh_ending(path) || path.exists() {
             return io::read(path);
         }
@@ -202,6 +207,23 @@ impl MeshFlags {
     }
 }
 
+/// A name with hyphens for what does not belong in the names of files.
+pub(super) fn plain(name: &str) -> String {
+    name.chars().map(|c| if c.is_alphanumeric() || c == '_' { c } else { '-' }).collect()
+}
+
+/// One JSON object of the fields of two.
+///
+/// # Panics
+/// If one is no object.
+pub(super) fn all_fields(mut object: Value, fields: Value) -> Value {
+    let (Value::Object(all), Value::Object(more)) = (&mut object, fields) else {
+        panic!("the fields of a JSON object")
+    };
+    all.extend(more);
+    object
+}
+
 impl Input {
     /// The topology of the mesh; found when it is first asked for, if the validator looked at a renumbered mesh.
     pub fn topology(&self) -> &Topology {
@@ -218,16 +240,7 @@ impl Input {
     /// # Errors
     /// A relative tolerance where all points coincide.
     pub fn stop(&self, flags: &StopFlags) -> Result<Stop> {
-        let extent = self.mesh.diagonal();
-        let tolerance = match flags.tol_absolute {
-            Some(tolerance) => (tolerance / self.frame.scale()).min(f64::MAX),
-            None if extent > 0.0 => flags.tol * extent,
-            None => {
-                let what = "all points coincide, so no tolerance can be relative to their extent: give --tol-absolute";
-                return Err(Error::mesh(&self.name, what));
-            }
-        };
-        Ok(Stop { tolerance, max_iterations: flags.max_iter })
+        flags.rule(self.mesh.diagonal(), self.frame.scale()).map_err(|what| Error::mesh(&self.name, what))
     }
 
     /// The points as they were given, with their noise: in mesh units.
@@ -266,8 +279,7 @@ impl Input {
         let path = Path::new(&self.name);
         let name = if has_mesh_ending(path) { path.file_stem() } else { path.file_name() };
         let name = name.unwrap_or_default().to_string_lossy();
-        let plain: String = name.chars().map(|c| if c.is_alphanumeric() || c == '_' { c } else { '-' }).collect();
-        format!("{prefix}-{plain}-{}", self.scheme)
+        format!("{prefix}-{}-{}", plain(&name), self.scheme)
     }
 
     /// The JSON object of one mesh: what every program tells of it, and `fields`.
@@ -275,17 +287,13 @@ impl Input {
     /// # Panics
     /// If `fields` is not an object.
     pub fn json(&self, fields: Value) -> Value {
-        let mut object = json!({
+        let head = json!({
             "mesh": self.name,
             "scheme": self.scheme.name(),
             "vertices": self.mesh.len(),
             "faces": self.mesh.faces.len(),
         });
-        let (Value::Object(all), Value::Object(more)) = (&mut object, fields) else {
-            panic!("the fields of a JSON object")
-        };
-        all.extend(more);
-        object
+        all_fields(head, fields)
     }
 
     /// Assembles the limit system.

@@ -2,11 +2,13 @@
 
 mod input;
 mod json;
+mod problem;
 mod process;
 mod progress;
 
 pub use input::{Input, MeshFlags, STAND_IN_NOISE};
 pub use json::print_json;
+pub use problem::{Given, Problem, Subject};
 pub use process::{exit, say};
 pub use progress::Progress;
 
@@ -19,6 +21,7 @@ use serde_json::{Value, json};
 
 use crate::report::Table;
 use limitlab::error::{Error, Result};
+use limitlab::solvers::Stop;
 
 /// Flags of every program: threads and silence.
 #[derive(Args, Clone, Debug)]
@@ -61,6 +64,25 @@ pub struct StopFlags {
     /// Iterations at most
     #[arg(long, value_name = "K", default_value_t = 10_000)]
     pub max_iter: usize,
+}
+
+impl StopFlags {
+    /// The rule for points of this extent, in units of `scale`; or what is wrong.
+    ///
+    /// # Errors
+    /// A relative tolerance where all points coincide.
+    pub fn rule(&self, extent: f64, scale: f64) -> std::result::Result<Stop, &'static str> {
+        let tolerance = match self.tol_absolute {
+            Some(tolerance) => (tolerance / scale).min(f64::MAX),
+            None if extent > 0.0 => self.tol * extent,
+            None => {
+                return Err(
+                    "all points coincide, so no tolerance can be relative to their extent: give --tol-absolute",
+                );
+            }
+        };
+        Ok(Stop { tolerance, max_iterations: self.max_iter })
+    }
 }
 
 /// Where results go.

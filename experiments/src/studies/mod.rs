@@ -1,4 +1,5 @@
 //! Tables and figures that more than one program makes.
 
+pub mod comparison;
 pub mod splitting;
 pub mod sweep;

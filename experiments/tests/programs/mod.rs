@@ -6,6 +6,7 @@ mod metadata;
 #[cfg(target_os = "linux")]
 mod process;
 mod results;
+mod systems;
 
 use std::fs;
 use std::path::Path;

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use super::super::magic::other_kind;
-use super::super::text::{Scanner, quoted};
+use crate::text::{Scanner, quoted};
 use crate::{Error, Result};
 
 /// What the mesh keeps of a vertex: its position and its normal.

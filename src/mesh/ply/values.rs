@@ -3,8 +3,8 @@
 use std::fmt::Display;
 use std::path::Path;
 
-use super::super::text::Scanner;
 use super::header::Scalar;
+use crate::text::Scanner;
 use crate::{Error, Result};
 
 /// Values in file order. A method that gives `None` leaves the place for [`unexpected`](Values::unexpected).

@@ -37,8 +37,8 @@ pub struct Direct<'a, S, F> {
     rows: Rows,
 }
 
-/// A is called singular if the estimate of λ_min(A) is below this many times N·ε: backward stable factorizations
-/// perturb the eigenvalues, which are at most 1, by a small multiple of ε that grows with N at most linearly.
+/// A is called singular if the estimate of λ_min(A) is below this many times N·ε·λ_max: backward stable factorizations
+/// perturb the eigenvalues by a small multiple of ελ_max that grows with N at most linearly.
 pub const SINGULAR: f64 = 4.0;
 
 impl<'a, S: System, F: Factorization> Direct<'a, S, F> {
@@ -46,17 +46,17 @@ impl<'a, S: System, F: Factorization> Direct<'a, S, F> {
     ///
     /// # Errors
     /// [`Outcome::Singular`] if three steps of inverse iteration on H^½MH^½, which is similar to A, estimate
-    /// λ_min(A) below [`SINGULAR`]·N·ε. (λ_max is 1, so λ_min is the reciprocal condition number.)
+    /// λ_min(A) below [`SINGULAR`]·N·ε·λ_max, λ_max the system's bound.
     pub fn new(system: &'a S, points: &'a [DVec3], mut factorization: F) -> Result<Self, Failure> {
         let n = system.len();
-        let threshold = SINGULAR * n as f64 * f64::EPSILON;
+        let threshold = SINGULAR * n as f64 * f64::EPSILON * system.lambda_max();
         let estimate = smallest_eigenvalue(system.weights(), &mut factorization);
         // Not a number: an exactly vanishing pivot.
         if estimate.is_nan() || estimate < threshold {
             return Err(Failure {
                 outcome: Outcome::Singular,
                 detail: format!(
-                    "the smallest eigenvalue of A is estimated as {estimate:.1e}, below {SINGULAR}·N·ε = {threshold:.1e}"
+                    "the smallest eigenvalue of A is estimated as {estimate:.1e}, below {SINGULAR}·N·ε·λ_max = {threshold:.1e}"
                 ),
             });
         }

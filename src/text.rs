@@ -10,7 +10,9 @@ use crate::{Error, Result};
 
 /// A place in the bytes of a text file. Lines end with `\n`, `\r\n` or `\r`, in a file whose first line does so with
 /// `\n\r`, and are counted from 1. A token ends at white space and at a `\` that ends its line, which continues it;
-/// `#` opens a comment where a token would start, and else belongs to the token (`1.#INF`). Zero bytes and DOS's sign
+/// `#`, or
+/// another character that is chosen, opens a comment where a token would start, and else belongs to the token
+/// (`1.#INF`). Zero bytes and DOS's sign
 /// for the end of a file are no text at its end. The bytes need not be UTF-8.
 ///
 /// Tables have a row a line where their first row has: then no row takes a value from the next line, or leaves one.
@@ -23,6 +25,7 @@ pub(crate) struct Scanner<'a> {
     at: usize,
     line: usize,
     feed_before_return: bool,
+    comment: u8,
     rows: Rows,
     /// The line on which the present row starts.
     row_line: usize,
@@ -65,10 +68,16 @@ impl<'a> Scanner<'a> {
             at: 0,
             line: 1,
             feed_before_return,
+            comment: b'#',
             rows: Rows::None,
             row_line: 0,
             shared_line: None,
         }
+    }
+
+    /// With another character that opens comments.
+    pub fn with_comment(self, comment: u8) -> Self {
+        Scanner { comment, ..self }
     }
 
     pub fn line(&self) -> usize {
@@ -91,7 +100,7 @@ impl<'a> Scanner<'a> {
 
     /// Whether the line holds no further token, once blanks are skipped.
     pub fn at_line_end(&self) -> bool {
-        self.peek().is_none_or(|b| is_line_end(b) || b == b'#')
+        self.peek().is_none_or(|b| is_line_end(b) || b == self.comment)
     }
 
     pub fn peek(&self) -> Option<u8> {
@@ -115,7 +124,7 @@ impl<'a> Scanner<'a> {
             self.skip_blanks();
             match self.peek() {
                 Some(b'\n' | b'\r') => self.skip_line_break(),
-                Some(b'#') => self.skip_to_line_end(),
+                Some(b) if b == self.comment => self.skip_to_line_end(),
                 _ => return,
             }
         }
@@ -361,7 +370,7 @@ fn short_decimal(bytes: &[u8]) -> Option<(f64, usize)> {
 
 /// The number that the digits at the start of `bytes` form, and how many digits they are. `None` without digits, or
 /// if the number does not fit.
-pub(super) fn leading_digits(bytes: &[u8]) -> Option<(u64, usize)> {
+pub(crate) fn leading_digits(bytes: &[u8]) -> Option<(u64, usize)> {
     let mut value = 0u64;
     let mut length = 0;
     while let Some(digit @ b'0'..=b'9') = bytes.get(length) {
@@ -392,12 +401,12 @@ fn is_separator(b: u8) -> bool {
 }
 
 /// Whether a line is continued here: at a backslash that is the last character of it or of the file.
-pub(super) fn continues_line(rest: &[u8]) -> bool {
+pub(crate) fn continues_line(rest: &[u8]) -> bool {
     matches!(rest, [b'\\'] | [b'\\', b'\n' | b'\r', ..])
 }
 
 /// Appends the shortest decimal that reads back equal, with an exponent where plain digits would be long.
-pub(super) fn push_number(text: &mut Vec<u8>, x: f64) -> io::Result<()> {
+pub(crate) fn push_number(text: &mut Vec<u8>, x: f64) -> io::Result<()> {
     let size = x.abs();
     if (size < 1e-5 && size > 0.0) || (1e17..f64::INFINITY).contains(&size) {
         write!(text, "{x:e}")
@@ -407,7 +416,7 @@ pub(super) fn push_number(text: &mut Vec<u8>, x: f64) -> io::Result<()> {
 }
 
 /// Appends the three coordinates, separated by spaces.
-pub(super) fn push_point(text: &mut Vec<u8>, p: DVec3) -> io::Result<()> {
+pub(crate) fn push_point(text: &mut Vec<u8>, p: DVec3) -> io::Result<()> {
     push_number(text, p.x)?;
     text.push(b' ');
     push_number(text, p.y)?;
@@ -416,7 +425,7 @@ pub(super) fn push_point(text: &mut Vec<u8>, p: DVec3) -> io::Result<()> {
 }
 
 /// Appends a whole number; the formatting machinery would take most of a writer's time.
-pub(super) fn push_unsigned(text: &mut Vec<u8>, mut n: u64) {
+pub(crate) fn push_unsigned(text: &mut Vec<u8>, mut n: u64) {
     let mut digits = [0; 20];
     let mut start = digits.len();
     loop {

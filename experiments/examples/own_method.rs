@@ -1,0 +1,59 @@
+//! A method of one's own beside those of the house: `cargo run --release --example own_method`.
+
+use std::path::Path;
+
+use faer::sparse::SparseColMat;
+use glam::DVec3;
+use limitlab::analysis::comparison::{Row, compare, entries};
+use limitlab::analysis::{own::Own, spectrum::spectrum, sweep::rounding_floor, sweep::sweep};
+use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::mesh::{Topology, builtin, noise::add_noise};
+use limitlab::solvers::{Errors, Failure, Iterate, Method, Stop, system::Rows};
+use limitlab_experiments::studies::comparison::{figure, table};
+use nalgebra_sparse::CsrMatrix;
+
+/// Steepest descent on M V = H⁻¹P in the inner product of H: V ← V + α e, e = P − A V, α = ⟨e, H⁻¹e⟩/⟨e, M e⟩.
+struct SteepestDescent<'a>(&'a LimitSystem, &'a [DVec3], Vec<DVec3>);
+impl Iterate for SteepestDescent<'_> {
+    fn errors(&mut self) -> Errors {
+        Rows::new(self.1.len()).errors(self.0, self.1, &self.2)
+    }
+    fn advance(&mut self) -> Result<(), Failure> {
+        let Self(system, points, v) = self;
+        let e: Vec<DVec3> = (0..v.len()).map(|i| points[i] - system.a.row_times(i, v)).collect();
+        let square: f64 = (0..v.len()).map(|i| e[i].length_squared() / system.h[i]).sum();
+        let curvature: f64 = (0..v.len()).map(|i| e[i].dot(system.m.row_times(i, &e))).sum();
+        v.iter_mut().zip(&e).for_each(|(v, e)| *v += square / curvature * *e);
+        Ok(())
+    }
+    fn points(&self) -> &[DVec3] {
+        &self.2
+    }
+}
+
+fn main() -> limitlab::Result<()> {
+    run("out".as_ref()).map(drop)
+}
+
+pub fn run(out: &Path) -> limitlab::Result<Vec<Row>> {
+    let mut mesh = builtin::builtin("torus:16x12")?; // or mesh::io::read(path)?.mesh, validated
+    add_noise(&mut mesh, 0.1, 1);
+    let system = LimitSystem::new(&mesh, &Topology::new(&mesh.faces, mesh.len()), Scheme::CatmullClark)?;
+    let (theirs, columns) = (CsrMatrix::from(&system.a), SparseColMat::<u32, f64>::from(&system.a));
+    println!("A has {} entries in nalgebra-sparse and {} in faer", theirs.nnz(), columns.compute_nnz());
+
+    let spectrum = spectrum(&system)?;
+    println!("λ(A) ∈ [{:.6}, {:.6}]", spectrum.a.min, spectrum.a.max);
+    let stop = Stop { tolerance: 1e-8 * mesh.diagonal(), max_iterations: 1000 };
+    let (name, parameter) = ("steepest-descent".into(), "mine".into());
+    let mine = Own { name, parameter, start: &|s, points| Ok(Box::new(SteepestDescent(s, points, points.to_vec()))) };
+    let lines = entries(&system, &spectrum, &[Method::WPia, Method::Cg, Method::Lu], None, "file")?;
+    let rows = compare(&system, &spectrum, &mesh.positions, &lines, &[mine], &stop, &mut || ())?;
+    println!("{}", table("own".into(), "My method".into(), "A torus.".into(), &rows).to_markdown());
+    limitlab::output::create_dir(out)?;
+    figure("My method".into(), "mesh units", &rows).render()?.save(&out.join("own_method.png"))?;
+    let grid = vec![(Method::Pia, (1..=20).map(|k| f64::from(k) / 10.0).collect())];
+    let found = sweep(&system, &mesh.positions, &grid, None, &stop, rounding_floor(mesh.diagonal()), &|_| ())?;
+    println!("best ω of PIA: {:?}", found.best(Method::Pia).map(|row| (row.omega, row.iterations)));
+    Ok(rows)
+}

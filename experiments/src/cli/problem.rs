@@ -1,0 +1,181 @@
+//! The systems that programs are asked about: that of a mesh, or one that a folder holds.
+
+use std::path::Path;
+
+use glam::DVec3;
+use serde_json::{Value, json};
+
+use super::input::{all_fields, plain};
+use super::{CommonFlags, Input, MeshFlags, StopFlags};
+use limitlab::assemble::LimitSystem;
+use limitlab::assemble::matrix_market::{self, is_missing};
+use limitlab::error::{Error, Result};
+use limitlab::mesh::diagonal;
+use limitlab::mesh::frame::Frame;
+use limitlab::mesh::order::Order;
+use limitlab::mesh::validate::Boundary;
+use limitlab::solvers::Stop;
+
+/// What a program's results are about, in words and in JSON: a mesh under a scheme, or a folder.
+pub struct Subject {
+    /// As the user named it.
+    pub name: String,
+    /// What titles call it: the mesh with its noise and its scheme, or the folder.
+    pub title: String,
+    /// How large it is, in words.
+    pub size: String,
+    /// What errors are measured in.
+    pub unit: &'static str,
+    /// The end of the names of files.
+    stem: String,
+    head: Value,
+}
+
+impl Subject {
+    /// A stem for file names, after the program's `prefix`.
+    pub fn stem(&self, prefix: &str) -> String {
+        format!("{prefix}{}", self.stem)
+    }
+
+    /// The JSON object of the program: what every program tells of a mesh or a system, and `fields`.
+    ///
+    /// # Panics
+    /// If `fields` is not an object.
+    pub fn json(&self, fields: Value) -> Value {
+        all_fields(self.head.clone(), fields)
+    }
+}
+
+impl Input {
+    /// What results on this mesh are about.
+    pub fn subject(&self) -> Subject {
+        Subject {
+            name: self.name.clone(),
+            title: format!("{} under {}", self.label, self.scheme),
+            size: format!("{} vertices, {} faces", self.mesh.len(), self.mesh.faces.len()),
+            unit: "mesh units",
+            stem: self.stem(""),
+            head: self.json(json!({})),
+        }
+    }
+}
+
+/// A system of anybody, as a folder holds it, with its points.
+pub struct Given {
+    pub subject: Subject,
+    pub system: LimitSystem,
+    /// In their [frame](Frame::of_size).
+    pub points: Vec<DVec3>,
+    frame: Frame,
+}
+
+impl Given {
+    /// When iterations on this system stop.
+    ///
+    /// # Errors
+    /// A relative tolerance where all points coincide.
+    pub fn stop(&self, flags: &StopFlags) -> Result<Stop> {
+        let rule = flags.rule(diagonal(&self.points), self.frame.scale());
+        rule.map_err(|what| Error::mesh(&self.subject.name, what))
+    }
+}
+
+/// A system with its points, whatever it comes from: a MESH, or a SYSTEM_DIR with M.mtx, H.mtx and P.mtx.
+pub struct Problem {
+    pub subject: Subject,
+    pub system: LimitSystem,
+    /// In units of [`scale`](Self::scale), as the tolerance of `stop` is.
+    pub points: Vec<DVec3>,
+    pub stop: Stop,
+    /// The order of in-place sweeps.
+    pub order: Vec<u32>,
+    /// Lengths in the units of the files are this many times those here.
+    pub scale: f64,
+}
+
+impl Problem {
+    /// The diagonal of the bounding box of the points.
+    pub fn diagonal(&self) -> f64 {
+        diagonal(&self.points)
+    }
+}
+
+impl MeshFlags {
+    /// The system that the folder `name` holds; `None` if it is no folder, or one without M.mtx.
+    ///
+    /// # Errors
+    /// As [`read_system`](matrix_market::read_system); flags that are about meshes; points that doubles cannot hold
+    /// together.
+    pub fn given(&self, name: &str) -> Result<Option<Given>> {
+        let path = Path::new(name);
+        if !path.is_dir() || is_missing(&path.join("M.mtx")) {
+            return Ok(None);
+        }
+        let (system, mut points) = matrix_market::read_system(path)?;
+        let refuse = |what: String| Err(Error::mesh(name, what));
+        let as_interior = self.boundary == Boundary::AsInterior;
+        let flags =
+            [("--scheme", self.scheme.is_some()), ("--noise", self.noise.is_some()), ("--boundary", as_interior)];
+        if let Some((flag, _)) = flags.into_iter().find(|f| f.1) {
+            return refuse(format!("{flag} is about a mesh, and this is a system without one: leave it out"));
+        }
+        let frame = match Frame::of_size(&points) {
+            Ok(frame) => frame,
+            Err(i) => {
+                return refuse(format!(
+                    "row {i} of P: a number is more than 10^300 times smaller than the largest, and doubles cannot hold \
+                     both: correct it, or set it to 0"
+                ));
+            }
+        };
+        frame.enter(&mut points);
+        let (n, entries) = (system.len(), system.a.values().len());
+        let whole = path.canonicalize().unwrap_or_else(|_| path.into());
+        let subject = Subject {
+            name: name.to_owned(),
+            title: name.to_owned(),
+            size: format!("{n} rows, {entries} entries"),
+            unit: "units of P",
+            stem: format!("-{}", plain(&whole.file_name().unwrap_or_default().to_string_lossy())),
+            head: json!({
+                "mesh": null, "scheme": null, "vertices": n, "faces": null, "system": name, "entries": entries,
+            }),
+        };
+        Ok(Some(Given { subject, system, points, frame }))
+    }
+
+    /// The system of a mesh as [`input`](Self::input) gives it, or of a folder as [`given`](Self::given) does.
+    ///
+    /// # Errors
+    /// As these two; a relative tolerance where all points coincide; an order by a mesh that is not there.
+    pub fn problem(&self, name: &str, stop: &StopFlags, order: Order, common: &CommonFlags) -> Result<Problem> {
+        let Some(given) = self.given(name)? else { return of_mesh(&self.input(name, common)?, stop, order) };
+        let Some(numbers) = order.of_numbers(given.system.len()) else {
+            return Err(Error::mesh(
+                name,
+                format!(
+                    "the order {order} goes by a mesh, and this is a system without one: use file, reverse or random"
+                ),
+            ));
+        };
+        Ok(Problem {
+            stop: given.stop(stop)?,
+            order: numbers,
+            scale: given.frame.scale(),
+            subject: given.subject,
+            system: given.system,
+            points: given.points,
+        })
+    }
+}
+
+fn of_mesh(input: &Input, stop: &StopFlags, order: Order) -> Result<Problem> {
+    Ok(Problem {
+        stop: input.stop(stop)?,
+        subject: input.subject(),
+        system: input.system()?,
+        points: input.mesh.positions.clone(),
+        order: order.order(&input.mesh, &input.topology().incidence),
+        scale: input.frame.scale(),
+    })
+}
