@@ -44,8 +44,9 @@ pub const SOR_OMEGA: f64 = 1.1;
 pub const SSOR_OMEGA: f64 = 1.0;
 /// An estimated λ_min below this part of λ_max is taken for 0: the matrix is singular for all that iterations can tell.
 const VANISHING: f64 = 1e-9;
-/// The part of λ_max where a Chebyshev interval starts if λ_min vanishes: modes beneath are left nearly as they are, which is right
-/// where the data do not excite them. Tuned on singular meshes: lower costs iterations, higher leaves out modes.
+/// The part of λ_max where a Chebyshev interval starts if λ_min vanishes: modes beneath are left nearly as they are,
+/// which is right where the data do not excite them. Tuned on singular meshes: lower costs iterations, higher leaves out
+/// modes.
 const LOWEST: f64 = 1e-3;
 /// The part of an estimated λ_min that a Chebyshev interval starts from: Ritz values lie above the eigenvalue.
 const SAFETY: f64 = 0.98;

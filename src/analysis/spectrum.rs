@@ -351,8 +351,8 @@ impl Known {
         })
     }
 
-    /// Both ends of one operator of eigenvalues of size `scale`: by a vector that attains a proven bound, else enclosed, else by Lanczos, where a
-    /// less accurate enclosure may still tell the multiplicity.
+    /// Both ends of one operator of eigenvalues of size `scale`: by a vector that attains a proven bound, else enclosed,
+    /// else by Lanczos, where a less accurate enclosure may still tell the multiplicity.
     fn operator_ends<T: Scalar>(
         &self,
         matrix: &Matrix<'_, T>,
