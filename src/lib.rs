@@ -16,6 +16,7 @@ pub mod memory;
 pub mod mesh;
 pub mod output;
 mod pages;
+mod parallel;
 mod prefetch;
 pub mod solvers;
 pub mod subdivide;

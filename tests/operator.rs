@@ -156,16 +156,12 @@ fn single_precision_rows_agree_to_single_rounding() {
         let mut sums = Vec::new();
         case.operator.all_sums(&single, &mut sums);
         let n = x.len();
-        let mut left = 0..n;
-        let rows = |count| {
-            let from = left.start;
-            left.start += count;
-            from..left.start
-        };
-        case.operator.rows(0..n, (&single, 0), (&sums, 0), rows, |i, _, ax| {
-            let difference = (ax.as_dvec3() - expected[i]).length();
+        let mut image = vec![Vec3A::ZERO; n];
+        case.operator.product(0..n, (&single, 0), (&sums, 0), &mut image);
+        for (ax, expected) in image.iter().zip(&expected) {
+            let difference = (ax.as_dvec3() - *expected).length();
             assert!(difference <= 4e-6, "{}: {difference}", case.name);
-        });
+        }
     }
 }
 

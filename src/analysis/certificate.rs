@@ -166,7 +166,7 @@ pub fn inertia(s: &Csr, sigma: f64) -> Result<Inertia> {
         let (mut error, mut norm) = (0.0f64, 0.0f64);
         for (k, &i) in place.iter().enumerate() {
             let i = i as usize;
-            let exact = s.row_times_scalar(i, &x) - sigma * x[i];
+            let exact = s.row_times(i, &x) - sigma * x[i];
             error += (z[k] - exact).powi(2);
             norm += x[i] * x[i];
         }

@@ -14,10 +14,10 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
 use crate::assemble::Csr;
 use crate::error::{Error, Result};
+use crate::parallel;
 
 /// Columns that a product handles at once: one cache line of a row.
 const LANES: usize = 8;
@@ -252,9 +252,8 @@ impl<'a> Iteration<'a> {
     fn step(&mut self, alpha: f64, c: f64, beta: f64) {
         self.applications += self.width;
         let (s, x, width) = (self.s, &self.x, self.width);
-        self.y.par_chunks_mut(CHUNK * width).enumerate().for_each(|(k, y)| {
-            for (offset, y) in y.chunks_exact_mut(width).enumerate() {
-                let i = k * CHUNK + offset;
+        parallel::chunks(&mut self.y, CHUNK * width, |first, y| {
+            for (i, y) in (first / width..).zip(y.chunks_exact_mut(width)) {
                 for (lane, y) in y.chunks_exact_mut(LANES).enumerate() {
                     let at = lane * LANES;
                     let sum = row_times_lanes(s, i, x, width, at);
@@ -344,21 +343,17 @@ fn row_times_lanes(s: &Csr, i: usize, x: &[f64], width: usize, at: usize) -> [f6
 
 /// XᵀY for row-major blocks: chunks of rows in parallel, added up in their order.
 fn gram(x: &[f64], y: &[f64], p: usize) -> DMatrix<f64> {
-    let parts: Vec<Vec<f64>> = x
-        .par_chunks(CHUNK * p)
-        .zip(y.par_chunks(CHUNK * p))
-        .map(|(x, y)| {
-            let mut sum = vec![0.0; p * p];
-            for (x, y) in x.chunks_exact(p).zip(y.chunks_exact(p)) {
-                for (sum, &a) in sum.chunks_exact_mut(p).zip(x) {
-                    for (sum, &b) in sum.iter_mut().zip(y) {
-                        *sum += a * b;
-                    }
+    let parts = parallel::map(x.len(), CHUNK * p, |range| {
+        let mut sum = vec![0.0; p * p];
+        for (x, y) in x[range.clone()].chunks_exact(p).zip(y[range].chunks_exact(p)) {
+            for (sum, &a) in sum.chunks_exact_mut(p).zip(x) {
+                for (sum, &b) in sum.iter_mut().zip(y) {
+                    *sum += a * b;
                 }
             }
-            sum
-        })
-        .collect();
+        }
+        sum
+    });
     let mut total = DMatrix::zeros(p, p);
     for part in parts {
         total += DMatrix::from_row_slice(p, p, &part);
@@ -368,20 +363,16 @@ fn gram(x: &[f64], y: &[f64], p: usize) -> DMatrix<f64> {
 
 fn residual_squares(x: &[f64], y: &[f64], values: &[f64]) -> Vec<f64> {
     let p = values.len();
-    let parts: Vec<Vec<f64>> = x
-        .par_chunks(CHUNK * p)
-        .zip(y.par_chunks(CHUNK * p))
-        .map(|(x, y)| {
-            let mut sum = vec![0.0; p];
-            for (x, y) in x.chunks_exact(p).zip(y.chunks_exact(p)) {
-                for j in 0..p {
-                    let r = y[j] - values[j] * x[j];
-                    sum[j] += r * r;
-                }
+    let parts = parallel::map(x.len(), CHUNK * p, |range| {
+        let mut sum = vec![0.0; p];
+        for (x, y) in x[range.clone()].chunks_exact(p).zip(y[range].chunks_exact(p)) {
+            for j in 0..p {
+                let r = y[j] - values[j] * x[j];
+                sum[j] += r * r;
             }
-            sum
-        })
-        .collect();
+        }
+        sum
+    });
     let mut total = vec![0.0; p];
     for part in parts {
         total.iter_mut().zip(part).for_each(|(t, s)| *t += s);
@@ -393,7 +384,7 @@ fn residual_squares(x: &[f64], y: &[f64], values: &[f64]) -> Vec<f64> {
 fn rotate(x: &mut [f64], t: &DMatrix<f64>) {
     let p = t.nrows();
     let by_rows: Vec<f64> = t.transpose().as_slice().to_vec();
-    x.par_chunks_mut(CHUNK * p).for_each(|x| {
+    parallel::chunks(x, CHUNK * p, |_, x| {
         let mut new = vec![0.0; p];
         for row in x.chunks_exact_mut(p) {
             new.fill(0.0);

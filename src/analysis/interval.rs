@@ -16,7 +16,6 @@ use std::sync::Arc;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
 use super::lanczos::{self, Matrix, SelfAdjoint};
 use super::spectrum::Operator as Which;
@@ -24,6 +23,7 @@ use crate::assemble::csr::Pattern;
 use crate::assemble::{Csr, Operator};
 use crate::error::Result;
 use crate::mesh::topology::NONE;
+use crate::parallel;
 
 /// Products for the upper end.
 const POWERS: usize = 8;
@@ -115,9 +115,8 @@ fn collatz_wielandt(operator: &Operator) -> f64 {
     let mut bound = f64::INFINITY;
     for _ in 0..POWERS {
         multiply(&b, &v, &mut image);
-        let quotient = |(y, x): (&f64, &f64)| y / x;
-        let largest = image.par_iter().zip(&v).with_min_len(CHUNK).map(quotient).reduce(|| 0.0, f64::max);
-        bound = bound.min(largest);
+        let largest = parallel::map(v.len(), CHUNK, |range| range.fold(0.0, |max, i| f64::max(max, image[i] / v[i])));
+        bound = bound.min(largest.into_iter().fold(0.0, f64::max));
         std::mem::swap(&mut v, &mut image);
     }
     // Rounding of a row and of the quotient.
@@ -128,10 +127,7 @@ fn collatz_wielandt(operator: &Operator) -> f64 {
 fn multiply(b: &impl SelfAdjoint, x: &[f64], y: &mut [f64]) {
     let mut shared = Vec::new();
     b.prepare(x, &mut shared);
-    y.par_chunks_mut(CHUNK).enumerate().for_each(|(k, y)| {
-        let first = k * CHUNK;
-        b.rows(first..first + y.len(), x, &shared, |i, image| y[i] = image);
-    });
+    parallel::chunks(y, CHUNK, |first, y| b.product(first..first + y.len(), x, &shared, y));
 }
 
 /// Vertices where `average` is least, no two neighbours, at most [`PLACES`].

@@ -6,12 +6,12 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::spectrum::Operator as Which;
 use super::tridiagonal::Tridiagonal;
-use crate::assemble::{Csr, LimitSystem, Operator};
+use crate::assemble::Csr;
 use crate::error::{Error, Result};
+use crate::parallel;
+use crate::solvers::system::{STRIP, System};
 
 /// A Ritz value with what is known of its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,8 +79,8 @@ pub trait SelfAdjoint: Sync {
     /// Sums over x that the rows of one whole product share; none unless the matrix has some.
     fn prepare(&self, _x: &[f64], _shared: &mut Vec<f64>) {}
 
-    /// Calls `visit(k, (B x)_i)` for the k-th row i of `rows`; `shared` comes from [`prepare`](Self::prepare).
-    fn rows(&self, rows: Range<usize>, x: &[f64], shared: &[f64], visit: impl FnMut(usize, f64));
+    /// `out[k]` becomes (B x)_i of the k-th row i of `rows`; `shared` comes from [`prepare`](Self::prepare).
+    fn product(&self, rows: Range<usize>, x: &[f64], shared: &[f64], out: &mut [f64]);
 }
 
 /// A symmetric matrix: all weights are 1.
@@ -93,61 +93,10 @@ impl SelfAdjoint for Csr {
         1.0
     }
 
-    fn rows(&self, rows: Range<usize>, x: &[f64], _shared: &[f64], mut visit: impl FnMut(usize, f64)) {
-        for (k, i) in rows.enumerate() {
-            visit(k, self.row_times_scalar(i, x));
+    fn product(&self, rows: Range<usize>, x: &[f64], _shared: &[f64], out: &mut [f64]) {
+        for (out, i) in out.iter_mut().zip(rows) {
+            *out = self.row_times(i, x);
         }
-    }
-}
-
-/// A limit system's matrix A = H·M as it acts on one number a vertex.
-pub trait Scalar: Sync {
-    /// The diagonal of H.
-    fn weights(&self) -> &[f64];
-
-    /// The diagonal of A.
-    fn diagonal(&self) -> &[f64];
-
-    fn prepare(&self, _x: &[f64], _shared: &mut Vec<f64>) {}
-
-    /// Calls `visit(k, (A x)_i)` for the k-th row i of `rows`.
-    fn rows(&self, rows: Range<usize>, x: &[f64], shared: &[f64], visit: impl FnMut(usize, f64));
-}
-
-impl Scalar for LimitSystem {
-    fn weights(&self) -> &[f64] {
-        &self.h
-    }
-
-    fn diagonal(&self) -> &[f64] {
-        &self.diagonal
-    }
-
-    fn rows(&self, rows: Range<usize>, x: &[f64], shared: &[f64], visit: impl FnMut(usize, f64)) {
-        SelfAdjoint::rows(&self.a, rows, x, shared, visit);
-    }
-}
-
-impl Scalar for Operator {
-    fn weights(&self) -> &[f64] {
-        Operator::weights(self)
-    }
-
-    fn diagonal(&self) -> &[f64] {
-        Operator::diagonal(self)
-    }
-
-    fn prepare(&self, x: &[f64], shared: &mut Vec<f64>) {
-        self.all_sums(x, shared);
-    }
-
-    fn rows(&self, rows: Range<usize>, x: &[f64], shared: &[f64], mut visit: impl FnMut(usize, f64)) {
-        let mut end = 0;
-        let next = |count| {
-            end += count;
-            end - count..end
-        };
-        Operator::rows(self, rows, (x, 0), (shared, 0), next, |k, _, ax| visit(k, ax));
     }
 }
 
@@ -158,7 +107,7 @@ pub struct Matrix<'a, T> {
     pub which: Which,
 }
 
-impl<T: Scalar> SelfAdjoint for Matrix<'_, T> {
+impl<T: System> SelfAdjoint for Matrix<'_, T> {
     fn len(&self) -> usize {
         self.system.weights().len()
     }
@@ -176,12 +125,11 @@ impl<T: Scalar> SelfAdjoint for Matrix<'_, T> {
         self.system.prepare(x, shared);
     }
 
-    fn rows(&self, rows: Range<usize>, x: &[f64], shared: &[f64], mut visit: impl FnMut(usize, f64)) {
-        match self.which {
-            Which::A => self.system.rows(rows, x, shared, visit),
-            Which::Jacobi => {
-                let diagonal = &self.system.diagonal()[rows.start..];
-                self.system.rows(rows, x, shared, |k, ax| visit(k, ax / diagonal[k]));
+    fn product(&self, rows: Range<usize>, x: &[f64], shared: &[f64], out: &mut [f64]) {
+        self.system.product(rows.clone(), x, shared, out);
+        if self.which == Which::Jacobi {
+            for (out, a) in out.iter_mut().zip(&self.system.diagonal()[rows]) {
+                *out /= a;
             }
         }
     }
@@ -193,28 +141,24 @@ pub fn rayleigh(s: &impl SelfAdjoint, x: &[f64]) -> (f64, f64) {
     s.prepare(x, &mut shared);
     // Σ g x², Σ g x·Bx and Σ g (Bx)² would lose half of the residual's digits, so B x is kept.
     let mut image = vec![0.0; s.len()];
-    let sums = |parts: Vec<(f64, f64)>| parts.iter().fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
-    let parts = image.par_chunks_mut(CHUNK).enumerate().map(|(c, image)| {
-        let first = c * CHUNK;
+    parallel::chunks(&mut image, CHUNK, |first, image| {
+        s.product(first..first + image.len(), x, &shared, image);
+    });
+    let parts = parallel::map(s.len(), CHUNK, |range| {
         let (mut square, mut product) = (0.0, 0.0);
-        s.rows(first..first + image.len(), x, &shared, |k, y| {
-            let (g, x) = (s.weight(first + k), x[first + k]);
+        for i in range {
+            let (g, x, y) = (s.weight(i), x[i], image[i]);
             square += g * x * x;
             product += g * x * y;
-            image[k] = y;
-        });
+        }
         (square, product)
     });
-    let (square, product) = sums(parts.collect());
+    let (square, product) = parts.iter().fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
     let value = product / square;
-    let parts = image.par_chunks(CHUNK).enumerate().map(|(c, image)| {
-        let rest = |(k, y): (usize, &f64)| {
-            let i = c * CHUNK + k;
-            s.weight(i) * (y - value * x[i]).powi(2)
-        };
-        (image.iter().enumerate().map(rest).sum(), 0.0)
+    let parts = parallel::map(s.len(), CHUNK, |range| -> f64 {
+        range.map(|i| s.weight(i) * (image[i] - value * x[i]).powi(2)).sum()
     });
-    let (rest, _) = sums(parts.collect());
+    let rest: f64 = parts.iter().sum();
     (value, (rest / square).sqrt())
 }
 
@@ -282,39 +226,33 @@ pub fn extremes(s: &impl SelfAdjoint, start: Vec<f64>, limits: Limits) -> Result
 fn product(s: &impl SelfAdjoint, (v, norm): (&[f64], f64), (w, norm_before): (&mut [f64], f64), shared: &[f64]) -> f64 {
     // In the first step there is no vector before, and its norm is infinite.
     let (unit, back) = (1.0 / norm, norm / norm_before);
-    let parts: Vec<f64> = w
-        .par_chunks_mut(CHUNK)
-        .enumerate()
-        .map(|(k, w)| {
-            let first = k * CHUNK;
-            let mut dot = 0.0;
-            s.rows(first..first + w.len(), v, shared, |k, image| {
-                let new = unit * image - back * w[k];
-                dot += s.weight(first + k) * new * (unit * v[first + k]);
-                w[k] = new;
-            });
-            dot
-        })
-        .collect();
+    let mut parts = vec![0.0; w.len().div_ceil(CHUNK)];
+    parallel::chunks_with(w, CHUNK, &mut parts, |first, w, dot| {
+        let mut image = [0.0; STRIP];
+        for (k, w) in w.chunks_mut(STRIP).enumerate() {
+            let rows = first + k * STRIP..first + k * STRIP + w.len();
+            let image = &mut image[..w.len()];
+            s.product(rows.clone(), v, shared, image);
+            for ((i, w), image) in rows.zip(w).zip(image) {
+                let new = unit * *image - back * *w;
+                *dot += s.weight(i) * new * (unit * v[i]);
+                *w = new;
+            }
+        }
+    });
     parts.iter().sum()
 }
 
 /// `w ← w − α v` for the unit vector v along `v`, and the norm of w, in one pass.
 fn orthogonalize(s: &impl SelfAdjoint, (v, norm): (&[f64], f64), w: &mut [f64], alpha: f64) -> f64 {
     let step = alpha / norm;
-    let parts: Vec<f64> = w
-        .par_chunks_mut(CHUNK)
-        .zip(v.par_chunks(CHUNK))
-        .enumerate()
-        .map(|(k, (w, v))| {
-            let mut square = 0.0;
-            for (offset, (w, v)) in w.iter_mut().zip(v).enumerate() {
-                *w -= step * v;
-                square += s.weight(k * CHUNK + offset) * *w * *w;
-            }
-            square
-        })
-        .collect();
+    let mut parts = vec![0.0; w.len().div_ceil(CHUNK)];
+    parallel::chunks_with(w, CHUNK, &mut parts, |first, w, square| {
+        for ((i, w), v) in (first..).zip(w).zip(&v[first..]) {
+            *w -= step * v;
+            *square += s.weight(i) * *w * *w;
+        }
+    });
     parts.iter().sum::<f64>().sqrt()
 }
 
@@ -350,14 +288,7 @@ fn projected(alphas: &[f64], betas: &[f64], least_weight: f64) -> Result<(Ritz, 
 }
 
 fn weighted_norm(s: &impl SelfAdjoint, x: &[f64]) -> f64 {
-    let parts: Vec<f64> = x
-        .par_chunks(CHUNK)
-        .enumerate()
-        .map(|(k, x)| {
-            let square = |(offset, x): (usize, &f64)| s.weight(k * CHUNK + offset) * x * x;
-            x.iter().enumerate().map(square).sum()
-        })
-        .collect();
+    let parts = parallel::map(x.len(), CHUNK, |range| -> f64 { range.map(|i| s.weight(i) * x[i] * x[i]).sum() });
     parts.iter().sum::<f64>().sqrt()
 }
 

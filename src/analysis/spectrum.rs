@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::bracket::{alternation_is_all, bracket};
 use super::certificate::inertia;
 use super::eigen::End;
-use super::lanczos::{Matrix, Scalar, SelfAdjoint, rayleigh};
+use super::lanczos::{Matrix, SelfAdjoint, rayleigh};
 use super::singularity::{ZERO, colour};
 use super::{dense, lanczos};
 use crate::assemble::bounds::SpectralBounds;
@@ -324,7 +324,7 @@ struct Known {
 
 impl Known {
     /// The ends of both operators; `enclose` may know an end that attains no bound.
-    fn ends<T: Scalar>(&self, system: &T, enclose: impl Fn(Operator, End) -> Result<Option<Estimate>>) -> Result<Ends> {
+    fn ends<T: System>(&self, system: &T, enclose: impl Fn(Operator, End) -> Result<Option<Estimate>>) -> Result<Ends> {
         let b = &self.bounds;
         let mut applications = 0;
         let a = self.operator_ends(
@@ -353,7 +353,7 @@ impl Known {
 
     /// Both ends of one operator of eigenvalues of size `scale`: by a vector that attains a proven bound, else enclosed,
     /// else by Lanczos, where a less accurate enclosure may still tell the multiplicity.
-    fn operator_ends<T: Scalar>(
+    fn operator_ends<T: System>(
         &self,
         matrix: &Matrix<'_, T>,
         (least, greatest): (f64, f64),
@@ -475,7 +475,7 @@ fn components(m: &Csr) -> usize {
 ///
 /// # Panics
 /// If there is not one point a vertex.
-pub fn excited(system: &(impl System + Scalar), points: &[DVec3], operator: Operator) -> Result<Option<Extremes>> {
+pub fn excited(system: &impl System, points: &[DVec3], operator: Operator) -> Result<Option<Extremes>> {
     let n = points.len();
     let mut e = vec![DVec3::ZERO; n];
     let errors = Rows::new(n).residual(system, points, points, &mut e, |_, e, out, _| *out = e);
@@ -489,7 +489,7 @@ pub fn excited(system: &(impl System + Scalar), points: &[DVec3], operator: Oper
         // The residual of A V = P, or of D⁻¹A V = D⁻¹P.
         let start: Vec<f64> = match operator {
             Operator::A => e.iter().map(|e| e[axis]).collect(),
-            Operator::Jacobi => e.iter().zip(Scalar::diagonal(system)).map(|(e, a)| e[axis] / a).collect(),
+            Operator::Jacobi => e.iter().zip(system.diagonal()).map(|(e, a)| e[axis] / a).collect(),
         };
         let limits = lanczos::Limits {
             tolerance: ACCURACY,

@@ -1,9 +1,8 @@
 //! Bounds on the spectra of A and D⁻¹A that valences, face sizes and the diagonal alone prove.
 
-use rayon::prelude::*;
-
 use super::csr::Csr;
 use super::scheme::{Scheme, loop_beta, sqrt3_beta};
+use crate::parallel;
 
 /// Entries of one task.
 const CHUNK: usize = 8192;
@@ -29,7 +28,8 @@ impl SpectralBounds {
     /// `λ(A) ≥ min (2a_ii − 1)`, `λ(A) ≤ 1`, `2 − max 1/a_ii ≤ λ(D⁻¹A) ≤ max 1/a_ii`.
     pub fn gershgorin(diagonal: &[f64]) -> Self {
         // Both are attained at the least entry.
-        let least = diagonal.par_iter().with_min_len(CHUNK).copied().reduce(|| 1.0, f64::min);
+        let least = parallel::map(diagonal.len(), CHUNK, |range| diagonal[range].iter().copied().fold(1.0, f64::min));
+        let least = least.into_iter().fold(1.0, f64::min);
         let jacobi_lambda_max = 1.0 / least;
         SpectralBounds {
             lambda_min: 2.0 * least - 1.0,
@@ -87,12 +87,13 @@ impl SpectralBounds {
         let mut bounds = Self::gershgorin(diagonal);
         let greatest = valences.iter().copied().max().unwrap_or(0) as usize;
         let at: Vec<f64> = (0..=greatest).map(|n| lambda_min_at(scheme, n, triangles_only)).collect();
-        let (a, jacobi) = valences
-            .par_iter()
-            .zip(diagonal)
-            .with_min_len(CHUNK)
-            .map(|(&n, a_ii)| (at[n as usize], at[n as usize] / a_ii))
-            .reduce(|| (f64::INFINITY, f64::INFINITY), |(a, b), (c, d)| (a.min(c), b.min(d)));
+        let least = |(a, b): (f64, f64), (c, d): (f64, f64)| (a.min(c), b.min(d));
+        let none = (f64::INFINITY, f64::INFINITY);
+        let ends = parallel::map(valences.len(), CHUNK, |range| {
+            let pairs = valences[range.clone()].iter().zip(&diagonal[range]);
+            pairs.map(|(&n, a_ii)| (at[n as usize], at[n as usize] / a_ii)).fold(none, least)
+        });
+        let (a, jacobi) = ends.into_iter().fold(none, least);
         bounds.lambda_min = a.min(1.0);
         bounds.jacobi_lambda_min = jacobi.min(bounds.jacobi_lambda_max);
         bounds
@@ -122,10 +123,11 @@ fn discs(h: &[f64], m: &Csr) -> (f64, f64) {
     // f64::min and max would drop a NaN.
     let least = |a: f64, b: f64| if a.is_nan() || a <= b { a } else { b };
     let greatest = |a: f64, b: f64| if a.is_nan() || a >= b { a } else { b };
-    let all = (0..m.len()).into_par_iter().with_min_len(CHUNK).map(ends).reduce(
-        || [[f64::INFINITY, f64::NEG_INFINITY]; 3],
-        |a, b| std::array::from_fn(|k| [least(a[k][0], b[k][0]), greatest(a[k][1], b[k][1])]),
-    );
+    let none = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+    let joined = |a: [[f64; 2]; 3], b: [[f64; 2]; 3]| {
+        std::array::from_fn(|k| [least(a[k][0], b[k][0]), greatest(a[k][1], b[k][1])])
+    };
+    let all = parallel::map(m.len(), CHUNK, |range| range.map(ends).fold(none, joined)).into_iter().fold(none, joined);
     let best =
         |end: fn(&[f64; 2]) -> f64, choose: fn(f64, f64) -> f64| all.iter().map(end).reduce(choose).unwrap_or(0.0);
     (best(|e| e[0], f64::max), best(|e| e[1], f64::min))

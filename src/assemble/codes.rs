@@ -1,11 +1,12 @@
 //! The neighbours of all rows as they are stored, and the sums over them: the innermost loop of every sweep.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use rayon::prelude::*;
-
-use super::stencil::Point;
+use super::stencil::{Kind, Point, Ring};
+use crate::mesh::incidence::split_rows;
 use crate::pages::large;
+use crate::parallel;
 use crate::prefetch::prefetch;
 
 /// Rows of one task.
@@ -87,7 +88,7 @@ impl Codes {
         assert!(offsets.first() == Some(&0), "offsets from 0");
         let n = offsets.len() - 1;
         assert!(runs.first() == (n > 0).then_some(&0), "runs from row 0");
-        (0..runs.len()).into_par_iter().with_min_len(CHUNK).for_each(|k| {
+        parallel::each(runs.len(), |k| {
             let rows = rows_of_run(&runs, k, n);
             assert!(!rows.is_empty() && rows.end <= n, "runs ascend");
             let lengths = offsets[rows.start..=rows.end].windows(2).map(|w| w[1].checked_sub(w[0]));
@@ -165,36 +166,34 @@ fn rows_of_run(runs: &[u32], k: usize, n: usize) -> Range<usize> {
 fn encode<C: Code>(offsets: &[u32], fill: &(impl Fn(usize, &mut [u32]) + Sync)) -> Option<(u32, Vec<C>)> {
     let n = offsets.len() - 1;
     let mut codes = large(vec![C::default(); offsets[n] as usize]);
-    let mut tasks = Vec::with_capacity(n.div_ceil(CHUNK));
-    let mut rest = codes.as_mut_slice();
-    for first in (0..n).step_by(CHUNK) {
-        let rows = first..(first + CHUNK).min(n);
-        let (part, after) = rest.split_at_mut((offsets[rows.end] - offsets[first]) as usize);
-        tasks.push((rows, part));
-        rest = after;
-    }
-    let reach = tasks
-        .into_par_iter()
-        .map_init(Vec::new, |neighbours, (rows, mut part)| {
-            let (mut reach, mut last) = (0, 0);
-            for i in rows {
-                let length = (offsets[i + 1] - offsets[i]) as usize;
-                neighbours.clear();
-                neighbours.resize(length, 0);
-                fill(i, neighbours);
-                let (row, after) = part.split_at_mut(length);
-                for (code, &j) in row.iter_mut().zip(&*neighbours) {
-                    reach = reach.max(j.abs_diff(i as u32));
-                    last = last.max(j);
-                    *code = C::new(i as u32, j);
-                }
-                part = after;
+    let too_far = AtomicBool::new(false);
+    let reaches = parallel::parts(split_rows(offsets, CHUNK, &mut codes), |rows, mut part| {
+        let (mut reach, mut last) = (0, 0);
+        let mut neighbours = Vec::new();
+        for i in rows {
+            if too_far.load(Ordering::Relaxed) {
+                break;
             }
-            assert!((last as usize) < n, "a neighbour that is no vertex: {last}");
-            (reach <= C::REACH).then_some(reach)
-        })
-        .try_reduce(|| 0, |a, b| Some(a.max(b)))?;
-    Some((reach, codes))
+            let length = (offsets[i + 1] - offsets[i]) as usize;
+            neighbours.clear();
+            neighbours.resize(length, 0);
+            fill(i, &mut neighbours);
+            let (row, after) = part.split_at_mut(length);
+            for (code, &j) in row.iter_mut().zip(&*neighbours) {
+                reach = reach.max(j.abs_diff(i as u32));
+                last = last.max(j);
+                *code = C::new(i as u32, j);
+            }
+            part = after;
+        }
+        assert!((last as usize) < n, "a neighbour that is no vertex: {last}");
+        if reach > C::REACH {
+            too_far.store(true, Ordering::Relaxed);
+        }
+        reach
+    });
+    let reach = reaches.into_iter().max().unwrap_or(0);
+    (reach <= C::REACH).then_some((reach, codes))
 }
 
 /// The neighbours of one row.
@@ -262,82 +261,61 @@ impl<'a, P: Point, C: Code> Window<'a, P, C> {
     /// vertices within reach of it, and `Codes::window` has found all such vertices among the points.
     #[inline(always)]
     unsafe fn sum<const N: usize>(&self, at: usize, codes: &[C]) -> P {
-        // SAFETY: by the contract of this function.
-        let point = |c: C| unsafe { *self.points.get_unchecked(c.place(at, self.start)) };
         let codes = codes.first_chunk::<N>().expect("N neighbours");
-        let mut sum = point(codes[0]);
+        // SAFETY: by the contract of this function.
+        let mut sum = unsafe { *self.points.get_unchecked(codes[0].place(at, self.start)) };
         for &c in &codes[1..] {
-            sum += point(c);
+            // SAFETY: likewise.
+            sum += unsafe { *self.points.get_unchecked(c.place(at, self.start)) };
         }
         sum
     }
 }
 
+// A loop over rows is all in one function without closures: what is called once a row must be inlined, and a closure
+// may end up in another unit of code than the loop.
 impl<P: Point, C: Code> Run<'_, '_, P, C> {
     pub(super) fn rows(&self) -> Range<usize> {
         self.rows.clone()
     }
 
-    /// The number of neighbours of each row.
-    pub(super) fn neighbours(&self) -> usize {
-        self.length
-    }
-
-    /// For rows of 2N neighbours each, `visit(slot, own, sum of the first N, sum of the others)`, `slot` from
-    /// `slots`.
+    /// Rows of valence N: `out[k]` becomes the k-th row's (A x)_i. Under [`Kind::Polygons`] it holds before what the
+    /// faces add, and rows may have no neighbour beside.
     ///
     /// # Panics
-    /// If the rows have another number of neighbours.
+    /// If the rows have another number of neighbours than `kind` means.
     #[inline(always)]
-    pub(super) fn halves<const N: usize, T>(&self, slots: impl Iterator<Item = T>, mut visit: impl FnMut(T, P, P, P)) {
-        self.each(2 * N, slots, |slot, own, at, codes| {
-            let (near, across) = codes.split_at(N);
-            // SAFETY: `each` hands out the neighbours of the row at `at`, which is one of the window.
-            let sums = unsafe { (self.window.sum::<N>(at, near), self.window.sum::<N>(at, across)) };
-            visit(slot, own, sums.0, sums.1);
-        });
-    }
-
-    /// For rows of N neighbours each, `visit(slot, own, their sum)`.
-    ///
-    /// # Panics
-    /// As [`halves`](Self::halves).
-    #[inline(always)]
-    pub(super) fn wholes<const N: usize, T>(&self, slots: impl Iterator<Item = T>, mut visit: impl FnMut(T, P, P)) {
-        self.each(N, slots, |slot, own, at, codes| {
-            // SAFETY: as in `halves`.
-            let sum = unsafe { self.window.sum::<N>(at, codes) };
-            visit(slot, own, sum);
-        });
-    }
-
-    /// `visit(slot, own)` for rows of which no neighbour is asked for.
-    #[inline(always)]
-    pub(super) fn alone<T>(&self, slots: impl Iterator<Item = T>, mut visit: impl FnMut(T, P)) {
-        slots.zip(self.own()).for_each(|(slot, &own)| visit(slot, own));
-    }
-
-    /// The points of the rows themselves.
-    #[inline(always)]
-    fn own(&self) -> &[P] {
-        &self.window.points[self.rows.start - self.window.start..][..self.rows.len()]
-    }
-
-    /// `visit(slot, own, place, codes)` for rows of `length` neighbours: `codes` are those of the row whose point is at
-    /// `place`, since all rows of a run have the number of neighbours that is asserted here.
-    #[inline(always)]
-    fn each<T>(&self, length: usize, slots: impl Iterator<Item = T>, mut visit: impl FnMut(T, P, usize, &[C])) {
-        assert_eq!(self.length, length, "neighbours of a row");
+    pub(super) fn weigh<const N: usize>(&self, kind: Kind, ring: Ring<P::Weight>, out: &mut [P]) {
         let Window { all, codes, points, start, .. } = self.window;
-        let codes = &codes[all.offsets[self.rows.start] as usize..all.offsets[self.rows.end] as usize];
         let first = self.rows.start - start;
-        let lists = codes.chunks_exact(length);
+        let own = &points[first..][..self.rows.len()];
+        if kind == Kind::Polygons && self.length == 0 {
+            for (out, &own) in out.iter_mut().zip(own) {
+                *out = ring.value_alone(own, *out);
+            }
+            return;
+        }
+        let length = if kind == Kind::Quads { 2 * N } else { N };
+        assert_eq!(self.length, length, "neighbours of a row");
+        let codes = &codes[all.offsets[self.rows.start] as usize..all.offsets[self.rows.end] as usize];
         // The rows move on at one pace; what they read for the first time is as far ahead as they reach.
         let front = first + all.reach + AHEAD / size_of::<P>();
-        for (k, ((slot, &own), list)) in slots.zip(self.own()).zip(lists).enumerate() {
+        for (k, ((out, &own), list)) in out.iter_mut().zip(own).zip(codes.chunks_exact(length)).enumerate() {
             prefetch(points, front + k);
             prefetch(list, AHEAD / size_of::<C>());
-            visit(slot, own, first + k, list);
+            let (near, across) = list.split_at(N);
+            // SAFETY: `list` holds the neighbours of the row at place `first + k`, a row of the window: all rows of a
+            // run have the number of neighbours that is asserted above.
+            let edge = unsafe { self.window.sum::<N>(first + k, near) };
+            *out = match kind {
+                Kind::Quads => {
+                    // SAFETY: likewise.
+                    let across = unsafe { self.window.sum::<N>(first + k, across) };
+                    ring.value(own, edge, across)
+                }
+                Kind::Edges => ring.value_of_edges(own, edge),
+                Kind::Polygons => ring.value(own, edge, *out),
+            };
         }
     }
 }
@@ -403,7 +381,7 @@ mod tests {
         let codes = Codes::new(vec![0, 0, 2, 4, 6, 7, 8], vec![0, 1, 3, 4], |_, neighbours| neighbours.fill(3));
         let points = [0.0f64; 6];
         let Windows::Near(window) = codes.window(0..5, &points, 0) else { panic!("near") };
-        let found: Vec<_> = window.runs().map(|run| (run.rows(), run.neighbours())).collect();
+        let found: Vec<_> = window.runs().map(|run| (run.rows(), run.length)).collect();
         assert_eq!(found, [(0..1, 0), (1..3, 2), (3..4, 2), (4..5, 1)]);
         let Windows::Near(window) = codes.window(2..3, &points, 0) else { panic!("near") };
         assert!(window.runs().map(|run| run.rows()).eq(std::iter::once(2..3)));
@@ -421,7 +399,7 @@ mod tests {
     fn rows_of_another_length_are_refused() {
         let (codes, points) = (cycle(), [0.0f64; 10]);
         if let Windows::Near(window) = codes.window(0..10, &points, 0) {
-            window.runs().for_each(|run| run.wholes::<1, _>(0..10, |_, _, _| {}));
+            window.runs().for_each(|run| run.weigh::<1>(Kind::Edges, Ring::new(0.0, 1.0, 0.0), &mut [0.0; 10]));
         }
     }
 
@@ -431,8 +409,7 @@ mod tests {
         let points: Vec<f64> = (0..10).map(|i| f64::from(1 << i)).collect();
         let mut sums = [0.0; 10];
         if let Windows::Near(window) = codes.window(0..10, &points, 0) {
-            let mut slots = sums.iter_mut();
-            window.runs().for_each(|run| run.wholes::<2, _>(slots.by_ref(), |slot, _, sum| *slot = sum));
+            window.runs().for_each(|run| run.weigh::<2>(Kind::Edges, Ring::new(0.0, 1.0, 0.0), &mut sums));
         }
         for (i, &sum) in sums.iter().enumerate() {
             assert_eq!(sum, points[(i + 1) % 10] + points[(i + 9) % 10]);

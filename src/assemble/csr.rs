@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
-use rayon::prelude::*;
-
+use super::stencil::Point;
 use crate::error::{Error, Result};
+use crate::mesh::incidence::split_rows;
+use crate::parallel;
 
 /// Rows of one task.
 const CHUNK: usize = 4096;
@@ -26,7 +26,7 @@ impl Pattern {
         assert!(offsets.last().map(|&l| l as usize) == Some(columns.len()), "row offsets end at the number of entries");
         let n = offsets.len() - 1;
         let pattern = Pattern { offsets, columns };
-        (0..n).into_par_iter().with_min_len(CHUNK).for_each(|i| {
+        parallel::each(n, |i| {
             let row = pattern.row(i);
             assert!(
                 row.is_sorted_by(|a, b| a < b) && row.last().is_none_or(|&c| (c as usize) < n),
@@ -139,7 +139,7 @@ impl Csr {
 
     /// The main diagonal.
     pub fn diagonal(&self) -> Vec<f64> {
-        (0..self.len()).into_par_iter().with_min_len(CHUNK).map(|i| self.get(i, i)).collect()
+        parallel::collect(self.len(), |i| self.get(i, i))
     }
 
     /// The transposed matrix. O(N + entries).
@@ -174,17 +174,8 @@ impl Csr {
     pub fn scale_rows(&self, scale: &[f64]) -> Csr {
         assert_eq!(scale.len(), self.len(), "one factor a row");
         let mut values = vec![0.0; self.values.len()];
-        let mut parts = Vec::with_capacity(scale.len().div_ceil(CHUNK));
-        let mut rest = values.as_mut_slice();
-        for (k, scale) in scale.chunks(CHUNK).enumerate() {
-            let first = k * CHUNK;
-            let entries = self.pattern.offsets[first + scale.len()] - self.pattern.offsets[first];
-            let (part, after) = rest.split_at_mut(entries as usize);
-            parts.push((first, scale, part));
-            rest = after;
-        }
-        parts.into_par_iter().for_each(|(first, scale, mut part)| {
-            for (i, &s) in (first..).zip(scale) {
+        parallel::parts(split_rows(&self.pattern.offsets, CHUNK, &mut values), |rows, mut part| {
+            for (i, &s) in rows.clone().zip(&scale[rows]) {
                 let row = self.row_values(i);
                 let (out, after) = part.split_at_mut(row.len());
                 for (out, &v) in out.iter_mut().zip(row) {
@@ -209,23 +200,15 @@ impl Csr {
         Csr { pattern: Arc::clone(&self.pattern), values }
     }
 
-    /// Row `i` times the points `x`: Σ_j a_ij x_j.
+    /// Row `i` times `x`, points or numbers: Σ_j a_ij x_j.
     #[inline]
-    pub fn row_times(&self, i: usize, x: &[DVec3]) -> DVec3 {
+    pub fn row_times<P: Point>(&self, i: usize, x: &[P]) -> P {
         let range = self.pattern.range(i);
-        let mut sum = DVec3::ZERO;
+        let mut sum = P::ZERO;
         for (&j, &a) in self.pattern.columns[range.clone()].iter().zip(&self.values[range]) {
-            sum += a * x[j as usize];
+            sum += x[j as usize].times(P::weight(a));
         }
         sum
-    }
-
-    /// Row `i` times the numbers `x`.
-    #[inline]
-    pub fn row_times_scalar(&self, i: usize, x: &[f64]) -> f64 {
-        let range = self.pattern.range(i);
-        let columns = &self.pattern.columns[range.clone()];
-        columns.iter().zip(&self.values[range]).map(|(&j, &a)| a * x[j as usize]).sum()
     }
 }
 

@@ -4,7 +4,6 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::bounds::{SpectralBounds, usual_lambda_min};
 use super::codes::Neighbours;
@@ -15,9 +14,7 @@ use super::system::{check_boundary, check_faces};
 use crate::error::Result;
 use crate::mesh::order::Numbering;
 use crate::mesh::{Faces, Incidence, Topology};
-
-/// Rows of one task.
-const CHUNK: usize = 4096;
+use crate::parallel;
 
 /// A = H·M without stored entries: a row knows its neighbours, and its weights follow from valence and face size.
 ///
@@ -97,15 +94,13 @@ impl Operator {
         let double = source.rings();
         let stencil = Stencil { codes, kinds, single: double.single(), double, polygons };
         // The rows of a run are alike, but for the sizes of faces that are summed: there the extremes tell all.
-        let (valences, diagonal): (Vec<u32>, Vec<f64>) = (0..stencil.codes.runs().len())
-            .into_par_iter()
-            .flat_map_iter(|k| {
-                let run = stencil.codes.run(k);
-                let n = source.valences[run.start];
-                let [least, greatest] = stencil.extremes(run);
-                [(n, least), (n, greatest)]
-            })
-            .unzip();
+        let extremes = parallel::collect(stencil.codes.runs().len(), |k| {
+            let run = stencil.codes.run(k);
+            let n = source.valences[run.start];
+            let [least, greatest] = stencil.extremes(run);
+            [(n, least), (n, greatest)]
+        });
+        let (valences, diagonal): (Vec<u32>, Vec<f64>) = extremes.into_iter().flatten().unzip();
         let triangles = faces.uniform_size() == Some(3);
         let bounds = if closed {
             SpectralBounds::closed(scheme, &valences, triangles, &diagonal)
@@ -142,8 +137,7 @@ impl Operator {
     }
 
     fn by_row(&self, value: impl Fn(usize) -> f64 + Send + Sync) -> Vec<f64> {
-        let rows = (0..self.len()).into_par_iter().with_min_len(CHUNK);
-        rows.map(value).collect()
+        parallel::collect(self.len(), value)
     }
 
     /// h_i.
@@ -163,7 +157,7 @@ impl Operator {
 
     /// (A x)_i. O(neighbours), and O(corners of the faces at `i`) where faces are summed.
     #[inline]
-    pub fn row(&self, i: usize, x: &[DVec3]) -> DVec3 {
+    pub fn row<P: Point>(&self, i: usize, x: &[P]) -> P {
         self.stencil.row(i, (x, 0))
     }
 
@@ -213,22 +207,14 @@ impl Operator {
         self.stencil.polygons.sum(first, window, sums);
     }
 
-    /// Calls `visit(slot, x_i, (A x)_i)` for every row i of `rows`, in ascending order. `slots(m)` gives what the next
-    /// m rows are visited with. `window` holds x from vertex `start` on, as far as the rows [reach](Self::reach),
-    /// and `sums` those of [all faces](Self::all_sums), or from a number on [those of the rows](Self::sums_of).
+    /// `out[k]` becomes (A x)_i of the k-th row i of `rows`. `window` holds x from vertex `start` on, as far as the rows
+    /// [reach](Self::reach), and `sums` those of [all faces](Self::all_sums), or from a number on [those of the
+    /// rows](Self::sums_of).
     ///
     /// # Panics
-    /// If a row reaches beyond the window.
-    #[inline(always)]
-    pub fn rows<P: Point, I: Iterator>(
-        &self,
-        rows: Range<usize>,
-        window: (&[P], usize),
-        sums: (&[P], usize),
-        slots: impl FnMut(usize) -> I,
-        visit: impl FnMut(I::Item, P, P),
-    ) {
-        self.stencil.rows(rows, window, sums, slots, visit);
+    /// If a row reaches beyond the window, or `out` has not one place a row.
+    pub fn product<P: Point>(&self, rows: Range<usize>, window: (&[P], usize), sums: (&[P], usize), out: &mut [P]) {
+        self.stencil.product(rows, window, sums, out);
     }
 
     /// The greatest distance in the vertex order between a row and its neighbours.

@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use glam::Vec3A;
-use rayon::prelude::*;
 
 use super::scheme::Scheme;
 use super::stencil::{Kind, Point};
@@ -14,6 +13,7 @@ use crate::mesh::order::Numbering;
 use crate::mesh::topology::NONE;
 use crate::mesh::{Faces, Incidence};
 use crate::pages::{filled, large};
+use crate::parallel;
 use crate::prefetch::prefetch;
 
 /// Faces are ordered by the block of so many rows that the first of their corners is in, and by size within a block.
@@ -77,7 +77,7 @@ impl Polygons {
         let sorted = all.sort(&mut numbers, kinds.len().div_ceil(BLOCK));
         all.measure(faces, scheme, &sorted);
         all.corners = large(vec![0; all.offsets.last().map_or(0, |&end| end as usize)]);
-        split_rows(&all.offsets, CHUNK, &mut all.corners).into_par_iter().for_each(|(some, mut rest)| {
+        parallel::parts(split_rows(&all.offsets, CHUNK, &mut all.corners), |some, mut rest| {
             for &f in &sorted[some] {
                 let face = faces.face(f as usize);
                 let (corners, after) = rest.split_at_mut(face.len());
@@ -92,11 +92,9 @@ impl Polygons {
     /// By face: the key to sort it by; [`NONE`] if no row needs its sum.
     fn keys(&mut self, faces: &Faces, kinds: &[Kind], row: impl Fn(u32) -> u32 + Sync) -> Vec<u32> {
         let mut keys = large(vec![NONE; faces.len()]);
-        let reach = keys
-            .par_iter_mut()
-            .enumerate()
-            .with_min_len(CHUNK)
-            .map(|(f, key)| {
+        let mut reach = vec![0; keys.len().div_ceil(CHUNK)];
+        parallel::chunks_with(&mut keys, CHUNK, &mut reach, |start, keys, reach| {
+            for (f, key) in (start..).zip(keys) {
                 let face = faces.face(f);
                 let (mut first, mut last, mut summed) = (NONE, 0, false);
                 for &v in face {
@@ -104,14 +102,13 @@ impl Polygons {
                     (first, last) = (first.min(i), last.max(i));
                     summed |= kinds[i as usize] == Kind::Polygons;
                 }
-                if !summed {
-                    return 0;
+                if summed {
+                    *key = (first as usize / BLOCK * (LARGE + 1) + face.len().min(LARGE)) as u32;
+                    *reach = last.abs_diff(first).max(*reach);
                 }
-                *key = (first as usize / BLOCK * (LARGE + 1) + face.len().min(LARGE)) as u32;
-                last - first
-            })
-            .max();
-        self.reach = reach.unwrap_or(0) as usize;
+            }
+        });
+        self.reach = reach.into_iter().max().unwrap_or(0) as usize;
         keys
     }
 
@@ -206,7 +203,7 @@ impl Polygons {
     ) -> Vec<u32> {
         let count = self.starts.last().map_or(0, |&end| end as usize);
         let mut table = large(vec![0; count]);
-        split_rows(&self.starts, CHUNK, &mut table).into_par_iter().for_each(|(rows, mut rest)| {
+        parallel::parts(split_rows(&self.starts, CHUNK, &mut table), |rows, mut rest| {
             for i in rows.filter(|&i| !self.at(i).is_empty()) {
                 if let Some(numbering) = numbering {
                     incidence.fetch_ahead(faces, numbering.order(), i);
@@ -301,9 +298,7 @@ impl Polygons {
         if sums.len() != count {
             *sums = filled(count, P::ZERO);
         }
-        sums.par_chunks_mut(self.parts.max(1) * CHUNK)
-            .enumerate()
-            .for_each(|(k, sums)| self.sum(self.parts * k * CHUNK, (x, 0), sums));
+        parallel::chunks(sums, self.parts.max(1) * CHUNK, |first, sums| self.sum(first, (x, 0), sums));
     }
 
     /// The sums from number `first` on, of whole faces. `points` holds x from row `start` on, as far as these reach.
@@ -373,37 +368,47 @@ impl Polygons {
         }
     }
 
-    /// What the N faces listed from place `e` on add up to, their sums known from number `first` on.
-    #[inline(always)]
-    pub(super) fn gather<const N: usize, P: Point>(&self, e: usize, sums: (&[P], usize)) -> P {
-        self.gather_in(e..e + N, sums)
+    /// What the faces at each row add up to, where all rows have `valence` of them, their sums known from number `first`
+    /// on.
+    pub(super) fn gather<P: Point>(&self, rows: Range<usize>, valence: usize, sums: (&[P], usize), out: &mut [P]) {
+        match valence {
+            3 => self.gather_run(rows, 3, sums, out),
+            4 => self.gather_run(rows, 4, sums, out),
+            5 => self.gather_run(rows, 5, sums, out),
+            6 => self.gather_run(rows, 6, sums, out),
+            n => self.gather_run(rows, n, sums, out),
+        }
     }
 
-    /// As [`gather`](Self::gather), of any number of faces.
     #[inline(always)]
-    pub(super) fn gather_in<P: Point>(&self, e: Range<usize>, (sums, first): (&[P], usize)) -> P {
-        if is_far(sums) {
-            let ahead = self.faces.get(e.start + AHEAD..e.end + AHEAD);
-            for &f in ahead.unwrap_or_default() {
-                prefetch(sums, (self.parts * f as usize).wrapping_sub(first));
-            }
-        }
-        let faces = &self.faces[e.clone()];
-        let mut total = P::ZERO;
-        if self.parts == 1 {
-            for &f in faces {
-                total += sums[(f as usize).wrapping_sub(first)];
-            }
-            return total;
-        }
+    fn gather_run<P: Point>(&self, rows: Range<usize>, n: usize, (sums, first): (&[P], usize), out: &mut [P]) {
+        let far = is_far(sums);
         let turns = P::turns(self);
-        for (&f, &place) in faces.iter().zip(&self.places[e]) {
-            let at = (3 * f as usize).wrapping_sub(first);
-            let [cos, sin] = turns[place as usize];
-            let sums = &sums[at..at + 3];
-            total += sums[0] + sums[1].times(cos) + sums[2].times(sin);
+        let start = self.at(rows.start).start;
+        for (k, out) in out.iter_mut().enumerate() {
+            let e = start + k * n..start + (k + 1) * n;
+            if far {
+                let ahead = self.faces.get(e.start + AHEAD..e.end + AHEAD);
+                for &f in ahead.unwrap_or_default() {
+                    prefetch(sums, (self.parts * f as usize).wrapping_sub(first));
+                }
+            }
+            let faces = &self.faces[e.clone()];
+            let mut total = P::ZERO;
+            if self.parts == 1 {
+                for &f in faces {
+                    total += sums[(f as usize).wrapping_sub(first)];
+                }
+            } else {
+                for (&f, &place) in faces.iter().zip(&self.places[e]) {
+                    let at = (3 * f as usize).wrapping_sub(first);
+                    let [cos, sin] = turns[place as usize];
+                    let sums = &sums[at..at + 3];
+                    total += sums[0] + sums[1].times(cos) + sums[2].times(sin);
+                }
+            }
+            *out = total;
         }
-        total
     }
 
     /// What the faces at row `i` add up to, for this row alone: O(corners of these faces).

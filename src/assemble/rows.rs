@@ -10,6 +10,7 @@ use crate::memory::require;
 use crate::mesh::incidence::{next_in, prev_in, split_rows};
 use crate::mesh::{Faces, Topology};
 use crate::pages::large;
+use crate::parallel;
 
 /// Rows handed to one task: large enough to pay for it, small enough to share out evenly.
 const CHUNK: usize = 8192;
@@ -198,12 +199,12 @@ impl<'a> Rows<'a> {
             });
             edges + 1 + others.sum::<u32>()
         };
-        (0..self.valence.len()).into_par_iter().with_min_len(CHUNK).map(length).collect()
+        parallel::collect(self.valence.len(), length)
     }
 
     /// All rows, if their lengths are at most these; otherwise their true lengths.
     fn fill(&self, lengths: Vec<u32>) -> Result<std::result::Result<Arrays, Vec<u32>>> {
-        let total: u64 = lengths.par_iter().map(|&l| u64::from(l)).sum();
+        let total: u64 = lengths.iter().map(|&l| u64::from(l)).sum();
         if u32::try_from(total).is_err() {
             return Err(Error::Computation(format!(
                 "the matrix would have {total} entries, more than 32-bit indices reach; use a smaller mesh or one \

@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::codes::Codes;
 use super::polygons::Polygons;
 use super::scheme::{Masks, Scheme};
@@ -13,9 +11,7 @@ use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::order::Numbering;
 use crate::mesh::{Faces, Incidence, Topology};
 use crate::pages::large;
-
-/// Rows of one task.
-const CHUNK: usize = 4096;
+use crate::parallel;
 
 /// What the rows are built from.
 pub(super) struct Source<'a> {
@@ -43,14 +39,10 @@ impl<'a> Source<'a> {
         let order = numbering.map(Numbering::order);
         assert!(order.is_none_or(|order| order.len() == n), "one entry a vertex");
         let vertex = |k: usize| order.map_or(k, |order| order[k] as usize);
-        let valences = (0..n)
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(|k| match open {
-                None => incidence.face_count(vertex(k)) as u32,
-                Some(topology) => topology.edge_valence(faces, vertex(k)) as u32,
-            })
-            .collect();
+        let valences = parallel::collect(n, |k| match open {
+            None => incidence.face_count(vertex(k)) as u32,
+            Some(topology) => topology.edge_valence(faces, vertex(k)) as u32,
+        });
         Source { faces, incidence, open, numbering, scheme, valences }
     }
 
@@ -85,27 +77,23 @@ impl<'a> Source<'a> {
             return vec![of_size(size); n];
         }
         let incidence = self.incidence;
-        (0..n)
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(|k| {
-                self.fetch_ahead(k);
-                // One bit for each kind that occurs: no branch on what there is no pattern in.
-                let at = incidence.corners_at(self.vertex(k)).iter();
-                let met = at.fold(0, |met, &c| {
-                    let kind = of_size(self.faces.range(incidence.face_of(c)).len());
-                    met | 1u8 << kind as u8
-                });
-                let only = |kind: Kind| met == 1 << kind as u8;
-                if only(Kind::Quads) {
-                    Kind::Quads
-                } else if met == 0 || only(Kind::Edges) {
-                    Kind::Edges
-                } else {
-                    Kind::Polygons
-                }
-            })
-            .collect()
+        parallel::collect(n, |k| {
+            self.fetch_ahead(k);
+            // One bit for each kind that occurs: no branch on what there is no pattern in.
+            let at = incidence.corners_at(self.vertex(k)).iter();
+            let met = at.fold(0, |met, &c| {
+                let kind = of_size(self.faces.range(incidence.face_of(c)).len());
+                met | 1u8 << kind as u8
+            });
+            let only = |kind: Kind| met == 1 << kind as u8;
+            if only(Kind::Quads) {
+                Kind::Quads
+            } else if met == 0 || only(Kind::Edges) {
+                Kind::Edges
+            } else {
+                Kind::Polygons
+            }
+        })
     }
 
     /// The faces that are summed, and the rows that read them.

@@ -5,7 +5,7 @@ use std::ops::{Add, AddAssign, Range, Sub};
 
 use glam::{DVec3, Vec3A};
 
-use super::codes::{self, Code, Codes, Row, Window, Windows};
+use super::codes::{Code, Codes, Row, Window, Windows};
 use super::polygons::Polygons;
 
 /// What an operator acts on: three right-hand sides of one vertex, interleaved, in doubles (24 bytes) or singles
@@ -117,17 +117,17 @@ impl<W> Ring<W> {
 
 impl<W: Copy> Ring<W> {
     #[inline(always)]
-    fn value<P: Point<Weight = W>>(&self, own: P, edge: P, across: P) -> P {
+    pub(super) fn value<P: Point<Weight = W>>(&self, own: P, edge: P, across: P) -> P {
         own.times(self.own) + edge.times(self.edge) + across.times(self.across)
     }
 
     #[inline(always)]
-    fn value_alone<P: Point<Weight = W>>(&self, own: P, across: P) -> P {
+    pub(super) fn value_alone<P: Point<Weight = W>>(&self, own: P, across: P) -> P {
         own.times(self.own) + across.times(self.across)
     }
 
     #[inline(always)]
-    fn value_of_edges<P: Point<Weight = W>>(&self, own: P, edge: P) -> P {
+    pub(super) fn value_of_edges<P: Point<Weight = W>>(&self, own: P, edge: P) -> P {
         own.times(self.own) + edge.times(self.edge)
     }
 }
@@ -217,60 +217,59 @@ impl Stencil {
         })
     }
 
-    /// Calls `visit(slot, x_i, (A x)_i)` for every row i of `rows`, the slots from `slots(number of rows)`, which is
-    /// asked for one run of rows after the other. `points` holds x from vertex `start` on, as far as these rows
+    /// `out[k]` becomes (A x)_i of the k-th row i of `rows`. `points` holds x from vertex `start` on, as far as these rows
     /// reach; `sums` those of their faces, from one of them on.
     ///
     /// # Panics
-    /// If a row reaches beyond the points.
-    #[inline(always)]
-    pub(super) fn rows<P: Point, I: Iterator>(
+    /// If a row reaches beyond the points, or `out` has not one place a row.
+    pub(super) fn product<P: Point>(
         &self,
         rows: Range<usize>,
         (points, start): (&[P], usize),
         sums: (&[P], usize),
-        slots: impl FnMut(usize) -> I,
-        visit: impl FnMut(I::Item, P, P),
+        out: &mut [P],
     ) {
+        assert_eq!(rows.len(), out.len(), "one place a row");
         match self.codes.window(rows, points, start) {
-            Windows::Near(window) => self.coded(&window, (points, start), sums, slots, visit),
-            Windows::Far(window) => self.coded(&window, (points, start), sums, slots, visit),
+            Windows::Near(window) => self.coded(&window, (points, start), sums, out),
+            Windows::Far(window) => self.coded(&window, (points, start), sums, out),
         }
     }
 
-    #[inline(always)]
-    fn coded<P: Point, C: Code, I: Iterator>(
+    fn coded<P: Point, C: Code>(
         &self,
         window: &Window<P, C>,
         (points, start): (&[P], usize),
         sums: (&[P], usize),
-        mut slots: impl FnMut(usize) -> I,
-        mut visit: impl FnMut(I::Item, P, P),
+        mut out: &mut [P],
     ) {
+        use Kind::{Edges, Polygons, Quads};
         let rings = P::rings(self);
-        for rows in window.runs() {
-            let Range { start: from, end: to } = rows.rows();
-            let run = Run { rows, slots: slots(to - from) };
-            match (self.kinds[from], self.valence(from)) {
-                (Kind::Quads, 4) => run.quads::<4>(rings, &mut visit),
-                (Kind::Quads, 3) => run.quads::<3>(rings, &mut visit),
-                (Kind::Quads, 5) => run.quads::<5>(rings, &mut visit),
-                (Kind::Quads, 6) => run.quads::<6>(rings, &mut visit),
-                (Kind::Edges, 6) => run.edges::<6>(rings, &mut visit),
-                (Kind::Edges, 5) => run.edges::<5>(rings, &mut visit),
-                (Kind::Edges, 7) => run.edges::<7>(rings, &mut visit),
-                (Kind::Edges, 4) => run.edges::<4>(rings, &mut visit),
-                (Kind::Edges, 3) => run.edges::<3>(rings, &mut visit),
-                (Kind::Edges, 8) => run.edges::<8>(rings, &mut visit),
-                (Kind::Polygons, 3) => run.polygons::<3>(rings, &self.polygons, sums, &mut visit),
-                (Kind::Polygons, 4) => run.polygons::<4>(rings, &self.polygons, sums, &mut visit),
-                (Kind::Polygons, 5) => run.polygons::<5>(rings, &self.polygons, sums, &mut visit),
-                (Kind::Polygons, 6) => run.polygons::<6>(rings, &self.polygons, sums, &mut visit),
+        for run in window.runs() {
+            let Range { start: from, end: to } = run.rows();
+            let out = out.split_off_mut(..to - from).expect("one place a row");
+            let (kind, valence) = (self.kinds[from], self.valence(from));
+            if kind == Polygons {
+                self.polygons.gather(from..to, valence, sums, out);
+            }
+            match (kind, valence) {
+                (Quads, 4) => run.weigh::<4>(Quads, rings.quads[4], out),
+                (Quads, 3) => run.weigh::<3>(Quads, rings.quads[3], out),
+                (Quads, 5) => run.weigh::<5>(Quads, rings.quads[5], out),
+                (Quads, 6) => run.weigh::<6>(Quads, rings.quads[6], out),
+                (Edges, 6) => run.weigh::<6>(Edges, rings.edges[6], out),
+                (Edges, 5) => run.weigh::<5>(Edges, rings.edges[5], out),
+                (Edges, 7) => run.weigh::<7>(Edges, rings.edges[7], out),
+                (Edges, 4) => run.weigh::<4>(Edges, rings.edges[4], out),
+                (Edges, 3) => run.weigh::<3>(Edges, rings.edges[3], out),
+                (Edges, 8) => run.weigh::<8>(Edges, rings.edges[8], out),
+                (Polygons, 3) => run.weigh::<3>(Polygons, rings.polygons[3], out),
+                (Polygons, 4) => run.weigh::<4>(Polygons, rings.polygons[4], out),
+                (Polygons, 5) => run.weigh::<5>(Polygons, rings.polygons[5], out),
+                (Polygons, 6) => run.weigh::<6>(Polygons, rings.polygons[6], out),
                 _ => {
-                    let faces = |i| self.polygons.gather_in(self.polygons.at(i), sums);
-                    for (i, slot) in (from..to).zip(run.slots) {
-                        let value = self.coded_row(window.codes(i), i, points, start, faces);
-                        visit(slot, points[i - start], value);
+                    for (i, out) in (from..to).zip(out) {
+                        *out = self.coded_row(window.codes(i), i, points, start, |_| *out);
                     }
                 }
             }
@@ -356,55 +355,4 @@ fn sum<P: Point, C: Code>(codes: &[C], window: &[P], row: usize, start: usize) -
         sum += window[place];
     }
     sum
-}
-
-/// Consecutive rows of one kind and valence, with what they are visited with.
-struct Run<'w, 'a, P, C, I> {
-    rows: codes::Run<'w, 'a, P, C>,
-    slots: I,
-}
-
-impl<P: Point, C: Code, I: Iterator> Run<'_, '_, P, C, I> {
-    /// Rows of valence N among quads.
-    #[inline(always)]
-    fn quads<const N: usize>(self, rings: &Rings<P::Weight>, visit: &mut impl FnMut(I::Item, P, P)) {
-        let ring = rings.quads[N];
-        self.rows.halves::<N, _>(self.slots, |slot, own, edge, across| {
-            visit(slot, own, ring.value(own, edge, across));
-        });
-    }
-
-    /// Rows of N edge neighbours.
-    #[inline(always)]
-    fn edges<const N: usize>(self, rings: &Rings<P::Weight>, visit: &mut impl FnMut(I::Item, P, P)) {
-        let ring = rings.edges[N];
-        self.rows.wholes::<N, _>(self.slots, |slot, own, edge| {
-            visit(slot, own, ring.value_of_edges(own, edge));
-        });
-    }
-
-    /// Rows of N faces that are summed.
-    #[inline(always)]
-    fn polygons<const N: usize>(
-        self,
-        rings: &Rings<P::Weight>,
-        polygons: &Polygons,
-        sums: (&[P], usize),
-        visit: &mut impl FnMut(I::Item, P, P),
-    ) {
-        let ring = rings.polygons[N];
-        let listed = (polygons.at(self.rows.rows().start).start..).step_by(N);
-        let slots = self.slots.zip(listed);
-        if self.rows.neighbours() == 0 {
-            self.rows.alone(slots, |(slot, e), own| {
-                let across = polygons.gather::<N, P>(e, sums);
-                visit(slot, own, ring.value_alone(own, across));
-            });
-        } else {
-            self.rows.wholes::<N, _>(slots, |(slot, e), own, edge| {
-                let across = polygons.gather::<N, P>(e, sums);
-                visit(slot, own, ring.value(own, edge, across));
-            });
-        }
-    }
 }

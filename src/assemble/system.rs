@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::bounds::SpectralBounds;
 use super::csr::{Csr, Pattern};
@@ -11,9 +10,7 @@ use super::rows::Rows;
 use super::scheme::{Masks, Scheme};
 use crate::error::{Error, Result};
 use crate::mesh::{Faces, Mesh, Topology};
-
-/// Rows handed to one task: large enough to pay for it, small enough to share out evenly.
-const CHUNK: usize = 8192;
+use crate::parallel;
 
 /// The limit system `A V = P` of one mesh: `A = H·M` explicitly, with both factors.
 ///
@@ -77,12 +74,12 @@ impl LimitSystem {
     /// More than 2³² − 1 entries.
     pub fn with_masks(mesh: &Mesh, topology: &Topology, masks: &impl Masks) -> Result<Self> {
         let valence = valences(&mesh.faces, topology);
-        let largest = valence.par_iter().copied().max().unwrap_or(0) as usize;
+        let largest = valence.iter().copied().max().unwrap_or(0) as usize;
         let by_valence: Vec<[f64; 2]> = (0..=largest).map(|n| [masks.h(n), masks.vertex_weight(n)]).collect();
         let blocks = FaceBlocks::new(&mesh.faces, masks);
         let rows = Rows::new(&mesh.faces, topology, &blocks, &by_valence, &valence);
         let arrays = rows.arrays()?;
-        let h = valence.par_iter().map(|&n| by_valence[n as usize][0]);
+        let h = valence.iter().map(|&n| by_valence[n as usize][0]);
         let bounds = SpectralBounds::gershgorin(&arrays.diagonal);
         let pattern = Arc::new(Pattern::new(arrays.offsets, arrays.columns));
         Ok(LimitSystem {
@@ -140,17 +137,13 @@ pub(super) fn check_boundary(faces: &Faces, topology: &Topology, scheme: Scheme)
 
 /// The number of edges at every vertex: the valence n of the masks, on a boundary too.
 pub fn valences(faces: &Faces, topology: &Topology) -> Vec<u32> {
-    (0..topology.incidence.vertices())
-        .into_par_iter()
-        .with_min_len(CHUNK)
-        .map(|v| {
-            if topology.boundary_edges() == 0 {
-                topology.incidence.face_count(v) as u32
-            } else {
-                topology.edge_valence(faces, v) as u32
-            }
-        })
-        .collect()
+    parallel::collect(topology.incidence.vertices(), |v| {
+        if topology.boundary_edges() == 0 {
+            topology.incidence.face_count(v) as u32
+        } else {
+            topology.edge_valence(faces, v) as u32
+        }
+    })
 }
 
 /// For every face size that occurs, what a face adds between a corner and the one k steps further: its

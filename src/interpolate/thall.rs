@@ -3,12 +3,12 @@
 //! [`normals`](super::normals).
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::Result;
 use crate::mesh::frame::of_order_one;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Mesh, Topology, generate};
+use crate::parallel;
 use crate::solvers::iteration::{Errors, Failure, Iterate};
 use crate::solvers::jacobi::THALL_OMEGA;
 use crate::solvers::system::Rows;
@@ -78,7 +78,7 @@ impl<'a> LocalIteration<'a> {
             debug_assert!(n >= 2.0);
             own + opposite * through_faces
         };
-        let inverse = (0..mesh.len()).into_par_iter().map(|v| THALL_OMEGA / weight(v)).collect();
+        let inverse = parallel::collect(mesh.len(), |v| THALL_OMEGA / weight(v));
         LocalIteration {
             mesh,
             topology,
@@ -120,7 +120,7 @@ fn limit(mesh: &Mesh, topology: &Topology, points: &[DVec3], centers: &[DVec3], 
 impl Iterate for LocalIteration<'_> {
     fn errors(&mut self) -> Errors {
         let (mesh, topology, current) = (self.mesh, self.topology, &self.current);
-        self.centers.par_iter_mut().enumerate().for_each(|(f, c)| {
+        parallel::change(&mut self.centers, |f, c| {
             let face = mesh.faces.face(f);
             let sum: DVec3 = face.iter().map(|&v| current[v as usize]).sum();
             *c = 4.0 / face.len() as f64 * sum;

@@ -6,15 +6,18 @@
 //! planes at every level.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::normals::unit_normals;
 use super::subset::nothing;
 use crate::error::short;
 use crate::mesh::{Mesh, Topology};
+use crate::parallel;
 use crate::subdivide::Refinement;
 use crate::subdivide::doo_sabin::{Rule, refine_by};
 use crate::{Error, Result};
+
+/// Vertices of one task.
+const CHUNK: usize = 1024;
 
 /// How phase one updates the vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,19 +143,16 @@ pub fn auxiliary(
             Sweep::GaussSeidel(None) => system.sweep((0..mesh.len()).filter(moves)),
             Sweep::Jacobi => {
                 let fixed = &system;
-                let squared = next
-                    .par_iter_mut()
-                    .enumerate()
-                    .with_min_len(1024)
-                    .filter(|(v, _)| moves(v))
-                    .map(|(v, next)| {
+                let mut squared = vec![0.0f64; next.len().div_ceil(CHUNK)];
+                parallel::chunks_with(&mut next, CHUNK, &mut squared, |first, next, squared| {
+                    for (v, next) in (first..).zip(next).filter(|(v, _)| moves(v)) {
                         let update = fixed.update(v);
                         *next = fixed.points[v] + update;
-                        update.length_squared()
-                    })
-                    .reduce(|| 0.0, f64::max);
+                        *squared = squared.max(update.length_squared());
+                    }
+                });
                 system.points.copy_from_slice(&next);
-                squared.sqrt()
+                squared.into_iter().fold(0.0, f64::max).sqrt()
             }
         };
         updates.push(largest);
@@ -178,11 +178,7 @@ impl<'a> LocalSystem<'a> {
     /// Anew in every sweep, so that rounding does not add up.
     fn sum_faces(&mut self) {
         let (faces, points) = (&self.mesh.faces, &self.points);
-        self.sums
-            .par_iter_mut()
-            .enumerate()
-            .with_min_len(1024)
-            .for_each(|(f, sum)| *sum = faces.face(f).iter().map(|&v| points[v as usize]).sum());
+        parallel::fill(&mut self.sums, |f| faces.face(f).iter().map(|&v| points[v as usize]).sum());
     }
 
     /// How far Eq. 7 moves `v`.

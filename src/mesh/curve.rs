@@ -1,10 +1,10 @@
 //! Along a space-filling curve: which meshes lie scattered through memory, and the way to bring them together.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::order::Numbering;
 use super::{Faces, Mesh, bounding_box};
+use crate::parallel;
 
 /// Whether vertices that faces bring together lie scattered through memory: of the vertices that a face does not
 /// share with the face before it, fewer than a quarter are within 128 places of one of that face's. Looks
@@ -39,24 +39,23 @@ pub fn along_curve(mesh: &Mesh) -> Option<(Mesh, Numbering)> {
     let n = mesh.len();
     let numbering = Numbering::new(morton_cells(&mesh.positions));
     let place = numbering.place();
-    let corners: Option<Vec<u32>> =
-        mesh.faces.corners().par_iter().with_min_len(8192).map(|&v| place.get(v as usize).copied()).collect();
-    let moved = Faces::from_parts(mesh.faces.offsets().to_vec(), corners?);
-    let smallest: Vec<u32> = (0..moved.len())
-        .into_par_iter()
-        .with_min_len(8192)
-        .map(|f| moved.face(f).iter().copied().min().unwrap_or(0))
-        .collect();
+    let old = mesh.faces.corners();
+    if parallel::any(old.len(), |c| old[c] as usize >= n) {
+        return None;
+    }
+    let corners = parallel::collect(old.len(), |c| place[old[c] as usize]);
+    let moved = Faces::from_parts(mesh.faces.offsets().to_vec(), corners);
+    let smallest = parallel::collect(moved.len(), |f| moved.face(f).iter().copied().min().unwrap_or(0));
     let by_smallest = counting_sort(&smallest, n);
     let faces = match moved.uniform_size() {
         // Each face has its place: all threads can work.
         Some(size) => {
             let mut corners = vec![0; moved.corners().len()];
-            corners
-                .par_chunks_mut(size)
-                .with_min_len(8192)
-                .zip(&by_smallest)
-                .for_each(|(face, &f)| face.copy_from_slice(moved.face(f as usize)));
+            parallel::chunks(&mut corners, 8192 * size, |first, part| {
+                for (face, &f) in part.chunks_exact_mut(size).zip(&by_smallest[first / size..]) {
+                    face.copy_from_slice(moved.face(f as usize));
+                }
+            });
             Faces::from_parts(moved.offsets().to_vec(), corners)
         }
         None => {
@@ -97,8 +96,10 @@ pub(super) fn morton(positions: &[DVec3]) -> Vec<u32> {
     let highest = morton_codes(positions, |code| (code >> (3 * (21 - FIRST))) as u32);
     let mut order = counting_sort(&highest, 1 << (3 * FIRST));
     let mut lists: Vec<&mut [u32]> = order.chunk_by_mut(|&v, &w| highest[v as usize] == highest[w as usize]).collect();
-    lists.par_iter_mut().for_each(|list| {
-        list.sort_unstable_by_key(|&v| (codes[v as usize], v));
+    parallel::chunks(&mut lists, 64, |_, lists| {
+        for list in lists {
+            list.sort_unstable_by_key(|&v| (codes[v as usize], v));
+        }
     });
     order
 }
@@ -115,15 +116,11 @@ fn morton_codes<T: Send>(positions: &[DVec3], take: impl Fn(u64) -> T + Send + S
     const CELLS: f64 = ((1u64 << 21) - 1) as f64;
     let (low, high) = bounding_box(positions).unwrap_or((DVec3::ZERO, DVec3::ZERO));
     let scale = CELLS / (high - low).max_element().max(f64::MIN_POSITIVE);
-    positions
-        .par_iter()
-        .with_min_len(8192)
-        .map(|&p| {
-            // A coordinate that is not a number becomes 0.
-            let cell = ((p - low) * scale).to_array().map(|x| spread(x as u64));
-            take(cell[0] | cell[1] << 1 | cell[2] << 2)
-        })
-        .collect()
+    parallel::collect(positions.len(), |v| {
+        // A coordinate that is not a number becomes 0.
+        let cell = ((positions[v] - low) * scale).to_array().map(|x| spread(x as u64));
+        take(cell[0] | cell[1] << 1 | cell[2] << 2)
+    })
 }
 
 /// Puts two zeros between the lowest 21 bits.

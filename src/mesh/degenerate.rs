@@ -3,12 +3,13 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::DVec3;
-use rayon::prelude::*;
+use rayon::slice::ParallelSliceMut;
 
 use super::frame::magnitude;
 use super::validate::counted;
 use super::{Faces, Mesh};
 use crate::pages::large;
+use crate::parallel;
 use crate::prefetch::prefetch;
 
 /// A remark for each kind of oddity that occurs, with its count and first place.
@@ -84,7 +85,7 @@ fn copies<T: Ord>(count: u32, key: impl Fn(u32) -> Option<u64> + Sync, value: im
     let bits = (BITS_PER_ITEM * count as usize).next_power_of_two().max(64);
     let table = || -> Vec<AtomicU64> {
         let mut words = large(Vec::with_capacity(bits / 64));
-        words.par_extend((0..bits / 64).into_par_iter().map(|_| AtomicU64::new(0)));
+        parallel::extend(&mut words, bits / 64, |_| |_| AtomicU64::new(0));
         words
     };
     let (met, met_again) = (table(), table());
@@ -104,9 +105,9 @@ fn copies<T: Ord>(count: u32, key: impl Fn(u32) -> Option<u64> + Sync, value: im
         }
         items.zip(keys).filter_map(|(item, key)| Some((key?, item)))
     };
-    let blocks = || (0..count.div_ceil(BLOCK as u32)).into_par_iter();
-    blocks().with_min_len(BLOCK).for_each(|k| {
-        for (key, _) in block(k, &met) {
+    let blocks = count.div_ceil(BLOCK as u32) as usize;
+    parallel::each(blocks, |k| {
+        for (key, _) in block(k as u32, &met) {
             let (word, bit) = place(key);
             if met[word].fetch_or(bit, Ordering::Relaxed) & bit != 0 {
                 met_again[word].fetch_or(bit, Ordering::Relaxed);
@@ -117,8 +118,9 @@ fn copies<T: Ord>(count: u32, key: impl Fn(u32) -> Option<u64> + Sync, value: im
         let (word, bit) = place(key);
         met_again[word].load(Ordering::Relaxed) & bit != 0
     };
-    let mut keys: Vec<(u64, u32)> =
-        blocks().with_min_len(BLOCK).flat_map_iter(|k| block(k, &met_again).filter(shares_a_bit)).collect();
+    let mut keys: Vec<(u64, u32)> = parallel::flat_map(blocks, BLOCK, |range| {
+        range.flat_map(|k| block(k as u32, &met_again).filter(shares_a_bit)).collect()
+    });
     keys.par_sort_unstable();
     let mut copies = Vec::new();
     for run in keys.chunk_by(|a, b| a.0 == b.0).filter(|run| run.len() > 1) {
@@ -155,25 +157,23 @@ fn zero_area_faces(mesh: &Mesh) -> Vec<u32> {
         // What is not a number, too, is not clearly larger.
         area.length().partial_cmp(&(ROUNDING * scale)) != Some(std::cmp::Ordering::Greater)
     };
-    (0..mesh.faces.len() as u32)
-        .into_par_iter()
-        .filter(|&f| {
-            let face = mesh.faces.face(f as usize);
-            let corner = |k: usize| mesh.positions[face[k] as usize];
-            if !vanishes(face.len(), &|k| corner(k) - corner(0)) {
-                return false;
-            }
-            // Products of lengths may have left the range of doubles: the same at order one.
-            let largest = |vectors: &mut dyn Iterator<Item = DVec3>| {
-                magnitude(vectors.fold(DVec3::ZERO, |m, v| m.max(v.abs())).max_element())
-            };
-            let unit = largest(&mut (0..face.len()).map(corner));
-            let mut sides: Vec<DVec3> = (0..face.len()).map(|k| corner(k) / unit - corner(0) / unit).collect();
-            let unit = largest(&mut sides.iter().copied());
-            sides.iter_mut().for_each(|side| *side /= unit);
-            vanishes(face.len(), &|k| sides[k])
-        })
-        .collect()
+    let is_flat = |f: usize| {
+        let face = mesh.faces.face(f);
+        let corner = |k: usize| mesh.positions[face[k] as usize];
+        if !vanishes(face.len(), &|k| corner(k) - corner(0)) {
+            return false;
+        }
+        // Products of lengths may have left the range of doubles: the same at order one.
+        let largest = |vectors: &mut dyn Iterator<Item = DVec3>| {
+            magnitude(vectors.fold(DVec3::ZERO, |m, v| m.max(v.abs())).max_element())
+        };
+        let unit = largest(&mut (0..face.len()).map(corner));
+        let mut sides: Vec<DVec3> = (0..face.len()).map(|k| corner(k) / unit - corner(0) / unit).collect();
+        let unit = largest(&mut sides.iter().copied());
+        sides.iter_mut().for_each(|side| *side /= unit);
+        vanishes(face.len(), &|k| sides[k])
+    };
+    parallel::flat_map(mesh.faces.len(), 4096, |range| range.filter(|&f| is_flat(f)).map(|f| f as u32).collect())
 }
 
 #[cfg(test)]

@@ -1,9 +1,6 @@
 //! Numbers for the edges of a closed mesh, without a table.
 
-use rayon::prelude::*;
-
-/// Half-edges of one task.
-const CHUNK: usize = 4096;
+use crate::parallel;
 
 /// The edges of a closed mesh, numbered by their first half-edges: the order of
 /// [`Topology::edge_sides`](super::Topology::edge_sides). A number comes from a bit and half a bit of counts a half-edge,
@@ -17,15 +14,13 @@ pub(crate) struct EdgeNumbers<'a> {
 impl<'a> EdgeNumbers<'a> {
     /// From the opposite of every half-edge.
     pub(super) fn new(twins: &'a [u32]) -> Self {
-        let word = |(k, twins): (usize, &[u32])| {
+        let mut words: Vec<(u64, u32)> = parallel::collect(twins.len().div_ceil(64), |k| {
             let mut bits = 0;
-            for (i, (&t, c)) in twins.iter().zip(64 * k as u32..).enumerate() {
+            for (i, (c, &t)) in (64 * k as u32..).zip(twins[64 * k..].iter().take(64)).enumerate() {
                 bits |= u64::from(c <= t) << i;
             }
             (bits, bits.count_ones())
-        };
-        let chunks = twins.par_chunks(64).with_min_len(CHUNK / 64);
-        let mut words: Vec<(u64, u32)> = chunks.enumerate().map(word).collect();
+        });
         let mut before = 0;
         for (_, count) in &mut words {
             before += std::mem::replace(count, before);
@@ -41,13 +36,19 @@ impl<'a> EdgeNumbers<'a> {
         before + (bits & !(u64::MAX << (first % 64))).count_ones()
     }
 
-    /// The first half-edges, ascending.
-    pub(crate) fn firsts(&self) -> impl IndexedParallelIterator<Item = u32> + '_ {
-        let start = || Cursor { next: u32::MAX, word: 0, bits: 0 };
-        (0..self.twins.len() as u32 / 2)
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map_init(start, |cursor, edge| cursor.first_of(edge, &self.words))
+    /// The first half-edges of the edges from number `edge` on, ascending.
+    pub(crate) fn firsts_from(&self, edge: u32) -> impl Iterator<Item = u32> {
+        let mut cursor = Cursor { next: u32::MAX, word: 0, bits: 0 };
+        (edge..self.twins.len() as u32 / 2).map(move |edge| cursor.first_of(edge, &self.words))
+    }
+
+    /// Appends to `values` what `value` makes of the first half-edge of every edge.
+    pub(crate) fn extend<T: Send>(&self, values: &mut Vec<T>, value: impl Fn(u32) -> T + Sync) {
+        parallel::extend(values, self.twins.len() / 2, |first| {
+            let mut firsts = self.firsts_from(first as u32);
+            let value = &value;
+            move |_| value(firsts.next().expect("as many first half-edges as edges"))
+        });
     }
 }
 
@@ -97,7 +98,9 @@ mod tests {
             for twins in [twins, apart] {
                 let firsts: Vec<u32> = (0..2 * half).filter(|&c| c <= twins[c as usize]).collect();
                 let numbers = EdgeNumbers::new(&twins);
-                assert_eq!(numbers.firsts().collect::<Vec<u32>>(), firsts, "{name}");
+                let mut found = Vec::new();
+                numbers.extend(&mut found, |c| c);
+                assert_eq!(found, firsts, "{name}");
                 for (e, &c) in (0..).zip(&firsts) {
                     assert_eq!([numbers.of(c), numbers.of(twins[c as usize])], [e; 2]);
                 }

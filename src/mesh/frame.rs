@@ -7,9 +7,9 @@
 use std::ops::Range;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::bounding_box;
+use crate::parallel;
 
 /// The largest coordinate of points that need no other scale: their squares, and those of a 10⁻³⁰th of them, are far
 /// from the ends of the range of doubles.
@@ -66,7 +66,7 @@ impl Frame {
         if scale == 1.0 {
             return Ok(frame);
         }
-        match points.par_iter().position_first(|&p| frame.back(frame.there(p)) != p) {
+        match parallel::find_first(points.len(), |v| frame.back(frame.there(points[v])) != points[v]) {
             None => Ok(frame),
             Some(vertex) => Err(vertex),
         }
@@ -103,7 +103,7 @@ impl Frame {
 
     fn map(&self, points: &mut [DVec3], to: impl Fn(DVec3) -> DVec3 + Sync) {
         if !self.is_identity() {
-            points.par_iter_mut().with_min_len(4096).for_each(|p| *p = to(*p));
+            parallel::change(points, |_, p| *p = to(*p));
         }
     }
 }

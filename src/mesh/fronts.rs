@@ -2,10 +2,9 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::order::Numbering;
 use super::{Faces, Incidence};
+use crate::parallel;
 
 /// One bit for each of some things: whether it was met.
 struct Met(Vec<u64>);
@@ -104,7 +103,7 @@ fn group_kinds(faces: &Faces, incidence: &Incidence, order: &mut [u32]) {
         let kinds = u32::from(met != bit(3)) + u32::from(met != bit(3) && met != bit(4));
         kinds as usize * (MOST + 1) + n
     };
-    order.par_chunks_mut(GROUP).for_each(|group| {
+    parallel::chunks(order, GROUP, |_, group| {
         let mut vertices = [(0, 0); GROUP];
         let vertices = &mut vertices[..group.len()];
         let mut starts = [0; 3 * (MOST + 1) + 1];

@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::Faces;
 use super::topology::NONE;
 use crate::pages::large;
+use crate::parallel;
 use crate::prefetch::prefetch;
 
 /// Vertices of one task.
@@ -39,8 +38,7 @@ impl FaceOf {
             _ => {}
         }
         let mut table = large(vec![0; faces.corners().len()]);
-        let parts = split_by_face(faces, CHUNK, &mut table);
-        parts.into_par_iter().for_each(|(rows, mut part)| {
+        parallel::parts(split_by_face(faces, CHUNK, &mut table), |rows, mut part| {
             for f in rows {
                 let (face, rest) = part.split_at_mut(faces.range(f).len());
                 face.fill(f as u32);
@@ -64,9 +62,8 @@ impl Incidence {
         let parts = rayon::current_num_threads().min(MOST_PARTS);
         let share = vertices.div_ceil(parts).max(CHUNK);
         let mut offsets = large(vec![0u32; vertices + 1]);
-        let counts = offsets[1..].par_chunks_mut(share).enumerate();
-        counts.for_each(|(k, counts)| {
-            let first = (k * share) as u32;
+        parallel::chunks(&mut offsets[1..], share, |first, counts| {
+            let first = first as u32;
             for &v in corners {
                 if let Some(count) = counts.get_mut(v.wrapping_sub(first) as usize) {
                     *count += 1;
@@ -78,8 +75,7 @@ impl Incidence {
         }
         assert!(offsets[vertices] as usize == corners.len(), "every corner names a vertex");
         let mut sorted = large(vec![0u32; corners.len()]);
-        let parts = split_rows(&offsets, share, &mut sorted);
-        parts.into_par_iter().for_each(|(rows, sorted)| {
+        parallel::parts(split_rows(&offsets, share, &mut sorted), |rows, sorted| {
             let base = offsets[rows.start];
             let mut next: Vec<u32> = offsets[rows.clone()].iter().map(|&o| o - base).collect();
             let first = rows.start as u32;
@@ -189,7 +185,7 @@ impl Incidence {
     /// ```
     pub fn is_closed(&self, faces: &Faces) -> bool {
         let corners = faces.corners();
-        (0..self.vertices()).into_par_iter().with_min_len(CHUNK).all(|v| {
+        parallel::all(self.vertices(), |v| {
             let at = self.corners_at(v);
             let sides = |c: u32| {
                 let (after, before) = (self.next(faces, c), self.prev(faces, c));

@@ -26,8 +26,8 @@ pub mod vertex_data;
 
 use std::sync::OnceLock;
 
+use crate::parallel;
 use glam::DVec3;
-use rayon::prelude::*;
 
 pub use incidence::Incidence;
 pub use topology::Topology;
@@ -87,13 +87,17 @@ impl Faces {
         assert!(offsets.first() == Some(&0), "offsets start at 0");
         assert!(offsets.last().map(|&l| l as usize) == Some(corners.len()), "offsets end at the number of corners");
         // The least size and the greatest.
-        let sizes = offsets.par_windows(2).with_min_len(CHUNK).map(|w| {
-            assert!(w[0] <= w[1], "offsets ascend");
-            let size = w[1] - w[0];
-            (size, size)
-        });
-        let sizes = sizes.reduce(|| (u32::MAX, 0), |a, b| (a.0.min(b.0), a.1.max(b.1)));
         let count = offsets.len() - 1;
+        let sizes = parallel::map(count, CHUNK, |range| {
+            let (mut least, mut greatest) = (u32::MAX, 0);
+            for f in range {
+                assert!(offsets[f] <= offsets[f + 1], "offsets ascend");
+                let size = offsets[f + 1] - offsets[f];
+                (least, greatest) = (least.min(size), greatest.max(size));
+            }
+            (least, greatest)
+        });
+        let sizes = sizes.into_iter().fold((u32::MAX, 0), |a, b| (a.0.min(b.0), a.1.max(b.1)));
         let (size, offsets) =
             if count == 0 || sizes.0 == sizes.1 { (Some(sizes.1 as usize), Vec::new()) } else { (None, offsets) };
         Faces { count, size, offsets, corners, ..Faces::default() }
@@ -226,8 +230,12 @@ pub fn diagonal(points: &[DVec3]) -> f64 {
 
 /// The corners of the smallest axis-parallel box around all finite points.
 pub fn bounding_box(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
-    let finite = points.par_iter().with_min_len(CHUNK).filter(|p| p.is_finite());
-    finite.map(|&p| (p, p)).reduce_with(|(lo, hi), (least, most)| (lo.min(least), hi.max(most)))
+    let joined = |(lo, hi): (DVec3, DVec3), (least, most): (DVec3, DVec3)| (lo.min(least), hi.max(most));
+    let boxes = parallel::map(points.len(), CHUNK, |range| {
+        let finite = points[range].iter().filter(|p| p.is_finite());
+        finite.map(|&p| (p, p)).reduce(joined)
+    });
+    boxes.into_iter().flatten().reduce(joined)
 }
 
 #[cfg(test)]

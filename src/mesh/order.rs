@@ -6,13 +6,13 @@ use std::str::FromStr;
 
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
 use super::curve::morton;
 use super::cuthill_mckee::reverse_cuthill_mckee;
 use super::fronts::breadth_first;
 use super::incidence::Incidence;
 use super::{Faces, Mesh};
+use crate::parallel;
 use crate::{Error, Result};
 
 /// `--order file|reverse|bfs|rcm|morton|valence|multicolour|random[:SEED]`.
@@ -252,14 +252,14 @@ impl Numbering {
     pub fn back_into<T: Copy + Send + Sync>(&self, values: &[T], out: &mut [T]) {
         let n = self.place.len();
         assert!(values.len() == n && out.len() == n, "one value a vertex");
-        out.par_iter_mut().zip(&self.place).with_min_len(4096).for_each(|(out, &k)| *out = values[k as usize]);
+        parallel::fill(out, |v| values[self.place[v] as usize]);
     }
 }
 
 /// The k-th is `values[order[k]]`.
 fn gather<T: Copy + Send + Sync>(values: &[T], order: &[u32]) -> Vec<T> {
     assert_eq!(values.len(), order.len(), "one value a vertex");
-    order.par_iter().with_min_len(4096).map(|&v| values[v as usize]).collect()
+    parallel::collect(order.len(), |k| values[order[k] as usize])
 }
 
 /// How far apart an order puts neighbours.

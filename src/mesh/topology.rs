@@ -4,12 +4,13 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use rayon::prelude::*;
+use rayon::slice::ParallelSliceMut;
 
 use super::Faces;
 use super::edge_numbers::EdgeNumbers;
 use super::incidence::{FEW, Incidence};
 use crate::pages::large;
+use crate::parallel;
 
 /// Marks an absent index in the arrays of this room.
 pub const NONE: u32 = u32::MAX;
@@ -23,7 +24,7 @@ impl Scatter {
     /// All places [`NONE`].
     pub(crate) fn new(len: usize) -> Self {
         let mut places = large(Vec::with_capacity(len));
-        places.par_extend((0..len).into_par_iter().map(|_| AtomicU32::new(NONE)));
+        parallel::extend(&mut places, len, |_| |_| AtomicU32::new(NONE));
         Scatter(places)
     }
 
@@ -98,16 +99,11 @@ impl Topology {
     pub fn new(faces: &Faces, vertices: usize) -> Self {
         let incidence = Incidence::new(faces, vertices);
         let twin = Scatter::new(faces.corners().len());
-        let chunks: Vec<Pairs> = (0..vertices.div_ceil(CHUNK))
-            .into_par_iter()
-            .map(|k| {
-                let mut pairs = Pairs::default();
-                for v in k * CHUNK..vertices.min((k + 1) * CHUNK) {
-                    pairs.at(v, faces, &incidence, &twin);
-                }
-                pairs
-            })
-            .collect();
+        let chunks = parallel::map(vertices, CHUNK, |range| {
+            let mut pairs = Pairs::default();
+            range.for_each(|v| pairs.at(v, faces, &incidence, &twin));
+            pairs
+        });
         let mut topology = Topology {
             incidence,
             twin: twin.into_vec(),
@@ -152,10 +148,8 @@ impl Topology {
         if let Some(&known) = self.umbrellas.0.get() {
             return known;
         }
-        let one_each = (0..self.incidence.vertices())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .all(|v| self.incidence.face_count(v) > 0 && self.is_one_umbrella(faces, v));
+        let holds = |v| self.incidence.face_count(v) > 0 && self.is_one_umbrella(faces, v);
+        let one_each = parallel::all(self.incidence.vertices(), holds);
         *self.umbrellas.0.get_or_init(|| one_each)
     }
 

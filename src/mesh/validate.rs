@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
-use rayon::prelude::*;
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
 pub use super::defect::{Defect, DefectKind};
 use super::incidence::{Incidence, next_in, prev_in};
 use super::topology::{NONE, Topology, join};
 use super::{Faces, Mesh, degenerate};
+use crate::parallel;
 use crate::{Error, Result};
 
 /// Vertices or corners of one task.
@@ -222,8 +222,8 @@ pub fn validate(mesh: &Mesh, lines: Option<(&[u32], &[u32])>, boundary: Boundary
     if mesh.faces.is_empty() {
         report.defects.push(Defect::new(DefectKind::NoFaces));
     }
-    let corners = mesh.faces.corners().par_iter().with_min_len(CHUNK);
-    let indices_are_good = corners.copied().all(|v| (v as usize) < mesh.len());
+    let corners = mesh.faces.corners();
+    let indices_are_good = parallel::all(corners.len(), |c| (corners[c] as usize) < mesh.len());
     let ((defects, isolated), remarks) = rayon::join(
         || examine_faces(mesh),
         || {
@@ -366,39 +366,37 @@ fn examine_vertices(faces: &Faces, topology: &Topology, defects: &mut Vec<Defect
     let incidence = &topology.incidence;
     let n = incidence.vertices();
     let is_closed = topology.is_closed();
-    let chunks: Vec<(Vec<Defect>, usize, usize, bool)> = (0..n.div_ceil(CHUNK))
-        .into_par_iter()
-        .map_init(Link::default, |link, chunk| {
-            let mut found = Vec::new();
-            let (mut min, mut max) = (usize::MAX, 0);
-            let mut one_each = true;
-            for v in chunk * CHUNK..n.min((chunk + 1) * CHUNK) {
-                if incidence.face_count(v) == 0 {
-                    one_each = false;
-                    continue;
-                }
-                // One umbrella of edges with two sides each: the valence is the number of faces.
-                let (valence, umbrellas) = if is_closed && topology.is_one_umbrella(faces, v) {
-                    (incidence.face_count(v), 1)
-                } else {
-                    one_each = false;
-                    link.examine(faces, incidence, v)
-                };
-                min = min.min(valence);
-                max = max.max(valence);
-                let mut report = |kind, count: usize| {
-                    found.push(Defect { count: Some(count as u32), ..Defect::at_vertex(kind, v as u32) });
-                };
-                if umbrellas > 1 {
-                    report(DefectKind::NonManifoldVertex, umbrellas);
-                }
-                if valence < 3 {
-                    report(DefectKind::LowValence, valence);
-                }
+    let chunks = parallel::map(n, CHUNK, |range| {
+        let mut link = Link::default();
+        let mut found = Vec::new();
+        let (mut min, mut max) = (usize::MAX, 0);
+        let mut one_each = true;
+        for v in range {
+            if incidence.face_count(v) == 0 {
+                one_each = false;
+                continue;
             }
-            (found, min, max, one_each)
-        })
-        .collect();
+            // One umbrella of edges with two sides each: the valence is the number of faces.
+            let (valence, umbrellas) = if is_closed && topology.is_one_umbrella(faces, v) {
+                (incidence.face_count(v), 1)
+            } else {
+                one_each = false;
+                link.examine(faces, incidence, v)
+            };
+            min = min.min(valence);
+            max = max.max(valence);
+            let mut report = |kind, count: usize| {
+                found.push(Defect { count: Some(count as u32), ..Defect::at_vertex(kind, v as u32) });
+            };
+            if umbrellas > 1 {
+                report(DefectKind::NonManifoldVertex, umbrellas);
+            }
+            if valence < 3 {
+                report(DefectKind::LowValence, valence);
+            }
+        }
+        (found, min, max, one_each)
+    });
     if chunks.iter().all(|&(.., one_each)| one_each) {
         topology.know_one_umbrella_each();
     }

@@ -12,9 +12,9 @@
 use std::ops::Range;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::assemble::Operator;
+use crate::parallel;
 
 /// Rows of one task.
 const PIECE: usize = 2048;
@@ -34,19 +34,15 @@ impl<'a> Coloured<'a> {
     pub fn new(operator: &'a Operator) -> Self {
         let n = operator.len();
         // One more than the last neighbour before each row; 0 without one.
-        let before: Vec<u32> = (0..n)
-            .into_par_iter()
-            .with_min_len(PIECE)
-            .map(|i| {
-                let mut before = 0;
-                operator.neighbours(i, |j, _| {
-                    if j < i {
-                        before = before.max(j as u32 + 1);
-                    }
-                });
-                before
-            })
-            .collect();
+        let before: Vec<u32> = parallel::collect(n, |i| {
+            let mut before = 0;
+            operator.neighbours(i, |j, _| {
+                if j < i {
+                    before = before.max(j as u32 + 1);
+                }
+            });
+            before
+        });
         let mut starts = vec![0];
         let mut start = 0;
         for (i, &before) in before.iter().enumerate() {
@@ -95,11 +91,8 @@ impl<'a> Coloured<'a> {
             return;
         }
         let old = &*x;
-        fresh
-            .par_chunks_mut(PIECE)
-            .enumerate()
-            .for_each(|(k, fresh)| self.piece(omega, rows.start + k * PIECE, p, old, fresh));
-        x[rows].par_chunks_mut(PIECE).zip(fresh.par_chunks(PIECE)).for_each(|(x, fresh)| x.copy_from_slice(fresh));
+        parallel::chunks(fresh, PIECE, |first, fresh| self.piece(omega, rows.start + first, p, old, fresh));
+        parallel::chunks(&mut x[rows], PIECE, |first, x| x.copy_from_slice(&fresh[first..first + x.len()]));
     }
 
     fn piece(&self, omega: f64, first: usize, p: &[DVec3], x: &[DVec3], fresh: &mut [DVec3]) {

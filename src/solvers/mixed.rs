@@ -6,7 +6,6 @@
 //! 2006). A correction gains up to five digits; two or three are usual.
 
 use glam::{DVec3, Vec3A};
-use rayon::prelude::*;
 
 use super::chebyshev::{Recurrence, promised_iterations};
 use super::iteration::{Errors, Outcome, Report, Stop};
@@ -14,6 +13,7 @@ use super::system::Rows;
 use super::wavefront::Wavefront;
 use crate::assemble::Operator;
 use crate::pages::filled;
+use crate::parallel;
 use crate::prefetch::{POINTS_AHEAD, prefetch};
 
 /// A correction in single precision is not asked for more than this: half a digit above its rounding.
@@ -98,7 +98,7 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
                     interval = (a.min(interval.0), 1.0);
                     Recurrence::new(interval).coefficients().1 as f32 / first
                 };
-                correction.par_iter_mut().with_min_len(4096).for_each(|d| *d *= rescale);
+                parallel::change(&mut correction, |_, d| *d *= rescale);
             } else if gain > PROGRESS {
                 break Outcome::Stagnated;
             }
@@ -107,10 +107,9 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
         wavefront.iterate(Recurrence::new(interval), count, &residual, &mut correction, &mut scratch);
         iterations += count;
         if control.is_empty() {
-            control =
-                points.par_iter().zip(&correction).with_min_len(4096).map(|(p, d)| *p + unit * d.as_dvec3()).collect();
+            control = parallel::collect(points.len(), |i| points[i] + unit * correction[i].as_dvec3());
         } else {
-            control.par_iter_mut().zip(&correction).with_min_len(4096).for_each(|(v, d)| *v += unit * d.as_dvec3());
+            parallel::change(&mut control, |i, v| *v += unit * correction[i].as_dvec3());
         }
     };
     if control.is_empty() {

@@ -3,10 +3,11 @@
 use std::ops::Range;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::iteration::Errors;
+use crate::assemble::stencil::Point;
 use crate::assemble::{LimitSystem, Operator};
+use crate::parallel;
 
 /// The matrix A of a limit system: A = H·M with H = diag(weights) positive and M symmetric.
 pub trait System: Sync {
@@ -26,27 +27,19 @@ pub trait System: Sync {
     /// An upper bound of the eigenvalues of A, which tells its scale: 1 for a scheme's matrix, whose rows sum to 1.
     fn lambda_max(&self) -> f64;
 
-    /// Row `i` of the product, (A x)_i. In-place relaxation calls it while `x` changes.
-    fn row(&self, i: usize, x: &[DVec3]) -> DVec3;
+    /// Row `i` of the product, (A x)_i, for x of one number or one point a vertex. In-place relaxation calls it while
+    /// `x` changes.
+    fn row<P: Point>(&self, i: usize, x: &[P]) -> P;
 
     /// Sums over `x` that the rows of one whole product share; none unless the system has some.
-    fn prepare(&self, _x: &[DVec3], shared: &mut Vec<DVec3>) {
+    fn prepare<P: Point>(&self, _x: &[P], shared: &mut Vec<P>) {
         shared.clear();
     }
 
-    /// Calls `visit(slot, (A x)_i)` for every row i of `rows`, in ascending order; `slots(m)` gives what the next m
-    /// rows are visited with, and `shared` comes from [`prepare`](Self::prepare).
-    #[inline(always)]
-    fn rows<I: Iterator>(
-        &self,
-        rows: Range<usize>,
-        x: &[DVec3],
-        _shared: &[DVec3],
-        mut slots: impl FnMut(usize) -> I,
-        mut visit: impl FnMut(I::Item, DVec3),
-    ) {
-        for (slot, i) in slots(rows.len()).zip(rows) {
-            visit(slot, self.row(i, x));
+    /// `out[k]` becomes (A x)_i of the k-th row i of `rows`; `shared` comes from [`prepare`](Self::prepare).
+    fn product<P: Point>(&self, rows: Range<usize>, x: &[P], _shared: &[P], out: &mut [P]) {
+        for (out, i) in out.iter_mut().zip(rows) {
+            *out = self.row(i, x);
         }
     }
 }
@@ -69,7 +62,7 @@ impl System for LimitSystem {
     }
 
     #[inline]
-    fn row(&self, i: usize, x: &[DVec3]) -> DVec3 {
+    fn row<P: Point>(&self, i: usize, x: &[P]) -> P {
         self.a.row_times(i, x)
     }
 }
@@ -92,28 +85,21 @@ impl System for Operator {
     }
 
     #[inline]
-    fn row(&self, i: usize, x: &[DVec3]) -> DVec3 {
+    fn row<P: Point>(&self, i: usize, x: &[P]) -> P {
         Operator::row(self, i, x)
     }
 
-    fn prepare(&self, x: &[DVec3], shared: &mut Vec<DVec3>) {
+    fn prepare<P: Point>(&self, x: &[P], shared: &mut Vec<P>) {
         self.all_sums(x, shared);
     }
 
-    #[inline(always)]
-    fn rows<I: Iterator>(
-        &self,
-        rows: Range<usize>,
-        x: &[DVec3],
-        shared: &[DVec3],
-        slots: impl FnMut(usize) -> I,
-        mut visit: impl FnMut(I::Item, DVec3),
-    ) {
-        Operator::rows(self, rows, (x, 0), (shared, 0), slots, |slot, _, ax| {
-            visit(slot, ax);
-        });
+    fn product<P: Point>(&self, rows: Range<usize>, x: &[P], shared: &[P], out: &mut [P]) {
+        Operator::product(self, rows, (x, 0), (shared, 0), out);
     }
 }
+
+/// Rows of a product that is worked on while it is in the nearest cache.
+pub(crate) const STRIP: usize = 128;
 
 /// Rows of one task. Fixed, so that sums over rows do not depend on the number of threads.
 const CHUNK: usize = 4096;
@@ -203,19 +189,16 @@ impl Rows {
     ) -> Totals {
         let mut shared = std::mem::take(&mut self.shared);
         system.prepare(x, &mut shared);
-        let totals = self.chunks(a, b, |first, mut a, mut b, tally| {
-            let mut next = first;
-            let end = first + a.len();
-            let slots = |count| {
-                let from = next;
-                next += count;
-                let a = a.split_off_mut(..count).unwrap_or_default();
-                let b = b.split_off_mut(..count).unwrap_or_default();
-                (from..).zip(a.iter_mut().zip(b))
-            };
-            system.rows(first..end, x, &shared, slots, |(i, (a, b)), ax| {
-                visit(i, ax, a, b, tally);
-            });
+        let totals = self.chunks(a, b, |first, a, b, tally| {
+            let mut image = [DVec3::ZERO; STRIP];
+            for (k, (a, b)) in a.chunks_mut(STRIP).zip(b.chunks_mut(STRIP)).enumerate() {
+                let first = first + k * STRIP;
+                let image = &mut image[..a.len()];
+                system.product(first..first + a.len(), x, &shared, image);
+                for (i, ((&ax, a), b)) in (first..).zip(image.iter().zip(a).zip(b)) {
+                    visit(i, ax, a, b, tally);
+                }
+            }
         });
         self.shared = shared;
         totals
@@ -228,21 +211,8 @@ impl Rows {
         b: &mut [B],
         chunk: impl Fn(usize, &mut [A], &mut [B], &mut Tally) + Sync,
     ) -> Totals {
-        let run = |k: usize, a: &mut [A], b: &mut [B], tally: &mut Tally| {
-            let mut local = Tally::default();
-            chunk(k * CHUNK, a, b, &mut local);
-            *tally = local;
-        };
-        let tallies = &mut self.tallies;
-        if tallies.len() > 1 {
-            a.par_chunks_mut(CHUNK)
-                .zip(b.par_chunks_mut(CHUNK))
-                .zip(tallies)
-                .enumerate()
-                .for_each(|(k, ((a, b), tally))| run(k, a, b, tally));
-        } else if let Some(tally) = tallies.first_mut() {
-            run(0, a, b, tally);
-        }
+        self.tallies.fill(Tally::default());
+        parallel::chunks_of_two(a, b, CHUNK, &mut self.tallies, chunk);
         let total = self.tallies.iter().fold(Tally::default(), |sum, &t| sum.merge(t));
         let mean = total.sum / self.n.max(1) as f64;
         let max = if mean.is_nan() { f64::NAN } else { total.max_squared.sqrt() };

@@ -17,10 +17,12 @@ use rayon::prelude::*;
 
 use super::chebyshev::Recurrence;
 use super::gauss_seidel::sweep;
+use super::system::STRIP;
 use crate::assemble::Operator;
 use crate::assemble::polygons::BLOCK;
 use crate::assemble::stencil::Point;
 use crate::pages::filled;
+use crate::parallel;
 use crate::prefetch::{POINTS_AHEAD, prefetch};
 
 /// Iterations of one group, which share a pass over memory, at the most.
@@ -119,7 +121,7 @@ impl<'a> Wavefront<'a> {
         let n = self.operator.len();
         let Scratch { other, sums } = scratch;
         assert!(r.len() == n && x.len() == n && other.len() == n, "one point a vertex");
-        other.par_chunks_mut(CHUNK).for_each(|c| c.fill(P::ZERO));
+        parallel::chunks(other, CHUNK, |_, c| c.fill(P::ZERO));
         let coefficients: Vec<(f64, f64)> = (1..count)
             .map(|_| {
                 recurrence.step();
@@ -193,9 +195,8 @@ impl<'a> Wavefront<'a> {
     /// One iteration: `other` becomes the next one after `x`.
     fn plain<P: Point>(&self, coefficients: (f64, f64), r: &[P], (x, other): (&[P], &mut [P]), sums: &mut Vec<P>) {
         self.operator.all_sums(x, sums);
-        other.par_chunks_mut(CHUNK).enumerate().for_each(|(k, out)| {
-            let update =
-                Update { rows: k * CHUNK..k * CHUNK + out.len(), window: (x, 0), sums: (sums, 0), out, coefficients };
+        parallel::chunks(other, CHUNK, |first, out| {
+            let update = Update { rows: first..first + out.len(), window: (x, 0), sums: (sums, 0), out, coefficients };
             self.update(update, r);
         });
     }
@@ -267,22 +268,19 @@ impl<'a> Wavefront<'a> {
     fn update<P: Point>(&self, task: Update<P>, r: &[P]) {
         let (gamma, tau) = task.coefficients;
         let (gamma, tau) = (P::weight(gamma), P::weight(tau));
-        let mut r = &r[task.rows.clone()];
-        let mut out = task.out;
-        self.operator.rows(
-            task.rows,
-            task.window,
-            task.sums,
-            |count| {
-                let out = out.split_off_mut(..count).unwrap_or_default();
-                out.iter_mut().zip(r.split_off(..count).unwrap_or_default())
-            },
-            |(out, r), v, ax| {
+        let (points, start) = task.window;
+        let mut image = [P::ZERO; STRIP];
+        for (first, out) in task.rows.step_by(STRIP).zip(task.out.chunks_mut(STRIP)) {
+            let rows = first..first + out.len();
+            let image = &mut image[..out.len()];
+            self.operator.product(rows.clone(), task.window, task.sums, image);
+            let v = &points[rows.start - start..rows.end - start];
+            for (((out, r), &v), &ax) in out.iter_mut().zip(&r[rows]).zip(v).zip(&*image) {
                 prefetch(std::slice::from_ref(out), POINTS_AHEAD);
                 prefetch(std::slice::from_ref(r), POINTS_AHEAD);
                 *out = v + (v - *out).times(gamma) + (*r - ax).times(tau);
-            },
-        );
+            }
+        }
     }
 }
 

@@ -5,7 +5,6 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::interpolatory::{RegularMask, SQRT_3, tangents};
 use super::loop_scheme::{refined_topology, split_in_four};
@@ -78,8 +77,8 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     let rings = Rings::new(mesh, topology, rule)?;
     let edges = topology.edge_numbers();
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
-    positions.par_extend(&mesh.positions);
-    positions.par_extend(edges.firsts().map(|c| {
+    positions.extend_from_slice(&mesh.positions);
+    edges.extend(&mut positions, |c| {
         let t = twin(topology, c);
         match [c, t].map(|c| rings.is_extraordinary(c)) {
             [false, false] => regular(mesh, topology, c) + regular(mesh, topology, t),
@@ -87,7 +86,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
             [false, true] => rings.point(t),
             [true, true] => 0.5 * (rings.point(c) + rings.point(t)),
         }
-    }));
+    });
     Ok(Mesh::new(positions, split_in_four(mesh, &edges)))
 }
 

@@ -5,15 +5,15 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
-use rayon::prelude::*;
 
-use super::refined::{self, rows};
-use super::star::{Circle, Tangents, centroid, for_each_star, numbers, require_closed, require_room, sides, twin};
+use super::refined::{self, set_rows};
+use super::star::{Circle, Tangents, centroid, for_each_star, require_closed, require_room, sides, twin};
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::pages::large;
+use crate::parallel;
 
 /// One step.
 ///
@@ -33,11 +33,10 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     let (old, incidence) = (&mesh.positions, &topology.incidence);
     let corners = mesh.faces.corners();
     let edges = topology.edge_numbers();
-    let center = |f| centroid(old, mesh.faces.face(f));
     let mut centers = large(Vec::with_capacity(mesh.faces.len()));
-    centers.par_extend(numbers(mesh.faces.len()).map(center));
+    parallel::extend(&mut centers, mesh.faces.len(), |_| |f| centroid(old, mesh.faces.face(f)));
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges() + centers.len()));
-    positions.par_extend(numbers(mesh.len()).map(|v| {
+    let vertex = |v: usize| {
         let star = incidence.corners_at(v);
         let mut sum = DVec3::ZERO;
         for &c in star {
@@ -46,13 +45,14 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
         }
         let n = star.len() as f64;
         (n - 2.0) / n * old[v] + sum / (n * n)
-    }));
-    positions.par_extend(edges.firsts().map(|c| {
+    };
+    parallel::extend(&mut positions, mesh.len(), |_| vertex);
+    edges.extend(&mut positions, |c| {
         let [one, other] =
             [c, twin(topology, c)].map(|c| old[corners[c as usize] as usize] + centers[incidence.face_of(c)]);
         0.25 * one + 0.25 * other
-    }));
-    positions.par_extend(centers);
+    });
+    positions.append(&mut centers);
     Ok(Mesh::new(positions, split(mesh, topology, &edges)))
 }
 
@@ -110,13 +110,13 @@ fn split(mesh: &Mesh, topology: &Topology, edges: &EdgeNumbers) -> Faces {
     let corners = mesh.faces.corners();
     let incidence = &topology.incidence;
     let mut quads = large(vec![0; 4 * corners.len()]);
-    rows(&mut quads).for_each(|(c, quad): (u32, &mut [u32; 4])| {
-        *quad = [
+    set_rows(&mut quads, |c| {
+        [
             corners[c as usize],
             vertices + edges.of(c),
             first_face + incidence.face_of(c) as u32,
             vertices + edges.of(incidence.prev(&mesh.faces, c)),
-        ];
+        ]
     });
     Faces::of_size(4, quads)
 }

@@ -5,14 +5,15 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
 
-use super::refined::{self, ends, rows, set_by_edge};
+use super::refined::{self, push_ends, set_by_edge, set_rows};
 use super::star::{CHUNK, Circle, Tangents, centroid, for_each_star, require_closed, require_room, twin};
 use crate::Result;
 use crate::mesh::incidence::{split_by_face, split_rows};
 use crate::mesh::{Faces, Mesh, Topology};
+use crate::pages::filled;
 use crate::pages::large;
+use crate::parallel;
 
 /// The rule of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,10 +43,9 @@ impl Rule {
 /// circulant of the constant, the first harmonic and the identity.
 pub fn corner_points(mesh: &Mesh, rule: Rule) -> Vec<DVec3> {
     let corners = mesh.faces.corners();
-    let mut points = large(Vec::with_capacity(corners.len()));
-    points.par_extend(corners.par_iter().map(|_| DVec3::ZERO));
-    let parts = split_by_face(&mesh.faces, CHUNK, &mut points);
-    parts.into_par_iter().for_each_init(Circle::default, |circle, (range, mut part)| {
+    let mut points = filled(corners.len(), DVec3::ZERO);
+    parallel::parts(split_by_face(&mesh.faces, CHUNK, &mut points), |range, mut part| {
+        let mut circle = Circle::default();
         for f in range {
             let face = mesh.faces.face(f);
             let (points, rest) = part.split_at_mut(face.len());
@@ -105,29 +105,28 @@ pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     let mut corners = large(vec![0; 4 * count]);
     let (of_faces, rest) = corners.split_at_mut(count);
     let (of_edges, of_vertices) = rest.split_at_mut(2 * count);
-    rows(of_faces).for_each(|(c, corner): (u32, &mut [u32; 1])| corner[0] = c);
+    set_rows(of_faces, |c| [c]);
     set_by_edge(of_edges, topology, |c| {
         let t = twin(topology, c);
         let next = |c| incidence.next(&mesh.faces, c);
         [next(c), c, next(t), t]
     });
-    let parts = split_rows(incidence.offsets(), CHUNK, of_vertices);
-    parts.into_par_iter().for_each_init(Vec::new, |star, (range, mut part)| {
+    parallel::parts(split_rows(incidence.offsets(), CHUNK, of_vertices), |range, mut part| {
+        let mut star = Vec::new();
         for v in range {
-            topology.star(&mesh.faces, v, star);
+            topology.star(&mesh.faces, v, &mut star);
             let (face, rest) = part.split_at_mut(star.len());
-            face.copy_from_slice(star);
+            face.copy_from_slice(&star);
             part = rest;
         }
     });
 
     let mut offsets = large(Vec::with_capacity(mesh.faces.len() + count / 2 + mesh.len() + 1));
     offsets.push(0);
-    let of_faces = (0..mesh.faces.len()).into_par_iter();
-    offsets.par_extend(of_faces.map(|f| mesh.faces.range(f).end as u32));
-    offsets.par_extend(ends(count, 4, count / 2));
+    parallel::extend(&mut offsets, mesh.faces.len(), |_| |f| mesh.faces.range(f).end as u32);
+    push_ends(&mut offsets, count, 4, count / 2);
     let first = 3 * count as u32;
-    offsets.par_extend(incidence.offsets()[1..].par_iter().map(|&end| first + end));
+    offsets.extend(incidence.offsets()[1..].iter().map(|&end| first + end));
     Ok(Mesh::new(corner_points(mesh, rule), Faces::from_parts(offsets, corners)))
 }
 

@@ -13,15 +13,15 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::interpolatory::{RegularMask, SQRT_3, tangents};
 use super::ring::{Place, Rings, Rule};
 use super::sqrt3::{flip, refined_topology};
-use super::star::{Tangents, numbers, prev_in_triangle, require_room, require_triangles, twin};
+use super::star::{Tangents, prev_in_triangle, require_room, require_triangles, twin};
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
 use crate::pages::large;
+use crate::parallel;
 
 /// The regular mask: the corners of the triangle, the vertices opposite to its sides, the six next to those.
 pub const REGULAR: [f64; 3] = [32.0 / 81.0, -1.0 / 81.0, -2.0 / 81.0];
@@ -94,8 +94,8 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     let rule = Rule { name: NAME, place: Place::Triangle, mask: extraordinary_mask, amplitudes };
     let rings = Rings::new(mesh, topology, rule)?;
     let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
-    positions.par_extend(&mesh.positions);
-    positions.par_extend(numbers(mesh.faces.len()).map(|f| {
+    positions.extend_from_slice(&mesh.positions);
+    let center = |f: usize| {
         let own = [0, 1, 2].map(|i| 3 * f as u32 + i);
         let extraordinary = own.map(|c| rings.is_extraordinary(c));
         let sharing = extraordinary.map(usize::from).iter().sum::<usize>();
@@ -109,7 +109,8 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
             }
         }
         sum / sharing as f64
-    }));
+    };
+    parallel::extend(&mut positions, mesh.faces.len(), |_| center);
     Ok(Mesh::new(positions, flip(mesh, topology)))
 }
 

@@ -3,11 +3,10 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
-use super::refined::{self, rows};
+use super::refined::{self, set_rows};
 use super::star::{
-    Tangents, blend_with_neighbors, blends, prev_in_triangle, require_room, require_triangles, ring_tangents, twin,
+    Tangents, blend_with_neighbors, prev_in_triangle, push_blends, require_room, require_triangles, ring_tangents, twin,
 };
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
@@ -49,15 +48,15 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     let (old, corners) = (&mesh.positions, mesh.faces.corners());
     let edges = topology.edge_numbers();
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
-    positions.par_extend(blends(mesh, topology, vertex_mask));
-    positions.par_extend(edges.firsts().map(|c| {
+    push_blends(&mut positions, mesh, topology, vertex_mask);
+    edges.extend(&mut positions, |c| {
         // 3/8 of the vertex that a side leaves, 1/8 of the vertex opposite to it.
         let [one, other] = [c, twin(topology, c)].map(|c| {
             let opposite = old[corners[prev_in_triangle(c)] as usize];
             0.375 * old[corners[c as usize] as usize] + 0.125 * opposite
         });
         one + other
-    }));
+    });
     Ok(Mesh::new(positions, split_in_four(mesh, &edges)))
 }
 
@@ -75,11 +74,11 @@ pub(super) fn split_in_four(mesh: &Mesh, edges: &EdgeNumbers) -> Faces {
     let vertices = mesh.len() as u32;
     let old = mesh.faces.corners();
     let mut corners = large(vec![0; 4 * old.len()]);
-    rows(&mut corners).for_each(|(f, corners): (u32, &mut [u32; 12])| {
+    set_rows(&mut corners, |f| {
         let own = [0, 1, 2].map(|i| 3 * f + i);
         let [u, v, w] = own.map(|c| old[c as usize]);
         let [a, b, c] = own.map(|c| vertices + edges.of(c));
-        *corners = [u, a, c, v, b, a, w, c, b, a, b, c];
+        [u, a, c, v, b, a, w, c, b, a, b, c]
     });
     Faces::of_size(3, corners)
 }

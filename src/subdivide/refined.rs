@@ -6,12 +6,11 @@
 //! [`Topology::new`] leaves without twins (a triangle and its back: the two faces of a vertex of valence 2 come to share
 //! two edges). Such meshes are recognised, and left to it.
 
-use rayon::prelude::*;
-
 use super::star::{next_in_triangle, prev_in_triangle};
 use crate::mesh::topology::Scatter;
 use crate::mesh::{Incidence, Mesh, Topology};
 use crate::pages::large;
+use crate::parallel;
 
 /// New faces, edges or vertices of one task.
 const CHUNK: usize = 4096;
@@ -20,16 +19,15 @@ const CHUNK: usize = 4096;
 pub(super) fn of_quads(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
     let (faces, incidence, twin) = (&mesh.faces, &topology.incidence, topology.twins());
     let count = twin.len();
-    let one_face_on_both_sides =
-        (0..count as u32).into_par_iter().any(|c| incidence.face_of(c) == incidence.face_of(twin[c as usize]));
+    let one_face_on_both_sides = parallel::any(count, |c| incidence.face_of(c as u32) == incidence.face_of(twin[c]));
     if one_face_on_both_sides {
         return Topology::new(&refined.faces, refined.len());
     }
     let (next, prev) = (|c| incidence.next(faces, c), |c| incidence.prev(faces, c));
     let mut twins = large(vec![0; 4 * count]);
-    rows(&mut twins).for_each(|(c, quad): (u32, &mut [u32; 4])| {
+    set_rows(&mut twins, |c| {
         let before = prev(c);
-        *quad = [4 * next(twin[c as usize]) + 3, 4 * next(c) + 2, 4 * before + 1, 4 * twin[before as usize]];
+        [4 * next(twin[c as usize]) + 3, 4 * next(c) + 2, 4 * before + 1, 4 * twin[before as usize]]
     });
 
     let mut corners = large(vec![0; 4 * count]);
@@ -42,14 +40,13 @@ pub(super) fn of_quads(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
         corners.sort_unstable();
         corners
     });
-    rows(at_faces).for_each(|(c, corner): (u32, &mut [u32; 1])| corner[0] = 4 * c + 2);
+    set_rows(at_faces, |c| [4 * c + 2]);
 
     let mut offsets = large(Vec::with_capacity(refined.len() + 1));
-    offsets.par_extend(incidence.offsets());
-    offsets.par_extend(ends(count, 4, count / 2));
+    offsets.extend_from_slice(incidence.offsets());
+    push_ends(&mut offsets, count, 4, count / 2);
     let first = 3 * count as u32;
-    let of_faces = (0..faces.len()).into_par_iter();
-    offsets.par_extend(of_faces.map(|f| first + faces.range(f).end as u32));
+    parallel::extend(&mut offsets, faces.len(), |_| |f| first + faces.range(f).end as u32);
     closed(refined, offsets, corners, twins)
 }
 
@@ -64,7 +61,8 @@ pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
     // The first corner of the triangle at corner c.
     let outer = |c: u32| 3 * (c + c / 3);
     let mut twins = large(vec![0; 4 * count]);
-    rows(&mut twins).for_each(|(f, twins): (u32, &mut [u32; 12])| {
+    set_rows(&mut twins, |f| {
+        let mut twins = [0; 12];
         let middle = 12 * f + 9;
         for i in 0..3 {
             let (next, prev) = ((i + 1) % 3, (i + 2) % 3);
@@ -76,6 +74,7 @@ pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
             twins[at + 2] = outer(entering);
             twins[9 + i as usize] = outer(3 * f + next) + 1;
         }
+        twins
     });
 
     let mut corners = large(vec![0; 4 * count]);
@@ -91,8 +90,8 @@ pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
     });
 
     let mut offsets = large(Vec::with_capacity(refined.len() + 1));
-    offsets.par_extend(incidence.offsets());
-    offsets.par_extend(ends(count, 6, count / 2));
+    offsets.extend_from_slice(incidence.offsets());
+    push_ends(&mut offsets, count, 6, count / 2);
     closed(refined, offsets, corners, twins)
 }
 
@@ -105,15 +104,16 @@ pub(super) fn of_flips(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
     let (incidence, twin) = (&topology.incidence, topology.twins());
     let count = twin.len();
     let mut twins = large(vec![0; 3 * count]);
-    rows(&mut twins).for_each(|(c, twins): (u32, &mut [u32; 3])| {
+    set_rows(&mut twins, |c| {
         let t = twin[c as usize];
-        *twins = [3 * next_in_triangle(t) as u32 + 2, 3 * t + 1, 3 * twin[prev_in_triangle(c)]];
+        [3 * next_in_triangle(t) as u32 + 2, 3 * t + 1, 3 * twin[prev_in_triangle(c)]]
     });
 
     let mut corners = large(vec![0; 3 * count]);
     let (at_vertices, at_faces) = corners.split_at_mut(count);
     scale(at_vertices, incidence.corners(), |c| 3 * c);
-    rows(at_faces).for_each(|(f, corners): (u32, &mut [u32; 6])| {
+    set_rows(at_faces, |f| {
+        let mut corners = [0; 6];
         let own = [0, 1, 2].map(|i| 3 * f + i);
         let [a, b, c] = own.map(|c| twin[c as usize]);
         let (low, high) = (a.min(b), a.max(b));
@@ -127,11 +127,12 @@ pub(super) fn of_flips(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
         for (i, (t, before)) in across.into_iter().zip(before).enumerate() {
             corners[i + 3 * (1 - before)] = 3 * t + 1;
         }
+        corners
     });
 
     let mut offsets = large(Vec::with_capacity(refined.len() + 1));
-    offsets.par_extend(incidence.offsets());
-    offsets.par_extend(ends(count, 6, mesh.faces.len()));
+    offsets.extend_from_slice(incidence.offsets());
+    push_ends(&mut offsets, count, 6, mesh.faces.len());
     closed(refined, offsets, corners, twins)
 }
 
@@ -150,7 +151,7 @@ pub(super) fn of_corners(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> To
     let stars = &refined.faces.corners()[3 * count..];
     // Where each corner stands in the face of its vertex.
     let place = Scatter::new(count);
-    stars.par_iter().enumerate().with_min_len(CHUNK).for_each(|(p, &c)| place.set(c, first_star + p as u32));
+    parallel::each(count, |p| place.set(stars[p], first_star + p as u32));
     let place = place.into_vec();
     // Of the quad of the edge of c, the corner that is c, and the corner that is next c.
     let in_edge = |c: u32| {
@@ -161,30 +162,29 @@ pub(super) fn of_corners(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> To
     let mut twins = large(vec![0; 4 * count]);
     let (of_faces, rest) = twins.split_at_mut(count);
     let (of_edges, of_vertices) = rest.split_at_mut(2 * count);
-    rows(of_faces).for_each(|(c, twin): (u32, &mut [u32; 1])| twin[0] = in_edge(c));
+    set_rows(of_faces, |c| [in_edge(c)]);
     set_by_edge(of_edges, topology, |c| {
         let t = twin[c as usize];
         let at = |c: u32| place[next(c) as usize];
         [c, at(t), t, at(c)]
     });
-    rows(of_vertices).for_each(|(p, twins): (u32, &mut [u32; 1])| {
+    set_rows(of_vertices, |p| {
         let ahead = twin[prev(stars[p as usize]) as usize];
-        twins[0] = in_edge(ahead) + 1;
+        [in_edge(ahead) + 1]
     });
 
     let mut corners = large(vec![0; 4 * count]);
-    rows(&mut corners).for_each(|(c, corners): (u32, &mut [u32; 4])| {
+    set_rows(&mut corners, |c| {
         let (leaving, entering) = (in_edge(c) + 1, in_edge(prev(c)));
-        *corners = [c, leaving.min(entering), leaving.max(entering), place[c as usize]];
+        [c, leaving.min(entering), leaving.max(entering), place[c as usize]]
     });
-    let offsets = (0..count as u32 + 1).into_par_iter().map(|c| 4 * c).collect();
+    let offsets = parallel::collect(count + 1, |c| 4 * c as u32);
     closed(refined, offsets, corners, twins)
 }
 
 /// A vertex whose faces may share two edges.
 fn has_valence_below_three(incidence: &Incidence) -> bool {
-    let offsets = incidence.offsets().par_windows(2);
-    offsets.with_min_len(CHUNK).any(|w| w[1] - w[0] < 3)
+    parallel::any(incidence.vertices(), |v| incidence.face_count(v) < 3)
 }
 
 fn closed(refined: &Mesh, offsets: Vec<u32>, corners: Vec<u32>, twins: Vec<u32>) -> Topology {
@@ -198,24 +198,28 @@ pub(super) fn set_by_edge<const N: usize>(
     topology: &Topology,
     row: impl Fn(u32) -> [u32; N] + Sync,
 ) {
-    let (rows, _) = values.as_chunks_mut();
     let edges = topology.edge_numbers();
-    let rows = rows.par_iter_mut().zip(edges.firsts());
-    rows.for_each(|(to, c)| *to = row(c));
+    parallel::chunks(values, CHUNK * N, |first, part| {
+        for (to, c) in part.as_chunks_mut().0.iter_mut().zip(edges.firsts_from((first / N) as u32)) {
+            *to = row(c);
+        }
+    });
 }
 
-/// Rows of N entries in parallel, with their numbers.
-pub(super) fn rows<const N: usize>(values: &mut [u32]) -> impl IndexedParallelIterator<Item = (u32, &mut [u32; N])> {
-    let (rows, _) = values.as_chunks_mut();
-    rows.par_iter_mut().with_min_len(CHUNK).enumerate().map(|(k, row)| (k as u32, row))
+/// Gives every k a row of N entries.
+pub(super) fn set_rows<const N: usize>(values: &mut [u32], row: impl Fn(u32) -> [u32; N] + Sync) {
+    parallel::chunks(values, CHUNK * N, |first, part| {
+        for (k, to) in (first / N..).zip(part.as_chunks_mut().0) {
+            *to = row(k as u32);
+        }
+    });
 }
 
 fn scale(to: &mut [u32], from: &[u32], map: impl Fn(u32) -> u32 + Sync) {
-    to.par_iter_mut().zip(from).with_min_len(CHUNK).for_each(|(to, &c)| *to = map(c));
+    parallel::fill(to, |k| map(from[k]));
 }
 
-/// The ends of `count` rows of `size` entries that begin at `start`.
-pub(super) fn ends(start: usize, size: u32, count: usize) -> impl IndexedParallelIterator<Item = u32> {
-    let start = start as u32;
-    (1..count as u32 + 1).into_par_iter().map(move |k| start + size * k)
+/// Appends the ends of `count` rows of `size` entries that begin at `start`.
+pub(super) fn push_ends(offsets: &mut Vec<u32>, start: usize, size: u32, count: usize) {
+    parallel::extend(offsets, count, |_| |k| start as u32 + size * (k as u32 + 1));
 }

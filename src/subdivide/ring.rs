@@ -2,11 +2,11 @@
 //! with a mask that is symmetric about an edge, or about the middle of a triangle, and a circulant of three harmonics.
 
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
 
-use super::star::{CHUNK, Circle, Harmonics, find_first, next_in_triangle, prev_in_triangle, refuse, twin};
+use super::star::{CHUNK, Circle, Harmonics, next_in_triangle, prev_in_triangle, refuse, twin};
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
+use crate::parallel::{self, find_first};
 
 /// Up to this valence, the ring is walked once a new point: n² steps a vertex. Beyond, once a vertex.
 const WALKED: usize = 16;
@@ -67,7 +67,6 @@ impl<'a> Rings<'a> {
                 rule.name
             ));
         }
-        let vertices = || (0..mesh.len()).into_par_iter().with_min_len(CHUNK);
         let half = |n: usize| {
             let mut half = Half::default();
             if n >= 3 {
@@ -88,9 +87,11 @@ impl<'a> Rings<'a> {
         Ok(Rings {
             mesh,
             topology,
-            valences: vertices().map(|v| valence(v).min(u8::MAX.into()) as u8).collect(),
+            valences: parallel::collect(mesh.len(), |v| valence(v).min(u8::MAX.into()) as u8),
             masks: (0..=WALKED).map(half).collect(),
-            wide: vertices().filter(|&v| valence(v) > WALKED).map(|v| Wide::new(mesh, topology, v, &rule)).collect(),
+            wide: parallel::flat_map(mesh.len(), CHUNK, |range| {
+                range.filter(|&v| valence(v) > WALKED).map(|v| Wide::new(mesh, topology, v, &rule)).collect()
+            }),
             rule,
         })
     }

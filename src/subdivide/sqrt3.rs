@@ -4,15 +4,15 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
-use super::refined::{self, rows};
+use super::refined::{self, set_rows};
 use super::star::{
-    Tangents, blend_with_neighbors, blends, centroid, numbers, require_room, require_triangles, ring_tangents, twin,
+    Tangents, blend_with_neighbors, centroid, push_blends, require_room, require_triangles, ring_tangents, twin,
 };
 use crate::Result;
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::pages::large;
+use crate::parallel;
 
 /// a_n = (4 − 2cos(2π/n))/9: how far an old vertex moves towards the mean of its neighbours (Lin-Luo Eq. 2).
 pub fn relaxation(n: usize) -> f64 {
@@ -48,9 +48,8 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     require_triangles(mesh, topology, "sqrt3")?;
     require_room(mesh, 3)?;
     let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
-    positions.par_extend(blends(mesh, topology, vertex_mask));
-    let center = |f| centroid(&mesh.positions, mesh.faces.face(f));
-    positions.par_extend(numbers(mesh.faces.len()).map(center));
+    push_blends(&mut positions, mesh, topology, vertex_mask);
+    parallel::extend(&mut positions, mesh.faces.len(), |_| |f| centroid(&mesh.positions, mesh.faces.face(f)));
     Ok(Mesh::new(positions, flip(mesh, topology)))
 }
 
@@ -68,9 +67,9 @@ pub(super) fn flip(mesh: &Mesh, topology: &Topology) -> Faces {
     let vertices = mesh.len() as u32;
     let old = mesh.faces.corners();
     let mut corners = large(vec![0; 3 * old.len()]);
-    rows(&mut corners).for_each(|(c, corners): (u32, &mut [u32; 3])| {
+    set_rows(&mut corners, |c| {
         let across = twin(topology, c);
-        *corners = [old[c as usize], vertices + across / 3, vertices + c / 3];
+        [old[c as usize], vertices + across / 3, vertices + c / 3]
     });
     Faces::of_size(3, corners)
 }

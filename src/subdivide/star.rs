@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
 
 use crate::mesh::frame::magnitude;
 use crate::mesh::topology::NONE;
 use crate::mesh::{Incidence, Mesh, Topology};
+use crate::parallel::{self, find_first};
 use crate::{Error, Result};
 
 /// Vertices, edges or faces of one task.
@@ -63,13 +63,6 @@ fn first_face(mesh: &Mesh, is_bad: impl Fn(usize) -> bool + Sync) -> Option<usiz
     find_first(mesh.faces.len(), |f| is_bad(mesh.faces.range(f).len()))
 }
 
-/// The first number below `count` of which `is_it` holds, looked for in parallel.
-pub(crate) fn find_first(count: usize, is_it: impl Fn(usize) -> bool + Sync) -> Option<usize> {
-    (0..count.div_ceil(CHUNK))
-        .into_par_iter()
-        .find_map_first(|k| (k * CHUNK..count.min((k + 1) * CHUNK)).find(|&i| is_it(i)))
-}
-
 /// Refuses a mesh that is not closed or has a face that is no triangle, naming the first such face.
 pub(crate) fn require_triangles(mesh: &Mesh, topology: &Topology, scheme: &str) -> Result<()> {
     require_closed(mesh, topology)?;
@@ -118,34 +111,29 @@ pub(crate) fn centroid(positions: &[DVec3], face: &[u32]) -> DVec3 {
 
 /// `mask(n)` for every valence up to the largest of the mesh.
 pub(crate) fn by_valence<T>(incidence: &Incidence, mask: impl Fn(usize) -> T) -> Vec<T> {
-    let valences = incidence.offsets().par_windows(2).with_min_len(CHUNK);
-    let largest = valences.map(|w| w[1] - w[0]).max().unwrap_or(0);
-    (0..=largest as usize).map(mask).collect()
+    let largest =
+        parallel::map(incidence.vertices(), CHUNK, |range| range.map(|v| incidence.face_count(v)).max().unwrap_or(0));
+    (0..=largest.into_iter().max().unwrap_or(0)).map(mask).collect()
 }
 
 /// `mask(n) = [a, b]` at every vertex of a closed mesh: a times the vertex plus b times the sum of its n
 /// neighbours.
 pub(crate) fn blend_with_neighbors(mesh: &Mesh, topology: &Topology, mask: impl Fn(usize) -> [f64; 2]) -> Vec<DVec3> {
-    blends(mesh, topology, mask).collect()
+    let mut points = Vec::new();
+    push_blends(&mut points, mesh, topology, mask);
+    points
 }
 
-/// [`blend_with_neighbors`], one vertex after the other.
-pub(crate) fn blends(
-    mesh: &Mesh,
-    topology: &Topology,
-    mask: impl Fn(usize) -> [f64; 2],
-) -> impl IndexedParallelIterator<Item = DVec3> {
+/// Appends the points of [`blend_with_neighbors`].
+pub(crate) fn push_blends(points: &mut Vec<DVec3>, mesh: &Mesh, topology: &Topology, mask: impl Fn(usize) -> [f64; 2]) {
     let masks = by_valence(&topology.incidence, mask);
-    numbers(mesh.len()).map(move |v| {
-        let (n, sum) = neighbor_sum(mesh, topology, v);
-        let [a, b] = masks[n];
-        a * mesh.positions[v] + b * sum
-    })
-}
-
-/// The numbers below `count`.
-pub(crate) fn numbers(count: usize) -> impl IndexedParallelIterator<Item = usize> {
-    (0..count).into_par_iter().with_min_len(CHUNK)
+    parallel::extend(points, mesh.len(), |_| {
+        |v| {
+            let (n, sum) = neighbor_sum(mesh, topology, v);
+            let [a, b] = masks[n];
+            a * mesh.positions[v] + b * sum
+        }
+    });
 }
 
 /// The number of neighbours of vertex `v` of a closed mesh, and their sum.

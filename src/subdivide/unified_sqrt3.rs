@@ -1,13 +1,12 @@
 //! The unified √3 scheme of Lin & Luo (§4–5): a parameter α at every vertex blends the approximating √3 scheme
 //! (α = 0) with an interpolatory one (α = 1). New vertices take the mean α of their triangle.
 
-use rayon::prelude::*;
-
 use super::sqrt3::{flip, relaxation};
-use super::star::{by_valence, centroid, find_first, neighbor_sum, numbers, refuse, require_room, require_triangles};
+use super::star::{by_valence, centroid, neighbor_sum, refuse, require_room, require_triangles};
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
 use crate::pages::large;
+use crate::parallel::{self, find_first};
 
 /// The parameters that the paper allows.
 pub const ALPHA_RANGE: std::ops::RangeInclusive<f64> = 0.0..=2.0;
@@ -40,23 +39,21 @@ pub fn refine(mesh: &Mesh, topology: &Topology, alpha: &[f64]) -> Result<(Mesh, 
         [-a, a / n as f64]
     });
     let old = &mesh.positions;
-    let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
+    let count = mesh.len() + mesh.faces.len();
+    let displacements = parallel::collect(mesh.len(), |v| {
+        let (n, sum) = neighbor_sum(mesh, topology, v);
+        let [a, b] = masks[n];
+        a * old[v] + b * sum
+    });
+    let mut positions = large(Vec::with_capacity(count));
+    parallel::extend(&mut positions, mesh.len(), |_| |v| old[v] + (1.0 - alpha[v]) * displacements[v]);
     // What each vertex gives to its triangles.
-    let mut shares = large(Vec::with_capacity(mesh.len()));
-    numbers(mesh.len())
-        .map(|v| {
-            let (n, sum) = neighbor_sum(mesh, topology, v);
-            let [a, b] = masks[n];
-            let displacement = a * old[v] + b * sum;
-            let new = old[v] + (1.0 - alpha[v]) * displacement;
-            (new, old[v] - alpha[v] * displacement)
-        })
-        .unzip_into_vecs(&mut positions, &mut shares);
-    let faces = || numbers(mesh.faces.len()).map(|f| mesh.faces.face(f));
-    positions.par_extend(faces().map(|face| centroid(&shares, face)));
-    let mut parameters = large(Vec::with_capacity(positions.len()));
-    parameters.par_extend(alpha);
+    let mut shares = displacements;
+    parallel::change(&mut shares, |v, d| *d = old[v] - alpha[v] * *d);
+    parallel::extend(&mut positions, mesh.faces.len(), |_| |f| centroid(&shares, mesh.faces.face(f)));
+    let mut parameters = large(Vec::with_capacity(count));
+    parameters.extend_from_slice(alpha);
     let sum = |face: &[u32]| face.iter().map(|&v| alpha[v as usize]).sum::<f64>();
-    parameters.par_extend(faces().map(|face| sum(face) / 3.0));
+    parallel::extend(&mut parameters, mesh.faces.len(), |_| |f| sum(mesh.faces.face(f)) / 3.0);
     Ok((Mesh::new(positions, flip(mesh, topology)), parameters))
 }

@@ -185,7 +185,7 @@ fn products_are_those_of_sprs() {
             for (i, &y) in y.iter().enumerate() {
                 let allowed = tol::rounding(system.a.row(i).len());
                 assert!((system.a.row_times(i, &x).y - y).abs() <= allowed);
-                assert!((system.a.row_times_scalar(i, &numbers) - y).abs() <= allowed);
+                assert!((system.a.row_times(i, &numbers) - y).abs() <= allowed);
             }
             // sprs finds the same factorization A = H·M.
             let mut scaled = theirs.clone();

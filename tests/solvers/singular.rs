@@ -67,7 +67,7 @@ fn direct_methods_call_singular_what_is_singular_whatever_the_data() {
         let system = system(&mesh, Scheme::CatmullClark);
         let colour = kernel(&mesh);
         assert!(colour.iter().any(|c| *c != 0.0), "{name} has a kernel");
-        let image = |i: usize| system.a.row_times_scalar(i, &colour);
+        let image = |i: usize| system.a.row_times(i, &colour);
         assert!((0..mesh.len()).all(|i| image(i).abs() <= tol::rounding(32)), "{name}: A colour = 0");
         let consistent = product(&system, &random_points(mesh.len(), 4));
         let inconsistent: Vec<DVec3> = consistent.iter().zip(&colour).map(|(p, c)| *p + 0.1 * *c).collect();

@@ -21,7 +21,7 @@ fn the_detective_knows_its_suspects() {
         // The null vectors are null vectors.
         let x: Vec<f64> = verdict.colouring.iter().map(|&c| f64::from(c)).collect();
         for i in 0..mesh.len() {
-            assert!(system.m.row_times_scalar(i, &x).abs() < 1e-12, "{name} {i}");
+            assert!(system.m.row_times(i, &x).abs() < 1e-12, "{name} {i}");
         }
         by_numbers
     };

@@ -11,7 +11,6 @@ use limitlab::analysis::certificate::{Certificate, certify};
 use limitlab::analysis::comparison::{SOR_OMEGA, SSOR_OMEGA};
 use limitlab::analysis::dense;
 use limitlab::analysis::eigen::End;
-use limitlab::analysis::lanczos::Scalar;
 use limitlab::analysis::promise::{Counts, Promise};
 use limitlab::analysis::radius::{SpectralRadius, spectral_radius};
 use limitlab::analysis::singularity::{Mode, Singularity, modes};
@@ -179,7 +178,7 @@ fn run(arguments: &Arguments) -> Result<()> {
 /// All findings: from `acting`, and where entries are asked for, from `system`, which is the same with entries.
 fn analyse_any(
     system: Option<&LimitSystem>,
-    acting: &(impl System + Scalar),
+    acting: &impl System,
     points: &[DVec3],
     parts: Parts,
     progress: &Progress,

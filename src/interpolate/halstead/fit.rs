@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::energy::{Energies, Fairness, Weights};
 use crate::assemble::Csr;
@@ -13,6 +12,7 @@ use crate::interpolate::normals::unit_normals;
 use crate::interpolate::zheng_cai::Constraints;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
+use crate::parallel;
 use crate::solvers::Errors;
 use crate::solvers::direct::{Cholesky, Factorization, Kind};
 use crate::solvers::system::Rows;
@@ -315,11 +315,8 @@ impl Kkt {
         for _ in 0..MOST_REFINEMENTS {
             factors.solve(&ones, &mut rest);
             x.iter_mut().zip(&rest).for_each(|(x, d)| *x += *d);
-            let residual = |(i, r): (usize, &mut DVec3)| {
-                *r = right[i] - matrix.row_times(i, &x);
-                r.abs().max_element()
-            };
-            let largest = rest.par_iter_mut().enumerate().map(residual).reduce(|| 0.0, f64::max);
+            parallel::fill(&mut rest, |i| right[i] - matrix.row_times(i, &x));
+            let largest = rest.iter().map(|r| r.abs().max_element()).fold(0.0, f64::max);
             // The residual falls by a constant factor until it is rounding, and then no more.
             if largest.is_nan() || largest > 0.5 * smallest {
                 break;

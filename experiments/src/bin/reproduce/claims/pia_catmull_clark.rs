@@ -116,7 +116,7 @@ pub fn quadratic_form(_: &Lab) -> Result<Finding> {
         let subject = exact(name)?;
         let system = subject.system(Scheme::CatmullClark)?;
         let x: Vec<f64> = random_points(system.len(), seed).iter().map(|p| p.x).collect();
-        let form: f64 = (0..system.len()).map(|i| x[i] * system.m.row_times_scalar(i, &x)).sum();
+        let form: f64 = (0..system.len()).map(|i| x[i] * system.m.row_times(i, &x)).sum();
         let (mut sums, mut squares, mut own) = (0.0, 0.0, 0.0);
         for face in subject.mesh.faces.iter() {
             let sum: f64 = face.iter().map(|&v| x[v as usize]).sum();
@@ -153,7 +153,7 @@ pub fn arbitrary_meshes(lab: &Lab) -> Result<Finding> {
         let outcome = fast.then(|| solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-6, 60_000).report.outcome);
         // The form of P8 for faces of any size, on a random vector.
         let x: Vec<f64> = random_points(system.len(), 5).iter().map(|p| p.x).collect();
-        let form: f64 = (0..system.len()).map(|i| x[i] * system.m.row_times_scalar(i, &x)).sum();
+        let form: f64 = (0..system.len()).map(|i| x[i] * system.m.row_times(i, &x)).sum();
         let mut squares = 0.0;
         for face in subject.mesh.faces.iter() {
             let sum: f64 = face.iter().map(|&v| x[v as usize]).sum();

@@ -97,7 +97,7 @@ fn slowest(system: &LimitSystem, name: &str) -> Result<(f64, Vec<f64>)> {
     let mut x: Vec<f64> = (1..=n).map(|i| (i as f64 * 0.618_033_988_749_895).fract() - 0.5).collect();
     let mut residual = f64::INFINITY;
     for _ in 0..STEPS {
-        let mut next: Vec<f64> = (0..n).map(|i| x[i] - system.a.row_times_scalar(i, &x)).collect();
+        let mut next: Vec<f64> = (0..n).map(|i| x[i] - system.a.row_times(i, &x)).collect();
         let largest = next.iter().copied().fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
         next.iter_mut().for_each(|v| *v /= largest);
         residual = (x.iter().zip(&next)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -107,7 +107,7 @@ fn slowest(system: &LimitSystem, name: &str) -> Result<(f64, Vec<f64>)> {
         }
     }
     let at = (0..n).fold(0, |best, i| if x[i].abs() > x[best].abs() { i } else { best });
-    let lambda = system.a.row_times_scalar(at, &x) / x[at];
+    let lambda = system.a.row_times(at, &x) / x[at];
     let known = spectrum(system)?.a.min;
     if (lambda - known).abs() > 1e-6 {
         return Err(Error::Computation(format!(

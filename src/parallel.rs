@@ -1,0 +1,220 @@
+//! Loops over arrays that all threads share, cut into chunks of a fixed length, so that what is summed up by chunks does
+//! not depend on the number of threads.
+//!
+//! What divides, steals and joins work is compiled once for a type of element, and the work of a chunk called through a
+//! pointer. As chains of parallel iterators, each of which is compiled for itself, loops took two fifths of the
+//! library's machine code, and of its build.
+
+use std::mem::MaybeUninit;
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+/// Elements of a chunk where nothing is summed up.
+const CHUNK: usize = 4096;
+
+/// Calls `body(first, part)` for the chunks of `a` of `size` elements, `first` the index of the first of them.
+///
+/// # Panics
+/// If `size` is 0.
+pub fn chunks<A: Send>(a: &mut [A], size: usize, body: impl Fn(usize, &mut [A]) + Sync) {
+    fn shared<A: Send>(a: &mut [A], size: usize, body: &(dyn Fn(usize, &mut [A]) + Sync)) {
+        if a.len() <= size {
+            if !a.is_empty() {
+                body(0, a);
+            }
+            return;
+        }
+        a.par_chunks_mut(size).enumerate().for_each(|(k, a)| body(k * size, a));
+    }
+    shared(a, size, &body);
+}
+
+/// As [`chunks`], each with a place for what it adds up: `body(first, part, &mut sums[k])` for the k-th chunk.
+///
+/// # Panics
+/// If there is not one sum a chunk.
+pub fn chunks_with<A: Send, S: Send>(
+    a: &mut [A],
+    size: usize,
+    sums: &mut [S],
+    body: impl Fn(usize, &mut [A], &mut S) + Sync,
+) {
+    // A vector of () takes no memory.
+    let mut nothing = vec![(); a.len()];
+    chunks_of_two(a, &mut nothing, size, sums, |first, a, _, sum| body(first, a, sum));
+}
+
+/// As [`chunks_with`], over two arrays of equal length.
+pub fn chunks_of_two<A: Send, B: Send, S: Send>(
+    a: &mut [A],
+    b: &mut [B],
+    size: usize,
+    sums: &mut [S],
+    body: impl Fn(usize, &mut [A], &mut [B], &mut S) + Sync,
+) {
+    type Body<'a, A, B, S> = &'a (dyn Fn(usize, &mut [A], &mut [B], &mut S) + Sync);
+    fn shared<A: Send, B: Send, S: Send>(a: &mut [A], b: &mut [B], size: usize, sums: &mut [S], body: Body<A, B, S>) {
+        match sums {
+            [] => {}
+            [sum] => body(0, a, b, sum),
+            _ => {
+                let parts = a.par_chunks_mut(size).zip(b.par_chunks_mut(size)).zip(sums);
+                parts.enumerate().for_each(|(k, ((a, b), sum))| body(k * size, a, b, sum));
+            }
+        }
+    }
+    assert_eq!(a.len(), b.len(), "arrays of equal length");
+    assert_eq!(sums.len(), a.len().div_ceil(size), "one sum a chunk");
+    shared(a, b, size, sums, &body);
+}
+
+/// What `body` makes of the ranges of `size` indices below `count`, in their order.
+///
+/// # Panics
+/// If `size` is 0.
+pub fn map<R: Send>(count: usize, size: usize, body: impl Fn(Range<usize>) -> R + Sync) -> Vec<R> {
+    fn shared<R: Send>(count: usize, size: usize, body: &(dyn Fn(Range<usize>) -> R + Sync)) -> Vec<R> {
+        let range = |k: usize| k * size..count.min((k + 1) * size);
+        if count <= size {
+            return (0..count.div_ceil(size)).map(|k| body(range(k))).collect();
+        }
+        (0..count.div_ceil(size)).into_par_iter().map(|k| body(range(k))).collect()
+    }
+    shared(count, size, &body)
+}
+
+/// What `body(range, part)` makes of parts of an array, each with the rows that it belongs to, in their order.
+pub fn parts<A: Send, R: Send>(
+    parts: Vec<(Range<usize>, &mut [A])>,
+    body: impl Fn(Range<usize>, &mut [A]) -> R + Sync,
+) -> Vec<R> {
+    type Body<'a, A, R> = &'a (dyn Fn(Range<usize>, &mut [A]) -> R + Sync);
+    fn shared<A: Send, R: Send>(parts: Vec<(Range<usize>, &mut [A])>, body: Body<A, R>) -> Vec<R> {
+        parts.into_par_iter().map(|(range, part)| body(range, part)).collect()
+    }
+    shared(parts, &body)
+}
+
+/// Calls `visit(i)` for all i below `count`.
+pub fn each(count: usize, visit: impl Fn(usize) + Sync) {
+    map(count, CHUNK, |range| range.for_each(&visit));
+}
+
+/// All items that `body` makes of the ranges of `size` indices below `count`, in their order.
+pub fn flat_map<R: Send>(count: usize, size: usize, body: impl Fn(Range<usize>) -> Vec<R> + Sync) -> Vec<R> {
+    map(count, size, body).into_iter().flatten().collect()
+}
+
+/// Calls `change(i, &mut a[i])` for all i.
+pub fn change<A: Send>(a: &mut [A], change: impl Fn(usize, &mut A) + Sync) {
+    chunks(a, CHUNK, |first, part| {
+        for (i, a) in (first..).zip(part) {
+            change(i, a);
+        }
+    });
+}
+
+/// Sets `a[i] = item(i)`.
+pub fn fill<T: Send>(a: &mut [T], item: impl Fn(usize) -> T + Sync) {
+    change(a, |i, slot| *slot = item(i));
+}
+
+/// The vector of `item(i)` for all i below `count`.
+pub fn collect<T: Send>(count: usize, item: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let mut vector = Vec::new();
+    extend(&mut vector, count, |_| &item);
+    vector
+}
+
+/// Appends `count` items: `start(i)` makes those of a chunk from the i-th on, one after the other.
+///
+/// Memory is touched once, by the thread that makes an item: a million points take 1.7 ms, and 2.9 if they are cleared
+/// first, as a slice must be.
+pub fn extend<T: Send, F: FnMut(usize) -> T>(vector: &mut Vec<T>, count: usize, start: impl Fn(usize) -> F + Sync) {
+    vector.reserve(count);
+    let length = vector.len();
+    let spare: &mut [MaybeUninit<T>] = &mut vector.spare_capacity_mut()[..count];
+    chunks(spare, CHUNK, |first, part| {
+        let mut item = start(first);
+        for (i, slot) in (first..).zip(part) {
+            slot.write(item(i));
+        }
+    });
+    // SAFETY: the memory was reserved, and each of the `count` places after the last element was written above: the
+    // chunks cover the slice, and the loop each chunk. (A panic of `item` leaves the length as it was.)
+    unsafe { vector.set_len(length + count) };
+}
+
+/// The first number below `count` of which `is_it` holds.
+pub fn find_first(count: usize, is_it: impl Fn(usize) -> bool + Sync) -> Option<usize> {
+    fn shared(count: usize, chunk: &(dyn Fn(Range<usize>) -> Option<usize> + Sync)) -> Option<usize> {
+        let range = |k: usize| k * CHUNK..count.min((k + 1) * CHUNK);
+        (0..count.div_ceil(CHUNK)).into_par_iter().find_map_first(|k| chunk(range(k)))
+    }
+    shared(count, &|mut range| range.find(|&i| is_it(i)))
+}
+
+/// Whether `is_it` holds of any number below `count`.
+pub fn any(count: usize, is_it: impl Fn(usize) -> bool + Sync) -> bool {
+    find_first(count, is_it).is_some()
+}
+
+/// Whether `holds` of every number below `count`.
+pub fn all(count: usize, holds: impl Fn(usize) -> bool + Sync) -> bool {
+    find_first(count, |i| !holds(i)).is_none()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chunks_cover_an_array_once() {
+        for n in [0, 1, 5, 10, 10_000] {
+            let (mut a, mut b) = (vec![0usize; n], vec![0usize; n]);
+            chunks(&mut a, 5, |first, part| part.iter_mut().enumerate().for_each(|(k, a)| *a += first + k));
+            assert!(a.iter().copied().eq(0..n));
+            let mut sums = vec![0; n.div_ceil(3)];
+            chunks_of_two(&mut a, &mut b, 3, &mut sums, |first, a, b, sum| {
+                assert_eq!((a[0], a.len()), (first, b.len()));
+                b.copy_from_slice(a);
+                *sum += a.iter().sum::<usize>();
+            });
+            assert_eq!(a, b);
+            assert!(sums.iter().copied().eq(a.chunks(3).map(|a| a.iter().sum::<usize>())));
+            let ranges = map(n, 5, |range| range);
+            assert!(ranges.iter().all(|r| !r.is_empty() && r.len() <= 5));
+            assert!(ranges.into_iter().flatten().eq(0..n));
+        }
+    }
+
+    #[test]
+    fn items_are_appended_in_order() {
+        for n in [0, 1, 4095, 4096, 4097, 20_000] {
+            let mut words = vec!["before".to_string()];
+            extend(&mut words, n, |first| {
+                let mut next = first;
+                move |i| {
+                    assert_eq!(i, next);
+                    next += 1;
+                    i.to_string()
+                }
+            });
+            assert_eq!(words[0], "before");
+            assert!(words[1..].iter().enumerate().all(|(i, word)| *word == i.to_string()));
+            assert_eq!(words.len(), n + 1);
+            assert!(collect(n, |i| 2 * i).into_iter().eq((0..n).map(|i| 2 * i)));
+            assert_eq!(find_first(n, |i| i >= 4096), (n > 4096).then_some(4096));
+        }
+    }
+
+    #[test]
+    fn a_panic_appends_nothing() {
+        let mut words = vec![String::new()];
+        let made = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            extend(&mut words, 9000, |_| |i: usize| if i == 8999 { panic!("the last") } else { i.to_string() });
+        }));
+        assert!(made.is_err() && words.len() == 1);
+    }
+}
