@@ -5,7 +5,7 @@
 //! `V` with `A V = P`. This crate assembles `A = H·M` for five schemes, solves the system by direct and
 //! iterative methods, and explains the convergence by spectra and proven bounds.
 //!
-//! The rooms, each of which uses only the ones above it: [`error`], [`output`], [`mesh`], [`subdivide`],
+//! The rooms, each of which uses only the ones above it: [`error`], [`output`], [`mesh`], [`schemes`],
 //! [`assemble`], [`solvers`], [`analysis`], [`interpolate`].
 
 pub mod analysis;
@@ -18,8 +18,8 @@ pub mod output;
 mod pages;
 mod parallel;
 mod prefetch;
+pub mod schemes;
 pub mod solvers;
-pub mod subdivide;
 mod text;
 
 pub use error::{Error, Result};

@@ -7,7 +7,7 @@ mod fuzz;
 mod meshes;
 mod operator;
 mod pipelines;
+mod schemes;
 mod solvers;
 mod spectra;
 mod splitting;
-mod subdivide;

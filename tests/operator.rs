@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 
 use glam::{DVec3, Vec3A};
-use limitlab::assemble::{LimitSystem, Operator, Scheme};
+use limitlab::assemble::{LimitSystem, Operator};
 use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::curve::{along_curve, is_scattered};
@@ -12,6 +12,7 @@ use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::generate::{dual, permute_vertices, random_polygons, shuffle_faces, union};
 use limitlab::mesh::order::{Numbering, Order, colouring};
 use limitlab::mesh::{Faces, Mesh, Topology, builtin::builtin, noise::add_noise};
+use limitlab::schemes::Scheme;
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
 use limitlab::solvers::coloured::Coloured;
 use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use assert_cmd::Command;
 use glam::DVec3;
 use limitlab::mesh::{Mesh, builtin, io, noise};
-use limitlab::subdivide::{Refinement, catmull_clark, doo_sabin};
+use limitlab::schemes::{Refinement, catmull_clark, doo_sabin};
 use serde_json::Value;
 use tempfile::TempDir;
 

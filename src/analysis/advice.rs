@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use super::singularity::{SingularComponent, Singularity};
-use crate::assemble::Scheme;
 use crate::mesh::{Mesh, Topology};
+use crate::schemes::{Scheme, SingularSet};
 use crate::solvers::{Method, Outcome, Report, Stop};
 
 /// Errors of this many times ε·max‖p‖ are rounding: what methods leave on the edge of theirs.
@@ -68,11 +68,14 @@ impl Failed {
         if let Some(component) = self.unreachable() {
             return format!(
                 "the points have a part that no control mesh reaches, {:.3e} at each of the {} vertices of the \
-                 component of vertex {}: all its valences are 3 and its graph is bipartite, so that the matrix is \
-                 singular; {ANOTHER_SYSTEM}",
+                 component of vertex {}: {}its graph is bipartite, so that the matrix is singular; {ANOTHER_SYSTEM}",
                 unit * component.unreachable.length(),
                 component.vertices,
-                component.first_vertex
+                component.first_vertex,
+                match self.scheme.singular_set() {
+                    SingularSet::Bipartite { valence: Some(n) } => format!("all its valences are {n} and "),
+                    SingularSet::Bipartite { valence: None } | SingularSet::Never => String::new(),
+                }
             );
         }
         let reachable = unit * 2.0 * self.max_error;
@@ -93,12 +96,12 @@ impl Failed {
                 "the matrix is singular, but these points have a control mesh: use --method auto".into()
             }
             _ if chosen => "use --method auto".into(),
-            _ if self.scheme == Scheme::CatmullClark => {
-                format!("the matrix is singular, or nearly so; {ANOTHER_SYSTEM}")
-            }
-            _ => format!(
-                "the error that can be reached is larger than the tolerance: use --tol-absolute {reachable:.0e}"
-            ),
+            _ => match self.scheme.singular_set() {
+                SingularSet::Bipartite { .. } => format!("the matrix is singular, or nearly so; {ANOTHER_SYSTEM}"),
+                SingularSet::Never => format!(
+                    "the error that can be reached is larger than the tolerance: use --tol-absolute {reachable:.0e}"
+                ),
+            },
         }
     }
 }

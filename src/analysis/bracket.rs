@@ -31,12 +31,13 @@ use super::certificate::inertia;
 use super::eigen::End;
 use super::lanczos;
 use super::spectrum::Operator;
+use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
 use crate::assemble::system::valences;
-use crate::assemble::{Csr, Masks, Scheme};
 use crate::error::Result;
 use crate::mesh::topology::NONE;
 use crate::mesh::{Faces, Topology};
+use crate::schemes::{Masks, Scheme};
 
 /// Larger faces have no patch: their elements are dense.
 const LARGEST_FACE: usize = 64;
@@ -226,7 +227,7 @@ pub fn element_bound(faces: &Faces, topology: &Topology, scheme: Scheme, operato
 /// ```
 /// use limitlab::analysis::bracket::bracket;
 /// use limitlab::analysis::{eigen::End, spectrum::Operator};
-/// use limitlab::assemble::Scheme;
+/// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Topology, builtin};
 ///
 /// let mesh = builtin::builtin("quad-sphere:7")?;

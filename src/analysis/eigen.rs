@@ -125,7 +125,8 @@ impl Eigenpairs {
 /// ```
 /// use limitlab::analysis::eigen::{End, Request, extreme};
 /// use limitlab::analysis::spectrum::{Operator, symmetric};
-/// use limitlab::assemble::{LimitSystem, Scheme};
+/// use limitlab::assemble::LimitSystem;
+/// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Topology, builtin};
 ///
 /// let mesh = builtin::torus(30, 30);

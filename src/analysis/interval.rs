@@ -64,7 +64,8 @@ pub struct Interval {
 ///
 /// ```
 /// use limitlab::analysis::{interval::interval, spectrum};
-/// use limitlab::assemble::{LimitSystem, Operator, Scheme};
+/// use limitlab::assemble::{LimitSystem, Operator};
+/// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Topology, builtin};
 ///
 /// let mesh = builtin::builtin("irregular-quad:3000")?;

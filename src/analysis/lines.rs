@@ -327,9 +327,9 @@ pub fn count(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assemble::Scheme;
     use crate::mesh::noise::add_noise;
     use crate::mesh::{Mesh, builtin, generate};
+    use crate::schemes::Scheme;
 
     fn noisy(name: &str) -> Mesh {
         let mut mesh = builtin::builtin(name).unwrap();

@@ -22,7 +22,8 @@ pub type Start<'s> =
 ///
 /// ```
 /// use limitlab::analysis::own::Own;
-/// use limitlab::assemble::{LimitSystem, Scheme};
+/// use limitlab::assemble::LimitSystem;
+/// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Topology, builtin};
 /// use limitlab::solvers::{Outcome, Stop, pia::Pia};
 ///

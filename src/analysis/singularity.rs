@@ -1,10 +1,8 @@
 //! Whether a system is singular, why, whether the data notice, and what each method makes of it.
 //!
-//! Theory, on closed meshes with all valences ≥ 3: under Catmull-Clark A is singular exactly when some connected
-//! component has all valences 3 and a bipartite edge graph; its null vector is the ±1 colouring. This follows from
-//! `xᵀMx = Σ_F (4/|F|)(Σ_{i∈F} x_i)² + 2 Σ_ij (x_i+x_j)² + Σ n(n−3) x_i²`: the edge terms vanish only for x_j = −x_i
-//! along every edge, the last only where n = 3, and the face terms then vanish by themselves, as all faces are even.
-//! The other schemes have positive lower bounds and are never singular.
+//! Theory, on closed meshes with all valences ≥ 3: each scheme has its [`SingularSet`]. Under Catmull-Clark A is singular
+//! exactly when some connected component has all valences 3 and a bipartite edge graph; its null vector is the ±1
+//! colouring. Schemes with positive lower bounds are never singular.
 
 use glam::DVec3;
 
@@ -12,10 +10,11 @@ use super::certificate::eigenvalues_below;
 use super::eigen::{self, End, Request};
 use super::spectrum::{Operator, scales, symmetric};
 use super::{dense, eigen::Eigenvalue};
-use crate::assemble::{LimitSystem, Scheme};
+use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Mesh, Topology};
+use crate::schemes::{Scheme, SingularSet};
 use crate::solvers::Method;
 
 /// A component on which A is singular.
@@ -74,14 +73,14 @@ impl Singularity {
         let (component, components) = topology.components(&mesh.faces);
         let mut verdict =
             Singularity { components, singular: Vec::new(), colouring: vec![0; mesh.len()], excited: false };
-        if scheme != Scheme::CatmullClark {
+        let SingularSet::Bipartite { valence } = scheme.singular_set() else {
             return verdict;
-        }
+        };
         let mut colour = colour(mesh, topology);
         let mut regular = vec![false; components];
         for v in 0..mesh.len() {
-            let bad =
-                topology.incidence.face_count(v) != 3 || neighbours(mesh, topology, v).any(|w| colour[w] == colour[v]);
+            let bad = valence.is_some_and(|valence| topology.incidence.face_count(v) != valence)
+                || neighbours(mesh, topology, v).any(|w| colour[w] == colour[v]);
             if bad {
                 regular[component[v] as usize] = true;
             }
@@ -127,14 +126,23 @@ impl Singularity {
     /// Simultaneous and sweeping relaxations of a semidefinite system converge if it is soluble (Keller 1965), and
     /// else move by the same step along the null space in each iteration.
     pub fn prediction(&self, method: Method) -> Prediction {
-        match method {
-            _ if !self.is_singular() => Prediction::Converges,
-            Method::Lu | Method::Cholesky | Method::Ldlt => Prediction::Refuses,
-            _ if self.excited => Prediction::Drifts,
+        if !self.is_singular() {
+            return Prediction::Converges;
+        }
+        let soluble = match method {
+            Method::Lu | Method::Cholesky | Method::Ldlt => return Prediction::Refuses,
             // Updates lie in the range of A = H M, which is H^-1-orthogonal to the null space.
             Method::Pia | Method::WPia | Method::Chebyshev | Method::Cg => Prediction::MinimumNorm,
-            _ => Prediction::SomeSolution,
-        }
+            Method::Jacobi
+            | Method::Thall
+            | Method::GaussSeidel
+            | Method::Sor
+            | Method::Ssor
+            | Method::PcgJacobi
+            | Method::PcgSsor
+            | Method::PcgIc0 => Prediction::SomeSolution,
+        };
+        if self.excited { Prediction::Drifts } else { soluble }
     }
 }
 

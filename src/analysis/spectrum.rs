@@ -12,10 +12,11 @@ use super::lanczos::{Matrix, SelfAdjoint, rayleigh};
 use super::singularity::{ZERO, colour};
 use super::{dense, lanczos};
 use crate::assemble::bounds::SpectralBounds;
-use crate::assemble::{Csr, LimitSystem, Scheme};
+use crate::assemble::{Csr, LimitSystem};
 use crate::error::Result;
 use crate::mesh::fronts::in_fronts;
 use crate::mesh::{Mesh, Topology};
+use crate::schemes::Scheme;
 use crate::solvers::System;
 use crate::solvers::system::Rows;
 
@@ -223,7 +224,7 @@ pub fn ends(system: &LimitSystem) -> Result<Ends> {
 ///
 /// ```
 /// use limitlab::analysis::spectrum::{Source, mesh_ends};
-/// use limitlab::assemble::Scheme;
+/// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Topology, builtin};
 ///
 /// let mesh = builtin::builtin("quad-sphere:7")?;

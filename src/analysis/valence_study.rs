@@ -10,10 +10,11 @@ use super::dense;
 use super::eigen::End;
 use super::singularity::{Mode, modes};
 use super::spectrum::Operator;
-use crate::assemble::{LimitSystem, Scheme};
+use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::generate::quad_split;
 use crate::mesh::{Mesh, Topology, builtin};
+use crate::schemes::Scheme;
 
 /// The spectra of infinite regular meshes: A and D⁻¹A of valence 4 in quads or 6 in triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,16 +23,9 @@ pub struct Band {
     pub jacobi: (f64, f64),
 }
 
-/// The regular band from the symbols: Catmull-Clark ((2+cosθ)/3)((2+cosφ)/3) and so on, the diagonal being constant.
-/// Nasri and Zheng-Cai on quads.
+/// The regular band from the [symbols](Scheme::regular_symbol), the diagonal being constant.
 pub fn regular_band(scheme: Scheme) -> Band {
-    // The least value of the symbol, and its mean: the diagonal entry.
-    let (least, diagonal) = match scheme {
-        Scheme::CatmullClark => (1.0 / 9.0, 4.0 / 9.0),
-        Scheme::Loop | Scheme::Sqrt3 => (0.25, 0.5),
-        Scheme::Nasri => (0.25, 9.0 / 16.0),
-        Scheme::ZhengCai => (0.5, 0.625),
-    };
+    let (least, diagonal) = scheme.regular_symbol();
     Band { a: (least, 1.0), jacobi: (least / diagonal, 1.0 / diagonal) }
 }
 

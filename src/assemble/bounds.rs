@@ -1,8 +1,8 @@
 //! Bounds on the spectra of A and D⁻¹A that valences, face sizes and the diagonal alone prove.
 
 use super::csr::Csr;
-use super::scheme::{Scheme, loop_beta, sqrt3_beta};
 use crate::parallel;
+use crate::schemes::Scheme;
 
 /// Entries of one task.
 const CHUNK: usize = 8192;
@@ -81,12 +81,12 @@ impl SpectralBounds {
         SpectralBounds { lambda_min, lambda_max, jacobi_lambda_min, jacobi_lambda_max }
     }
 
-    /// The bounds on a closed mesh. All schemes have `M ⪰ H⁻¹ diag(b)` with b_i = [`lambda_min_at`] of the valence,
+    /// The bounds on a closed mesh. All schemes have `M ⪰ H⁻¹ diag(b)` with b_i = [`Scheme::lambda_min_at`] of the valence,
     /// so `λ(A) ≥ min b_i` and, D being `H diag M`, `λ(D⁻¹A) ≥ min b_i/a_ii`. O(N).
     pub fn closed(scheme: Scheme, valences: &[u32], triangles_only: bool, diagonal: &[f64]) -> Self {
         let mut bounds = Self::gershgorin(diagonal);
         let greatest = valences.iter().copied().max().unwrap_or(0) as usize;
-        let at: Vec<f64> = (0..=greatest).map(|n| lambda_min_at(scheme, n, triangles_only)).collect();
+        let at: Vec<f64> = (0..=greatest).map(|n| scheme.lambda_min_at(n, triangles_only)).collect();
         let least = |(a, b): (f64, f64), (c, d): (f64, f64)| (a.min(c), b.min(d));
         let none = (f64::INFINITY, f64::INFINITY);
         let ends = parallel::map(valences.len(), CHUNK, |range| {
@@ -131,36 +131,6 @@ fn discs(h: &[f64], m: &Csr) -> (f64, f64) {
     let best =
         |end: fn(&[f64; 2]) -> f64, choose: fn(f64, f64) -> f64| all.iter().map(end).reduce(choose).unwrap_or(0.0);
     (best(|e| e[0], f64::max), best(|e| e[1], f64::min))
-}
-
-/// What a vertex of valence n ≥ 3 allows λ_min(A) to be on a closed mesh.
-///
-/// Catmull-Clark: `(n−3)/(n+5)`, from the quadratic form
-/// `xᵀMx = Σ_F (4/|F|)(Σ_{i∈F} x_i)² + 2 Σ_ij (x_i+x_j)² + Σ n(n−3) x_i²`. Loop and √3: `(3β_n − 1)/2`.
-/// Nasri: the face circulants have the eigenvalues 1, ½, ½, ¼, …, so ¼, and ½ where all faces are triangles.
-/// Zheng-Cai: ½.
-pub fn lambda_min_at(scheme: Scheme, n: usize, triangles_only: bool) -> f64 {
-    match scheme {
-        Scheme::CatmullClark => (n as f64 - 3.0) / (n as f64 + 5.0),
-        Scheme::Loop => 0.5 * (3.0 * loop_beta(n) - 1.0),
-        Scheme::Sqrt3 => 0.5 * (3.0 * sqrt3_beta(n) - 1.0),
-        Scheme::Nasri if triangles_only => 0.5,
-        Scheme::Nasri => 0.25,
-        Scheme::ZhengCai => 0.5,
-    }
-}
-
-/// What λ_min(A) usually is, or a little less: 0.086 to 0.111 under Catmull-Clark, 0.205 to 0.25 under Loop, 0.186 to
-/// 0.222 under √3 (`spectrum` on irregular meshes of 20 000 vertices and on tori). Nothing is proven by it. The other
-/// schemes have their proven bound.
-pub fn usual_lambda_min(scheme: Scheme) -> f64 {
-    match scheme {
-        Scheme::CatmullClark => 0.085,
-        Scheme::Loop => 0.2,
-        Scheme::Sqrt3 => 0.18,
-        Scheme::Nasri => 0.25,
-        Scheme::ZhengCai => 0.5,
-    }
 }
 
 #[cfg(test)]

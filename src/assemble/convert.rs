@@ -8,7 +8,8 @@
 //!
 //! ```
 //! use faer::sparse::SparseColMat;
-//! use limitlab::assemble::{Csr, LimitSystem, Scheme};
+//! use limitlab::assemble::{Csr, LimitSystem};
+//! use limitlab::schemes::Scheme;
 //! use limitlab::mesh::{Topology, builtin};
 //! use nalgebra_sparse::CsrMatrix;
 //!

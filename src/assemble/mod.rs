@@ -11,12 +11,10 @@ pub mod operator;
 mod parts;
 pub mod polygons;
 mod rows;
-pub mod scheme;
 mod source;
 pub mod stencil;
 pub mod system;
 
 pub use csr::Csr;
 pub use operator::Operator;
-pub use scheme::{Masks, Scheme};
 pub use system::LimitSystem;

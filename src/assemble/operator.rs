@@ -5,9 +5,8 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use super::bounds::{SpectralBounds, usual_lambda_min};
+use super::bounds::SpectralBounds;
 use super::codes::Neighbours;
-use super::scheme::{Masks, Scheme};
 use super::source::Source;
 use super::stencil::{Point, Stencil, runs};
 use super::system::{check_boundary, check_faces};
@@ -15,6 +14,7 @@ use crate::error::Result;
 use crate::mesh::order::Numbering;
 use crate::mesh::{Faces, Incidence, Topology};
 use crate::parallel;
+use crate::schemes::{Masks, Scheme};
 
 /// A = H·M without stored entries: a row knows its neighbours, and its weights follow from valence and face size.
 ///
@@ -113,7 +113,7 @@ impl Operator {
             weights: OnceLock::new(),
             diagonal: OnceLock::new(),
             bounds,
-            usual_lambda_min: usual_lambda_min(scheme),
+            usual_lambda_min: scheme.usual_lambda_min(),
         })
     }
 
@@ -150,7 +150,7 @@ impl Operator {
         self.bounds
     }
 
-    /// What the scheme's [λ_min usually is](super::bounds::usual_lambda_min).
+    /// What the scheme's [λ_min usually is](Scheme::usual_lambda_min).
     pub fn usual_lambda_min(&self) -> f64 {
         self.usual_lambda_min
     }

@@ -6,7 +6,6 @@ use std::ops::Range;
 
 use glam::Vec3A;
 
-use super::scheme::Scheme;
 use super::stencil::{Kind, Point};
 use crate::mesh::incidence::split_rows;
 use crate::mesh::order::Numbering;
@@ -15,6 +14,7 @@ use crate::mesh::{Faces, Incidence};
 use crate::pages::{filled, large};
 use crate::parallel;
 use crate::prefetch::prefetch;
+use crate::schemes::Scheme;
 
 /// Faces are ordered by the block of so many rows that the first of their corners is in, and by size within a block.
 pub const BLOCK: usize = 1024;
@@ -151,14 +151,14 @@ impl Polygons {
                 self.first_turn.resize(size + 1, NONE);
             }
             if self.first_turn[size] == NONE {
-                let modes = scheme.modes(size);
-                self.weights[size] = [modes.constant, modes.cosine];
+                let circulant = scheme.circulant(size);
+                self.weights[size] = [circulant.constant, circulant.cosine];
                 self.first_turn[size] = self.double.len() as u32;
-                self.parts = if modes.cosine == 0.0 { 1 } else { 3 };
+                self.parts = if circulant.cosine == 0.0 { 1 } else { 3 };
                 self.double.extend((0..size).map(|t| turn(t, size)));
                 let turns = &self.double[self.double.len() - size..];
                 let places = (1..size).rev().chain(0..size);
-                let weight = |t: usize| modes.constant + modes.cosine * turns[t][0];
+                let weight = |t: usize| circulant.constant + circulant.cosine * turns[t][0];
                 self.circulants.extend(places.map(weight));
                 self.circulants.push(0.0);
             }

@@ -356,10 +356,10 @@ impl<'a> Rows<'a> {
 mod tests {
     use super::*;
     use crate::assemble::system::valences;
-    use crate::assemble::{Masks, Scheme};
     use crate::mesh::Mesh;
     use crate::mesh::builtin::builtin;
     use crate::mesh::generate::{random_polygons, random_triangulation};
+    use crate::schemes::{Masks, Scheme};
 
     /// How many rows of M are made the usual way, after comparing them with those made the general way.
     fn usual_rows(mesh: &Mesh, scheme: Scheme) -> usize {

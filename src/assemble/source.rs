@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use super::codes::Codes;
 use super::polygons::Polygons;
-use super::scheme::{Masks, Scheme};
 use super::stencil::{Kind, Ring, Rings};
 use crate::error::{Error, Result};
 use crate::mesh::incidence::{next_in, prev_in};
@@ -12,6 +11,7 @@ use crate::mesh::order::Numbering;
 use crate::mesh::{Faces, Incidence, Topology};
 use crate::pages::large;
 use crate::parallel;
+use crate::schemes::{Masks, Scheme};
 
 /// What the rows are built from.
 pub(super) struct Source<'a> {
@@ -205,7 +205,7 @@ impl<'a> Source<'a> {
         // Of any size: the part of the faces that is no part of their sums does not depend on it.
         let polygons = |n: usize| {
             let (h, own, x) = weights(n);
-            Ring::new(h * (own + x * s.modes(4).identity), h * s.edge_weight(), h)
+            Ring::new(h * (own + x * s.circulant(4).identity), h * s.edge_weight(), h)
         };
         Rings { quads: rings(4), edges: rings(3), polygons: (0..=greatest).map(polygons).collect() }
     }

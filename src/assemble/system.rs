@@ -7,10 +7,10 @@ use glam::DVec3;
 use super::bounds::SpectralBounds;
 use super::csr::{Csr, Pattern};
 use super::rows::Rows;
-use super::scheme::{Masks, Scheme};
 use crate::error::{Error, Result};
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::parallel;
+use crate::schemes::{Masks, Scheme};
 
 /// The limit system `A V = P` of one mesh: `A = H·M` explicitly, with both factors.
 ///
@@ -41,7 +41,8 @@ impl LimitSystem {
     /// more than 2³² − 1 entries.
     ///
     /// ```
-    /// use limitlab::assemble::{LimitSystem, Scheme};
+    /// use limitlab::assemble::LimitSystem;
+    /// use limitlab::schemes::Scheme;
     /// use limitlab::mesh::{builtin, Topology};
     ///
     /// let mesh = builtin::builtin("tetrahedron")?;
@@ -116,7 +117,7 @@ pub(super) fn check_faces(faces: &Faces, scheme: Scheme, open: bool) -> Result<(
         return Err(Error::Computation(format!(
             "face {f} has {} corners, and the scheme {scheme} is defined on triangles only; triangulate the mesh{}",
             faces.face(f).len(),
-            if open { "" } else { " or use --scheme catmull-clark, nasri or zheng-cai" }
+            if open { String::new() } else { format!(" or use --scheme {}", names(|s| !s.needs_triangles())) }
         )));
     }
     Ok(())
@@ -129,10 +130,22 @@ pub(super) fn check_boundary(faces: &Faces, topology: &Topology, scheme: Scheme)
         return Err(Error::Computation(format!(
             "{} boundary edges, and the masks of {scheme} need whole faces around every vertex; close the holes{}",
             topology.boundary_edges(),
-            if triangles { ", or use --boundary as-interior with --scheme loop or sqrt3" } else { "" }
+            match names(|s| s.edges_only() && (triangles || !s.needs_triangles())) {
+                none if none.is_empty() => none,
+                names => format!(", or use --boundary as-interior with --scheme {names}"),
+            }
         )));
     }
     Ok(())
+}
+
+/// The names of some schemes, to choose one from.
+fn names(which: impl Fn(Scheme) -> bool) -> String {
+    let names: Vec<&str> = Scheme::ALL.into_iter().filter(|&s| which(s)).map(Scheme::name).collect();
+    match names.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        _ => names.concat(),
+    }
 }
 
 /// The number of edges at every vertex: the valence n of the masks, on a boundary too.

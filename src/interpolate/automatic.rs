@@ -21,14 +21,14 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use crate::assemble::bounds::usual_lambda_min;
-use crate::assemble::{Operator, Scheme};
+use crate::assemble::Operator;
 use crate::error::Result;
 use crate::memory::require;
 use crate::mesh::curve::{along_curve, is_scattered};
 use crate::mesh::fronts::{in_fronts, in_kinds};
 use crate::mesh::order::Numbering;
 use crate::mesh::{Incidence, Mesh, Topology};
+use crate::schemes::Scheme;
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::{Iterate, Method, Outcome, Report, Stop, mixed, solve};
 
@@ -62,7 +62,7 @@ pub struct Automatic {
 /// As [`require_memory`] and [`Operator::new`].
 ///
 /// ```
-/// use limitlab::assemble::Scheme;
+/// use limitlab::schemes::Scheme;
 /// use limitlab::interpolate::automatic::control_points;
 /// use limitlab::mesh::builtin;
 /// use limitlab::solvers::{Outcome, Stop};
@@ -164,7 +164,7 @@ fn operator(mesh: &Mesh, topology: Option<&Topology>, scheme: Scheme) -> Result<
         }
     };
     // Among mixed faces the search costs twice as much.
-    let few = usual_lambda_min(scheme) >= FEW && mesh.faces.uniform_size().is_none();
+    let few = scheme.usual_lambda_min() >= FEW && mesh.faces.uniform_size().is_none();
     let number = || {
         if mesh.len() >= ORDERED && !few {
             Some(in_fronts(&mesh.faces, incidence))

@@ -7,8 +7,9 @@ use std::ops::ControlFlow;
 
 use super::subset::Restriction;
 use crate::Result;
-use crate::assemble::{LimitSystem, Scheme};
+use crate::assemble::LimitSystem;
 use crate::mesh::{Mesh, Topology};
+use crate::schemes::Scheme;
 use crate::solvers::{Setup, Solution, Stop, run};
 
 /// Solves Nasri's system for the control points: all vertices, or those marked in `interpolated` with V_j = I_j at

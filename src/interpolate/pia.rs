@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use crate::assemble::{LimitSystem, Masks, Scheme};
+use crate::assemble::LimitSystem;
+use crate::schemes::{Masks, Scheme};
 use crate::solvers::{Errors, Outcome, Setup, Stop, run};
 
 /// A run of the paper's algorithm, counted as its Table 1 counts.

@@ -5,10 +5,10 @@ use glam::DVec3;
 
 use super::normals::{Rotation, rotate_rings};
 use super::zheng_cai::{Constraints, FirstRefinement};
-use crate::assemble::Scheme;
 use crate::mesh::{Mesh, Topology};
-use crate::subdivide::Refinement;
-use crate::subdivide::doo_sabin::{self, Rule};
+use crate::schemes::Refinement;
+use crate::schemes::Scheme;
+use crate::schemes::doo_sabin::{self, Rule};
 use crate::{Error, Result};
 
 /// What is wanted of the surface.
@@ -38,16 +38,6 @@ pub struct Surface {
     pub not_flattened: Vec<u32>,
 }
 
-/// The refinement whose surface the limit points of `scheme` lie on.
-pub fn refinement(scheme: Scheme) -> Refinement {
-    match scheme {
-        Scheme::CatmullClark => Refinement::CatmullClark,
-        Scheme::Loop => Refinement::Loop,
-        Scheme::Sqrt3 => Refinement::Sqrt3,
-        Scheme::Nasri | Scheme::ZhengCai => Refinement::DooSabin,
-    }
-}
-
 /// Makes the surface of a control mesh found for `scheme`. `points` are the given points; `topology` gives that of
 /// `control`, where it is needed.
 ///
@@ -70,13 +60,9 @@ pub fn surface<'a>(
     request: &Request,
 ) -> Result<Surface> {
     let given = &request.constraints;
-    let rule = match scheme {
-        Scheme::Nasri => Some(Rule::DooSabin),
-        Scheme::ZhengCai => Some(Rule::ZhengCai),
-        _ => None,
-    };
+    let rule = scheme.first_rule();
     let mut surface = match rule {
-        None => primal(control, refinement(scheme), request)?,
+        None => primal(control, scheme.refinement(), request)?,
         Some(_) if request.levels == 0 => {
             if given.normals.is_some() || given.handles.is_some() {
                 return Err(too_few("normals and shape handles act on", 1));
@@ -113,7 +99,7 @@ pub fn surface<'a>(
             Some(_) => Some(Rule::DooSabin),
             None => None,
         };
-        let scheme = refinement(scheme);
+        let scheme = scheme.refinement();
         if request.normals {
             surface.normals = Some(match rule {
                 Some(rule) => doo_sabin::limit_normals(rule, mesh, at)?,

@@ -9,10 +9,10 @@ use crate::mesh::frame::of_order_one;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Mesh, Topology, generate};
 use crate::parallel;
+use crate::schemes::catmull_clark;
 use crate::solvers::iteration::{Errors, Failure, Iterate};
 use crate::solvers::jacobi::THALL_OMEGA;
 use crate::solvers::system::Rows;
-use crate::subdivide::catmull_clark;
 
 /// How the limit mask of a vertex beside faces that are no quads is inverted. On quads the two are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

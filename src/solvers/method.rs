@@ -185,7 +185,8 @@ pub struct Solution {
 /// If there is not one point a vertex, or an order names a vertex that the system lacks.
 ///
 /// ```
-/// use limitlab::assemble::{LimitSystem, Scheme};
+/// use limitlab::assemble::LimitSystem;
+/// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{builtin, Topology};
 /// use limitlab::solvers::{Outcome, Setup, Stop, run};
 ///

@@ -2,17 +2,18 @@
 //! knows no masks, on a few.
 
 use glam::DVec3;
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::mesh::Mesh;
 use limitlab::mesh::generate::{random_polygons, random_triangulation};
-use limitlab::subdivide::doo_sabin::{self, Rule};
-use limitlab::subdivide::{Refinement, catmull_clark, loop_scheme, sqrt3};
+use limitlab::schemes::Scheme;
+use limitlab::schemes::doo_sabin::{self, Rule};
+use limitlab::schemes::{Refinement, catmull_clark, loop_scheme, sqrt3};
 use rayon::prelude::*;
 
 use crate::common::meshes::*;
 use crate::common::tol;
 
-/// The limit points of the control mesh by the masks of the room `subdivide`.
+/// The limit points of the control mesh by the masks of the room `schemes`.
 fn limits(scheme: Scheme, mesh: &Mesh) -> Vec<DVec3> {
     let topology = topology(mesh);
     match scheme {

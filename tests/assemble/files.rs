@@ -3,8 +3,9 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use limitlab::assemble::{Csr, Scheme, matrix_market};
+use limitlab::assemble::{Csr, matrix_market};
 use limitlab::output::write_file;
+use limitlab::schemes::Scheme;
 use sprs::io::read_matrix_market;
 
 use crate::common::matrix_market::read_array;

@@ -2,11 +2,12 @@
 //! system satisfies.
 
 use glam::DVec3;
-use limitlab::assemble::{Csr, LimitSystem, Scheme};
+use limitlab::assemble::{Csr, LimitSystem};
 use limitlab::mesh::generate::{permute_vertices, random_polygons, random_triangulation};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Mesh, builtin};
+use limitlab::schemes::Scheme;
 use nalgebra_sparse::CsrMatrix;
 use rayon::prelude::*;
 

@@ -9,8 +9,9 @@ use limitlab::Error;
 use limitlab::assemble::matrix_market::{
     read_matrix, read_points, read_system, read_vector, write_general, write_points, write_symmetric, write_vector,
 };
-use limitlab::assemble::{Csr, LimitSystem, Scheme};
+use limitlab::assemble::{Csr, LimitSystem};
 use limitlab::output::write_file;
+use limitlab::schemes::Scheme;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

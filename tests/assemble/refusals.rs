@@ -1,8 +1,9 @@
 //! Meshes that a scheme refuses, and open ones under the papers' treatment of the boundary.
 
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Faces, Mesh};
+use limitlab::schemes::Scheme;
 
 use crate::common::formulas::assemble;
 use crate::common::meshes::*;

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use limitlab::analysis::dense;
-use limitlab::assemble::Scheme;
 use limitlab::mesh::Mesh;
+use limitlab::schemes::Scheme;
 use rayon::prelude::*;
 
 use crate::common::formulas::assemble;
@@ -64,7 +64,7 @@ fn the_usual_lambda_min_is_usual() {
             true => ["tri-torus:12x12", "irregular-tri:500"],
             false => ["torus:12x12", "irregular-quad:500"],
         };
-        let usual = limitlab::assemble::bounds::usual_lambda_min(scheme);
+        let usual = scheme.usual_lambda_min();
         for name in names {
             let least = dense::eigenvalues(&system(&built_in(name), scheme)).unwrap().a[0];
             assert!((0.7 * least..least + 1e-12).contains(&usual), "{scheme} on {name}: {usual} for {least}");

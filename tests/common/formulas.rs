@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use limitlab::assemble::Scheme;
 use limitlab::mesh::Mesh;
+use limitlab::schemes::Scheme;
 use nalgebra::DMatrix;
 use nalgebra_sparse::convert::serial::convert_csr_dense;
 use nalgebra_sparse::{CooMatrix, CsrMatrix};

@@ -1,12 +1,13 @@
 //! Random meshes that are small enough for dense matrices, random points, special shapes.
 
 use glam::DVec3;
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::mesh::generate::{
     connected_sum, dual, flip_edges, merge_faces, permute_vertices, quad_split, ring_sphere, shuffle_faces, union,
 };
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Faces, Mesh, Topology, builtin};
+use limitlab::schemes::Scheme;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -1,12 +1,13 @@
 //! Fair interpolation: constraints, minimality, affine maps, singular meshes, errors per iteration.
 
 use glam::DVec3;
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::halstead::{Fairness, LEVELS, Weights, fit, follow};
 use limitlab::interpolate::zheng_cai::Constraints;
 use limitlab::mesh::{Mesh, Topology, builtin};
+use limitlab::schemes::Scheme;
+use limitlab::schemes::{Refinement, catmull_clark};
 use limitlab::solvers::{Outcome, Setup, Stop, run};
-use limitlab::subdivide::{Refinement, catmull_clark};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -6,7 +6,7 @@ use glam::DVec3;
 use limitlab::interpolate::lin_luo::curve::Ends;
 use limitlab::interpolate::lin_luo::{curve, surface};
 use limitlab::mesh::{Mesh, builtin};
-use limitlab::subdivide::{Refinement, sqrt3};
+use limitlab::schemes::{Refinement, sqrt3};
 
 use crate::common::pipelines::{ROUNDING, distance, noisy, topology};
 

@@ -7,7 +7,7 @@ use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix, condition_over
 use limitlab::interpolate::lin_luo::limit::limits;
 use limitlab::interpolate::lin_luo::surface::refine_n;
 use limitlab::mesh::Mesh;
-use limitlab::subdivide::sqrt3;
+use limitlab::schemes::sqrt3;
 
 use crate::common::pipelines::{ROUNDING, distance, noisy, topology};
 

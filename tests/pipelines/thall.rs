@@ -4,13 +4,14 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use glam::{DQuat, DVec3};
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::normals::{Rotation, rotate_rings};
 use limitlab::interpolate::thall::*;
 use limitlab::mesh::{Faces, Mesh, Topology, builtin};
+use limitlab::schemes::Scheme;
+use limitlab::schemes::{Refinement, catmull_clark};
 use limitlab::solvers::iteration::Iterate;
 use limitlab::solvers::{Outcome, Setup, Stop, run, run_watched, solve};
-use limitlab::subdivide::{Refinement, catmull_clark};
 
 use crate::common::pipelines::{ROUNDING, centroid, distance, noisy, topology};
 

@@ -3,13 +3,14 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::nasri;
 use limitlab::interpolate::subset::Restriction;
 use limitlab::interpolate::zheng_cai::*;
 use limitlab::mesh::{Mesh, builtin, io};
+use limitlab::schemes::Scheme;
+use limitlab::schemes::doo_sabin::{self, Rule};
 use limitlab::solvers::{Outcome, Setup, Stop, run, run_watched};
-use limitlab::subdivide::doo_sabin::{self, Rule};
 
 use crate::common::pipelines::{ROUNDING, centroid, distance, noisy, topology};
 

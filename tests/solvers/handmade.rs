@@ -3,8 +3,9 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::mesh::Mesh;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::chebyshev::promised_iterations;
 use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use limitlab::solvers::{Errors, Iterate, Outcome, Report, Setup, Stop, run_watched};

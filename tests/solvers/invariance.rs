@@ -1,9 +1,9 @@
 //! What must not change a run: affine maps of the data, vertex numbers (for simultaneous updates), the number of threads.
 
 use glam::{DMat3, DVec3};
-use limitlab::assemble::Scheme;
 use limitlab::mesh::generate::permute_vertices;
 use limitlab::mesh::order::Order;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::{Setup, Solution, Stop};
 
 use super::setups::*;

@@ -1,9 +1,10 @@
 //! How runs end that cannot end well: breakdowns, numbers that are not finite, tolerances below rounding, small limits.
 
 use glam::DVec3;
-use limitlab::assemble::{LimitSystem, Masks, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::Mesh;
+use limitlab::schemes::{Masks, Scheme};
 use limitlab::solvers::{Outcome, Setup, Stop, run};
 
 use super::setups::*;

@@ -3,8 +3,8 @@
 use limitlab::analysis::predict::predicted_rate;
 use limitlab::analysis::promise::Promise;
 use limitlab::analysis::{Extremes, Spectrum};
-use limitlab::assemble::Scheme;
 use limitlab::mesh::order::Order;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::Setup;
 use nalgebra::{Complex, DMatrix};
 

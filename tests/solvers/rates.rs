@@ -4,8 +4,8 @@ use limitlab::analysis::rate::observed_rate;
 use limitlab::analysis::spectrum::{Operator, excited};
 use limitlab::analysis::sweep::{Row, Sweep, rounding_floor, sweep};
 use limitlab::analysis::{Extremes, Spectrum};
-use limitlab::assemble::Scheme;
 use limitlab::mesh::Mesh;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::{Errors, Method, Outcome, Setup, Solution, Stop};
 use std::f64::consts::TAU;
 

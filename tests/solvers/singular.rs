@@ -1,9 +1,9 @@
 //! Singular and nearly singular systems: 3-valent bipartite meshes under Catmull-Clark.
 
 use glam::DVec3;
-use limitlab::assemble::Scheme;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::{Mesh, io};
+use limitlab::schemes::Scheme;
 use limitlab::solvers::{Outcome, Setup, Stop};
 
 use super::setups::*;

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use limitlab::analysis::dense::gaussian_elimination;
-use limitlab::assemble::Scheme;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::{Outcome, Setup, Stop};
 use nalgebra::DMatrix;
 

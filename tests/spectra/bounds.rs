@@ -8,9 +8,10 @@ use limitlab::analysis::promise::Promise;
 use limitlab::analysis::singularity::Singularity;
 use limitlab::analysis::spectrum::{Operator, Source, ends, mesh_ends};
 use limitlab::analysis::{comparison, dense};
-use limitlab::assemble::{Operator as MatrixFree, Scheme};
+use limitlab::assemble::Operator as MatrixFree;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::{Mesh, Topology, builtin};
+use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, Outcome, Setup, Stop, run};
 
 #[test]

@@ -5,8 +5,8 @@ use limitlab::analysis::certificate::{certify, eigenvalues_below};
 use limitlab::analysis::dense;
 use limitlab::analysis::eigen::End;
 use limitlab::analysis::spectrum::{Operator, ends};
-use limitlab::assemble::Scheme;
 use limitlab::mesh::builtin;
+use limitlab::schemes::Scheme;
 
 #[test]
 fn counts_by_inertia_are_those_of_dense_eigenvalues() {

@@ -7,8 +7,8 @@ use limitlab::analysis::eigen::{End, Request, extreme};
 use limitlab::analysis::singularity::modes;
 use limitlab::analysis::spectrum::{Operator, ends, mesh_ends, symmetric};
 use limitlab::analysis::valence_study::{regular_band, valence_study};
-use limitlab::assemble::Scheme;
 use limitlab::mesh::{Faces, Mesh, Topology, builtin, generate};
+use limitlab::schemes::Scheme;
 
 #[test]
 fn dense_spectra_are_the_symbols_of_the_torus() {

@@ -7,8 +7,9 @@ mod ends;
 mod singular;
 mod sweeps;
 
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::mesh::{Mesh, Topology, builtin, generate};
+use limitlab::schemes::Scheme;
 use std::f64::consts::TAU;
 
 fn assemble(mesh: &Mesh, scheme: Scheme) -> LimitSystem {

@@ -4,9 +4,10 @@ use super::{assemble, named};
 use glam::DVec3;
 use limitlab::analysis::singularity::{Prediction, Singularity, numerical_kernel_dimension};
 use limitlab::analysis::{comparison, dense};
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::{Faces, Mesh, Topology, generate};
+use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, Outcome, Setup, Stop, run};
 
 #[test]

@@ -10,7 +10,7 @@ use glam::DVec3;
 use serde_json::{Value, json};
 
 use super::{CommonFlags, StopFlags};
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::error::{Error, Result, short};
 use limitlab::interpolate::automatic::{Renumbered, renumbered, require_memory};
 use limitlab::mesh::frame::Frame;
@@ -18,6 +18,7 @@ use limitlab::mesh::io::{self, Loaded, has_mesh_ending};
 use limitlab::mesh::noise::{Noise, add_noise};
 use limitlab::mesh::validate::{Boundary, Validation, validate};
 use limitlab::mesh::{Mesh, Topology, bounding_box, builtin};
+use limitlab::schemes::Scheme;
 use limitlab::solvers::Stop;
 
 /// How a mesh is read and prepared.

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use glam::DVec3;
-use limitlab::assemble::Scheme;
 use limitlab::mesh::curve::is_scattered;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, Topology, io};
+use limitlab::schemes::Scheme;
 use limitlab::solvers::Method;
 use nalgebra_sparse::CsrMatrix;
 use sprs::io::read_matrix_market;

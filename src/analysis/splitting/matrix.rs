@@ -29,7 +29,7 @@ impl SplittingMatrix {
         Self::on_rings(scheme, valence, scheme.least_rings())
     }
 
-    /// The matrix on `rings` rings, N rows: the refinement function of [`subdivide`](crate::subdivide) is applied to
+    /// The matrix on `rings` rings, N rows: the refinement function of [`schemes`](crate::schemes) is applied to
     /// unit vectors, three at a time as coordinates. ⌈N/3⌉ refinements, O(N²) time and memory.
     ///
     /// The star is closed far away by a vertex at NaN. What comes out as NaN depends on it, and so the matrix

@@ -8,8 +8,8 @@ use nalgebra::Complex;
 use super::star::Layout;
 use crate::error::{Error, Result};
 use crate::mesh::{Mesh, Topology};
-use crate::subdivide::unified_sqrt3::{self, ALPHA_RANGE};
-use crate::subdivide::{catmull_clark, doo_sabin, labsik_greiner, loop_scheme, sqrt3};
+use crate::schemes::unified_sqrt3::{self, ALPHA_RANGE};
+use crate::schemes::{catmull_clark, doo_sabin, labsik_greiner, loop_scheme, sqrt3};
 
 /// Valences of local matrices. Below 3 a star is degenerate; the matrices are dense, and the largest (three rings
 /// of quads) has 12n+1 rows.

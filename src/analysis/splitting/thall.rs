@@ -13,7 +13,7 @@ use super::matrix::SplittingMatrix;
 use super::scheme::LocalScheme;
 use super::spectrum::distance_to_space;
 use crate::error::{Error, Result};
-use crate::subdivide::catmull_clark::tangent_constant;
+use crate::schemes::catmull_clark::tangent_constant;
 
 /// A printed number and the computed one.
 #[derive(Clone, Debug, PartialEq)]

@@ -89,7 +89,8 @@ pub fn read_points(path: &Path) -> Result<Vec<DVec3>> {
 ///
 /// ```
 /// use limitlab::assemble::matrix_market::{read_system, write_points, write_symmetric, write_vector};
-/// use limitlab::assemble::{LimitSystem, Scheme};
+/// use limitlab::assemble::LimitSystem;
+/// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Topology, builtin};
 /// use limitlab::output::write_file;
 ///

@@ -19,7 +19,7 @@ use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
-use crate::subdivide::Refinement;
+use crate::schemes::Refinement;
 
 /// How much of each energy the fairness holds.
 #[derive(Clone, Copy, Debug, PartialEq)]

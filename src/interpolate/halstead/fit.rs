@@ -13,10 +13,10 @@ use crate::interpolate::zheng_cai::Constraints;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::parallel;
+use crate::schemes::catmull_clark::{limit_mask, tangent_constant};
 use crate::solvers::Errors;
 use crate::solvers::direct::{Cholesky, Factorization, Kind};
 use crate::solvers::system::Rows;
-use crate::subdivide::catmull_clark::{limit_mask, tangent_constant};
 use crate::{Error, Result};
 
 /// The fairest control mesh.

@@ -9,8 +9,8 @@ use super::energy::{Energies, Fairness};
 use crate::assemble::LimitSystem;
 use crate::interpolate::thall::normal_deviations;
 use crate::mesh::{Mesh, Topology};
+use crate::schemes::catmull_clark;
 use crate::solvers::{Errors, Setup, Solution, Stop, run_watched};
-use crate::subdivide::catmull_clark;
 use crate::{Error, Result};
 
 /// One iterate.

@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::Result;
 use crate::interpolate::thall::angle;
 use crate::mesh::{Mesh, Topology};
-use crate::subdivide::{Refinement, unified_sqrt3};
+use crate::schemes::{Refinement, unified_sqrt3};
 
 /// α = 1, interpolated, at the vertices marked, and `elsewhere` at the others.
 pub fn choose(interpolated: &[bool], elsewhere: f64) -> Vec<f64> {

@@ -130,8 +130,9 @@ fn failed(method: &str, outcome: Outcome, why: impl std::fmt::Display) -> Failur
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assemble::{LimitSystem, Scheme};
+    use crate::assemble::LimitSystem;
     use crate::mesh::{Topology, builtin};
+    use crate::schemes::Scheme;
 
     /// The factors of λ times the identity.
     struct Multiple(f64);

@@ -9,10 +9,10 @@ use std::sync::LazyLock;
 
 use arbitrary::{Result, Unstructured};
 use glam::DVec3;
-use limitlab::assemble::Scheme;
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Mesh, Topology};
+use limitlab::schemes::Scheme;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::formats::writes_and_reads_back;

@@ -1,7 +1,7 @@
 //! Refinement: closed manifolds stay closed manifolds of the same genus.
 
 use limitlab::mesh::{Mesh, Topology};
-use limitlab::subdivide::Refinement;
+use limitlab::schemes::Refinement;
 
 use super::super::surface::Surface;
 use super::{Case, on_any_threads, suitable, systems};

@@ -1,7 +1,7 @@
 //! Matrices and solutions of one scheme on one mesh, against dense matrices from the formulas.
 
 use glam::DVec3;
-use limitlab::assemble::{LimitSystem, Operator, Scheme};
+use limitlab::assemble::{LimitSystem, Operator};
 use limitlab::interpolate::automatic::{Automatic, control_points};
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::curve::along_curve;
@@ -9,6 +9,7 @@ use limitlab::mesh::fronts::{in_fronts, in_kinds};
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::order::{Numbering, Order};
 use limitlab::mesh::{Mesh, Topology};
+use limitlab::schemes::Scheme;
 use limitlab::solvers::direct::SINGULAR;
 use limitlab::solvers::{Outcome, Setup, Solution, Stop, run};
 use nalgebra::{DMatrix, DVector};

@@ -13,14 +13,13 @@ use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser};
 
 use limitlab::Result;
-use limitlab::assemble::Scheme;
 use limitlab::error::Error;
-use limitlab::interpolate::surface::refinement;
 use limitlab::mesh::io;
 use limitlab::mesh::order::Order;
 use limitlab::output::{allow_replacing, check_target};
+use limitlab::schemes::Refinement;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::Method;
-use limitlab::subdivide::Refinement;
 use limitlab_experiments::cli::{self, CommonFlags, MeshFlags, StopFlags};
 
 use control::control_mesh;
@@ -216,7 +215,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let input = arguments.mesh.input(&arguments.input, &arguments.common)?;
     let refinement = match arguments.method {
         Choice::Keeping(scheme) => scheme,
-        _ => refinement(input.scheme),
+        _ => input.scheme.refinement(),
     };
     refinement.check_size(&input.mesh, arguments.shape.subdivide.into()).map_err(|e| input.named(e))?;
     let wishes = Wishes::read(&arguments.shape, &input)?;

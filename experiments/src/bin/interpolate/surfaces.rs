@@ -10,8 +10,8 @@ use limitlab::interpolate::normals::Rotation;
 use limitlab::interpolate::surface::{Request, Surface, surface};
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::{Mesh, Topology};
+use limitlab::schemes::Refinement;
 use limitlab::solvers::Errors;
-use limitlab::subdivide::Refinement;
 use limitlab_experiments::cli::Input;
 
 use super::Arguments;

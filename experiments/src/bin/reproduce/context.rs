@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use limitlab::Result;
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::error::Error;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Mesh, Topology, builtin, io};
 use limitlab::output::create_dir;
+use limitlab::schemes::Scheme;
 use limitlab_experiments::cli::{self, Printer, STAND_IN_NOISE};
 use limitlab_experiments::report::index::{self, Entry};
 use limitlab_experiments::report::{Animation, Figure, Table, compare};

@@ -4,13 +4,14 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::analysis::lines::{Preconditioner, Regularity, count};
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Mesh, Topology, builtin};
+use limitlab::schemes::Refinement;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::Stop;
-use limitlab::subdivide::Refinement;
 use limitlab_experiments::cli::STAND_IN_NOISE;
 use limitlab_experiments::report::{Cell, Column, Table};
 

@@ -3,7 +3,7 @@
 use limitlab::Result;
 use limitlab::analysis::comparison::{SOR_OMEGA, SSOR_OMEGA, entries};
 use limitlab::analysis::spectrum::spectrum;
-use limitlab::assemble::Scheme;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, Stop, run as solve};
 use limitlab_experiments::report::{Cell, Column, Figure, LinePlot, Scale, Series, Table};
 

@@ -2,8 +2,8 @@
 
 use limitlab::Result;
 use limitlab::analysis::sweep::{rounding_floor, sweep};
-use limitlab::assemble::Scheme;
 use limitlab::mesh::validate::Boundary;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, Stop};
 use limitlab_experiments::report::{Column, Table};
 use limitlab_experiments::studies::sweep as study;

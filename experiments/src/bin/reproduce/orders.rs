@@ -2,8 +2,8 @@
 
 use limitlab::Result;
 use limitlab::analysis::order_study::{Row, order_study, random_spread};
-use limitlab::assemble::Scheme;
 use limitlab::mesh::validate::Boundary;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::Stop;
 use limitlab_experiments::report::{Column, Table};
 

@@ -5,9 +5,10 @@
 //! the Mushroom's face point is the corner two steps back.
 
 use limitlab::Result;
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::pia::{TwoStepsBack, passes};
 use limitlab::mesh::validate::Boundary;
+use limitlab::schemes::Scheme;
 use limitlab_experiments::report::{Column, Table};
 
 use crate::context::{Context, Item, Subject};

@@ -1,13 +1,13 @@
 //! How much interpolating surfaces ripple, iteration by iteration, against the fairest one (Halstead, Kass & DeRose).
 
 use limitlab::Result;
-use limitlab::assemble::Scheme;
 use limitlab::interpolate::halstead::{Fairness, Weights, fit, follow};
 use limitlab::interpolate::zheng_cai::Constraints;
 use limitlab::mesh::Topology;
 use limitlab::mesh::validate::Boundary;
+use limitlab::schemes::Scheme;
+use limitlab::schemes::catmull_clark::limit_normals;
 use limitlab::solvers::{Setup, Stop};
-use limitlab::subdivide::catmull_clark::limit_normals;
 use limitlab_experiments::report::{Column, Figure, LinePlot, Scale, Series, Table};
 
 use crate::context::{Context, Item};

@@ -1,9 +1,9 @@
 //! The pattern of A in several vertex orders.
 
 use limitlab::Result;
-use limitlab::assemble::Scheme;
 use limitlab::mesh::order::{Order, inverse};
 use limitlab::mesh::validate::Boundary;
+use limitlab::schemes::Scheme;
 use limitlab_experiments::report::{Column, Figure, SparsityPlot, Table};
 
 use crate::context::{Context, Item};

@@ -2,7 +2,7 @@
 
 use limitlab::Result;
 use limitlab::analysis::spectrum::spectrum;
-use limitlab::assemble::Scheme;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::jacobi::THALL_OMEGA;
 use limitlab::solvers::{Setup, Stop, run as solve};
 use limitlab_experiments::report::{Column, Figure, LinePlot, Scale, Series, Table};

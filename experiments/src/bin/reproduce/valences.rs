@@ -2,7 +2,7 @@
 
 use limitlab::Result;
 use limitlab::analysis::valence_study::{Row, regular_band, valence_study};
-use limitlab::assemble::Scheme;
+use limitlab::schemes::Scheme;
 use limitlab_experiments::report::series::Bars;
 use limitlab_experiments::report::{Column, Figure, LinePlot, Rule, Table};
 

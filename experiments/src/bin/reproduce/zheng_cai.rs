@@ -11,8 +11,9 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::analysis::dense::gaussian_elimination;
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::mesh::validate::Boundary;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::gauss_seidel::sweep;
 use limitlab::solvers::{Setup, Stop, run as solve, run_watched};
 use limitlab_experiments::report::{Column, Table};

@@ -3,9 +3,9 @@
 //! update. No fusion, no single precision, no order. It belongs to the measurements, not to the library.
 
 use glam::DVec3;
-use limitlab::assemble::Scheme;
-use limitlab::assemble::scheme::Masks;
 use limitlab::mesh::{Incidence, Mesh};
+use limitlab::schemes::Masks;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::chebyshev::Recurrence;
 use rayon::prelude::*;
 

@@ -17,7 +17,7 @@ use glam::DVec3;
 use serde_json::json;
 
 use limitlab::analysis::spectrum::spectrum;
-use limitlab::assemble::{LimitSystem, Operator, Scheme};
+use limitlab::assemble::{LimitSystem, Operator};
 use limitlab::error::{Error, Result};
 use limitlab::interpolate::automatic::{control_points, renumbered};
 use limitlab::mesh::colours::in_colours;
@@ -27,6 +27,7 @@ use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::order::{Numbering, Order};
 use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Faces, Incidence, Mesh, Topology, builtin::builtin, io};
+use limitlab::schemes::Scheme;
 use limitlab::solvers::chebyshev::Chebyshev;
 use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use limitlab::solvers::gauss_seidel::{by_colours, in_waves};

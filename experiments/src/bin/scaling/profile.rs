@@ -4,10 +4,11 @@ use std::time::Instant;
 
 use glam::{DVec3, Vec3A};
 use limitlab::Result;
-use limitlab::assemble::{LimitSystem, Operator, Scheme};
+use limitlab::assemble::{LimitSystem, Operator};
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::{Mesh, Topology};
+use limitlab::schemes::Scheme;
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
 use limitlab::solvers::coloured::Coloured;
 use limitlab::solvers::iteration::Iterate;

@@ -4,13 +4,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use limitlab::Result;
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::error::Error;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Mesh, Topology, io};
-use limitlab::subdivide::{Refinement, sqrt3, unified_sqrt3};
+use limitlab::schemes::Scheme;
+use limitlab::schemes::{Refinement, sqrt3, unified_sqrt3};
 use limitlab_experiments::cli::Printer;
 use limitlab_experiments::report::{Cell, Column, Table};
 
@@ -91,8 +92,7 @@ impl Rows<'_> {
             }
         }
         for scheme in Refinement::ALL {
-            let of_any = matches!(scheme, Refinement::CatmullClark | Refinement::DooSabin);
-            if of_any != triangles {
+            if scheme.needs_triangles() == triangles {
                 self.refinement(scheme.name(), |mesh, topology| {
                     let fine = scheme.refine(mesh, topology)?;
                     let topology = scheme.refined_topology(mesh, topology, &fine);

@@ -3,11 +3,12 @@
 use std::time::Instant;
 
 use limitlab::Result;
-use limitlab::assemble::{Operator, Scheme};
+use limitlab::assemble::Operator;
 use limitlab::error::Error;
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::{Mesh, Topology};
+use limitlab::schemes::Scheme;
 use limitlab::solvers::Method;
 use limitlab::solvers::coloured::Coloured;
 use limitlab::solvers::system::Rows;

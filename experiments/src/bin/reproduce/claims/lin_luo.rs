@@ -11,7 +11,7 @@ use limitlab::analysis::splitting::{
 use limitlab::interpolate::lin_luo::curve::{self, Ends, fixed_point_radius, jump_norm, jumps};
 use limitlab::interpolate::lin_luo::surface::{choose, largest_fold, popping, refine_n, volume};
 use limitlab::mesh::{Mesh, Topology};
-use limitlab::subdivide::{Refinement, labsik_greiner, sqrt3, unified_sqrt3};
+use limitlab::schemes::{Refinement, labsik_greiner, sqrt3, unified_sqrt3};
 
 use super::Claim;
 use super::finding::{Evidence, Finding};

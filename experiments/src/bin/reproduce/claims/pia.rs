@@ -6,12 +6,13 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::analysis::splitting::LocalScheme;
-use limitlab::assemble::scheme::loop_beta;
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::pia::{TwoStepsBack, passes};
 use limitlab::mesh::validate::Boundary;
+use limitlab::schemes::Refinement;
+use limitlab::schemes::Scheme;
+use limitlab::schemes::loop_scheme::loop_beta;
 use limitlab::solvers::{Outcome, Setup, Stop, run_watched};
-use limitlab::subdivide::Refinement;
 
 use super::finding::{Evidence, Finding};
 use super::lab::{

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use limitlab::Result;
 use limitlab::analysis::singularity::Singularity;
-use limitlab::assemble::Scheme;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::{Outcome, Setup};
 
 use super::finding::{Evidence, Finding};

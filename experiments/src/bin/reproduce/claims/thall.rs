@@ -8,11 +8,11 @@ use glam::DVec3;
 use limitlab::Result;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
-use limitlab::assemble::Scheme;
 use limitlab::interpolate::thall::{Inverse, LocalIteration};
 use limitlab::mesh::{Mesh, Topology};
+use limitlab::schemes::Scheme;
+use limitlab::schemes::{Refinement, catmull_clark};
 use limitlab::solvers::{Outcome, Setup, Stop, solve};
-use limitlab::subdivide::{Refinement, catmull_clark};
 
 use super::finding::{Evidence, Finding};
 use super::lab::{

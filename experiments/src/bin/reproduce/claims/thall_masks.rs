@@ -7,10 +7,10 @@ use limitlab::Result;
 use limitlab::analysis::splitting::spectrum::distance_to_space;
 use limitlab::analysis::splitting::thall::{Entry, ThallTables, formula_mask};
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix, thall_tables};
-use limitlab::assemble::Scheme;
 use limitlab::mesh::Topology;
+use limitlab::schemes::Scheme;
+use limitlab::schemes::catmull_clark::{refine, refine_in_place};
 use limitlab::solvers::{Outcome, Setup};
-use limitlab::subdivide::catmull_clark::{refine, refine_in_place};
 
 use super::Claim;
 use super::finding::{Evidence, Finding};
@@ -398,7 +398,7 @@ fn not_sor(lab: &Lab) -> Result<Finding> {
     let by_sor = &iterates(&system, points, sor, 1)[0];
     let jacobi = &iterates(&system, points, Setup::THALL, 1)[0];
     // Eq. 3 at every vertex by the limit mask alone, all neighbours old.
-    let limits = limitlab::subdivide::catmull_clark::limit_positions(
+    let limits = limitlab::schemes::catmull_clark::limit_positions(
         &subject.mesh,
         &Topology::new(&subject.mesh.faces, subject.mesh.len()),
     )?;

@@ -3,14 +3,15 @@
 use glam::{DQuat, DVec3};
 
 use limitlab::Result;
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::normals::{Rotation, rotate_rings};
 use limitlab::interpolate::thall::{
     AttributeRule, MedialAtom, medial_shifts, normal_deviations, refine_attributes, scaled_distances,
 };
 use limitlab::mesh::{Mesh, Topology};
+use limitlab::schemes::Scheme;
+use limitlab::schemes::{Refinement, catmull_clark};
 use limitlab::solvers::{Setup, Stop, run};
-use limitlab::subdivide::{Refinement, catmull_clark};
 
 use super::finding::{Evidence, Finding};
 use super::lab::{Lab, distance, each, exact, largest, median, random_points};

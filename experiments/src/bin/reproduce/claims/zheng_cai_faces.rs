@@ -6,7 +6,7 @@ use limitlab::Result;
 use limitlab::interpolate::thall::normal_deviations;
 use limitlab::interpolate::zheng_cai::{Auxiliary, Constraints, FirstRefinement, PhaseOne, auxiliary};
 use limitlab::mesh::{Mesh, Topology};
-use limitlab::subdivide::doo_sabin::{Rule, face_normals, refine_by};
+use limitlab::schemes::doo_sabin::{Rule, face_normals, refine_by};
 
 use super::finding::{Evidence, Finding};
 use super::lab::{Lab, each, largest, median, random_points};

@@ -4,11 +4,11 @@ use std::time::Instant;
 
 use limitlab::Result;
 use limitlab::analysis::dense::gaussian_elimination;
-use limitlab::assemble::Scheme;
 use limitlab::interpolate::zheng_cai::{Constraints, FirstRefinement, PhaseOne, Sweep, auxiliary};
 use limitlab::mesh::validate::Boundary;
+use limitlab::schemes::Scheme;
+use limitlab::schemes::doo_sabin::Rule;
 use limitlab::solvers::{Setup, Stop, run};
-use limitlab::subdivide::doo_sabin::Rule;
 
 use super::finding::{Evidence, Finding, Value};
 use super::lab::{Lab, each, entries_per_vertex, exact, history, largest, median, smallest};

@@ -9,7 +9,7 @@ use limitlab::analysis::splitting::Layout;
 use limitlab::error::Error;
 use limitlab::interpolate::lin_luo::curve::{Ends, refine, refine_n};
 use limitlab::mesh::{Faces, Mesh, Topology};
-use limitlab::subdivide::unified_sqrt3;
+use limitlab::schemes::unified_sqrt3;
 use limitlab_experiments::report::{Colour, Dash, Figure, LinePlot, Marker, Series, palette};
 
 use super::{Album, Line, plain};

@@ -7,9 +7,9 @@ use limitlab::Result;
 use limitlab::interpolate::nasri;
 use limitlab::interpolate::zheng_cai::{Constraints, PhaseOne, TwoPhase, interpolate};
 use limitlab::mesh::{Mesh, builtin};
+use limitlab::schemes::Refinement;
+use limitlab::schemes::doo_sabin::{Rule, refine_by};
 use limitlab::solvers::{Setup, Stop};
-use limitlab::subdivide::Refinement;
-use limitlab::subdivide::doo_sabin::{Rule, refine_by};
 use limitlab_experiments::report::{Colour, Paint, Picture, Points, Surface, Vectors, View};
 
 use super::{Album, CONTROL, FACES, GIVEN, Line, POINT, cage, plain, sheet, view};

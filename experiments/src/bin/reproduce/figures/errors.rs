@@ -4,9 +4,10 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::analysis::spectrum::spectrum;
-use limitlab::assemble::{LimitSystem, Scheme};
+use limitlab::assemble::LimitSystem;
 use limitlab::error::Error;
 use limitlab::mesh::builtin;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::{Setup, System};
 use limitlab_experiments::report::{ColourScale, Picture, Surface};
 

@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 use limitlab::Result;
-use limitlab::assemble::Scheme;
+use limitlab::schemes::Refinement;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::Setup;
-use limitlab::subdivide::Refinement;
 use limitlab_experiments::report::{Figure, Picture, Points};
 
 use super::{Album, GIVEN, Line, POINT, cage, control, limit_surface, sheet, view};
@@ -98,20 +98,13 @@ const PRINTED: [Printed; 5] = [
     },
 ];
 
-fn refinement(scheme: Scheme) -> Refinement {
-    match scheme {
-        Scheme::Loop => Refinement::Loop,
-        _ => Refinement::CatmullClark,
-    }
-}
-
 /// The mesh beside its interpolating surface.
 pub fn pia(album: &mut Album) -> Result<()> {
     for printed in &PRINTED {
         let subject = album.subject(printed.file, printed.otherwise)?;
         let system = subject.system(printed.scheme)?;
         let (cage_mesh, error) = control(&subject, &system, Setup::Pia { omega: 1.0 }, printed.updates);
-        let surface = limit_surface(refinement(printed.scheme), &cage_mesh)?;
+        let surface = limit_surface(printed.scheme.refinement(), &cage_mesh)?;
         let view = view(printed.up, printed.azimuth, printed.elevation);
         let height = |p: &DVec3| p.dot(printed.up);
         let heights = || subject.mesh.positions.iter().map(height);

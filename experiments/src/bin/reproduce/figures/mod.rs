@@ -14,8 +14,8 @@ use limitlab::Result;
 use limitlab::assemble::LimitSystem;
 use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Mesh, Topology};
+use limitlab::schemes::Refinement;
 use limitlab::solvers::{Setup, Stop, run as solve};
-use limitlab::subdivide::{Refinement, catmull_clark, loop_scheme};
 use limitlab_experiments::report::{Colour, Column, Figure, Picture, Surface, Table, View};
 
 use crate::context::{Context, Item, Subject};
@@ -173,12 +173,8 @@ fn limit_surface(scheme: Refinement, control: &Mesh) -> Result<Surface> {
     }
     let refined = scheme.refine_n(control, levels)?;
     let topology = Topology::new(&refined.faces, refined.len());
-    let (points, normals) = match scheme {
-        Refinement::Loop => {
-            (loop_scheme::limit_positions(&refined, &topology)?, loop_scheme::limit_normals(&refined, &topology)?)
-        }
-        _ => (catmull_clark::limit_positions(&refined, &topology)?, catmull_clark::limit_normals(&refined, &topology)?),
-    };
+    let points = scheme.limit_positions(&refined, &topology)?;
+    let normals = scheme.limit_normals(&refined, &topology)?;
     Ok(Surface::with_normals(Mesh::new(points, refined.faces), normals))
 }
 

@@ -3,12 +3,12 @@
 use glam::DVec3;
 
 use limitlab::Result;
-use limitlab::assemble::Scheme;
 use limitlab::interpolate::normals::{Rotation, rotate_rings};
 use limitlab::interpolate::thall::normal_deviations;
 use limitlab::mesh::{Faces, Mesh, Topology, builtin};
+use limitlab::schemes::Scheme;
+use limitlab::schemes::{Refinement, catmull_clark};
 use limitlab::solvers::Setup;
-use limitlab::subdivide::{Refinement, catmull_clark};
 use limitlab_experiments::report::{Colour, Finish, Picture, Points, Vectors, View};
 
 use super::{Album, Line, POINT, control, limit_surface, plain, sheet, view};

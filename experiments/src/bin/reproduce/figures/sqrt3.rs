@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::mesh::{Mesh, Topology};
-use limitlab::subdivide::{Refinement, unified_sqrt3};
+use limitlab::schemes::{Refinement, unified_sqrt3};
 use limitlab_experiments::report::{Finish, Picture, Points, Surface};
 
 use super::{Album, FACES, GIVEN, Line, POINT, cage, sheet, view};

@@ -3,7 +3,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::star::{Tangents, next_in_triangle, twin};
+use super::star::{Tangents, next_in_triangle, require_triangles, twin};
+use crate::Result;
 use crate::mesh::{Mesh, Topology};
 
 pub(super) const SQRT_3: f64 = 1.732_050_807_568_877_2;
@@ -15,6 +16,12 @@ pub(super) const SQRT_3: f64 = 1.732_050_807_568_877_2;
 /// lattice. With those of polynomials that the scheme reproduces it is exact.
 pub(super) struct RegularMask {
     pub weights: &'static [(usize, usize, [f64; 2])],
+}
+
+/// The limit points of all vertices: the vertices themselves.
+pub(super) fn vertices(name: &str, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+    require_triangles(mesh, topology, name)?;
+    Ok(mesh.positions.clone())
 }
 
 /// The tangents at the vertices 0 to `originals` − 1 of a closed triangle mesh, in which they are the only vertices

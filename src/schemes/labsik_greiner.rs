@@ -14,7 +14,8 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::interpolatory::{RegularMask, SQRT_3, tangents};
+use super::interpolatory::{RegularMask, SQRT_3, tangents, vertices};
+use super::refinement::{Counts, Kind, Step};
 use super::ring::{Place, Rings, Rule};
 use super::sqrt3::{flip, refined_topology};
 use super::star::{Tangents, prev_in_triangle, require_room, require_triangles, twin};
@@ -22,6 +23,9 @@ use crate::Result;
 use crate::mesh::{Mesh, Topology};
 use crate::pages::large;
 use crate::parallel;
+
+/// On the command line and in messages.
+const NAME: &str = "labsik-greiner";
 
 /// The regular mask: the corners of the triangle, the vertices opposite to its sides, the six next to those.
 pub const REGULAR: [f64; 3] = [32.0 / 81.0, -1.0 / 81.0, -2.0 / 81.0];
@@ -60,7 +64,7 @@ fn amplitudes(n: usize) -> [f64; 3] {
 /// If `n` < 3, where the scheme has no rule.
 ///
 /// ```
-/// use limitlab::subdivide::labsik_greiner::extraordinary_mask;
+/// use limitlab::schemes::labsik_greiner::extraordinary_mask;
 /// let (center, ring) = extraordinary_mask(4);
 /// let expected = [2.0 / 9.0, 2.0 / 9.0, -1.0 / 9.0, -1.0 / 9.0];
 /// assert!((center - 7.0 / 9.0).abs() < 1e-15);
@@ -76,6 +80,18 @@ pub fn extraordinary_mask(n: usize) -> (f64, Vec<f64>) {
     (1.0 - a0, (0..n).map(weight).collect())
 }
 
+/// All that defines the refinement.
+pub(super) const STEP: Step = Step {
+    name: NAME,
+    kind: Kind::Interpolatory,
+    needs_triangles: true,
+    refine,
+    refined_topology,
+    counts: Counts::in_three,
+    limit_positions: |mesh, topology| vertices(NAME, mesh, topology),
+    limit_normals,
+};
+
 /// One step.
 ///
 /// A triangle of three regular vertices takes the 12-point mask, one with extraordinary vertices the mean of those
@@ -88,7 +104,6 @@ pub fn extraordinary_mask(n: usize) -> (f64, Vec<f64>) {
 /// # Panics
 /// If `topology` is not that of `mesh`.
 pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-    const NAME: &str = "labsik-greiner";
     require_triangles(mesh, topology, NAME)?;
     require_room(mesh, 3)?;
     let rule = Rule { name: NAME, place: Place::Triangle, mask: extraordinary_mask, amplitudes };

@@ -6,13 +6,17 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::interpolatory::{RegularMask, SQRT_3, tangents};
+use super::interpolatory::{RegularMask, SQRT_3, tangents, vertices};
 use super::loop_scheme::{refined_topology, split_in_four};
+use super::refinement::{Counts, Kind, Step};
 use super::ring::{Place, Rings, Rule};
 use super::star::{Tangents, next_in_triangle, prev_in_triangle, require_room, require_triangles, twin};
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
 use crate::pages::large;
+
+/// On the command line and in messages.
+const NAME: &str = "butterfly";
 
 /// The weight of the extraordinary vertex itself.
 pub const CENTER: f64 = 0.75;
@@ -57,6 +61,18 @@ pub fn extraordinary_mask(n: usize) -> Vec<f64> {
     (0..n).map(weight).collect()
 }
 
+/// All that defines the refinement.
+pub(super) const STEP: Step = Step {
+    name: NAME,
+    kind: Kind::Interpolatory,
+    needs_triangles: true,
+    refine,
+    refined_topology: |_, topology, refined| refined_topology(topology, refined),
+    counts: Counts::in_four,
+    limit_positions: |mesh, topology| vertices(NAME, mesh, topology),
+    limit_normals,
+};
+
 /// One step.
 ///
 /// An edge of two regular vertices (valence 6) takes the 8-point stencil, one with an extraordinary vertex that
@@ -70,7 +86,6 @@ pub fn extraordinary_mask(n: usize) -> Vec<f64> {
 /// # Panics
 /// If `topology` is not that of `mesh`.
 pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-    const NAME: &str = "butterfly";
     require_triangles(mesh, topology, NAME)?;
     require_room(mesh, 4)?;
     let rule = Rule { name: NAME, place: Place::Edge, mask: |n| (CENTER, extraordinary_mask(n)), amplitudes };

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 use limitlab::mesh::{Mesh, Topology};
-use limitlab::subdivide::doo_sabin::{self, Rule};
-use limitlab::subdivide::{Refinement, catmull_clark, loop_scheme, sqrt3};
+use limitlab::schemes::doo_sabin::{self, Rule};
+use limitlab::schemes::{Refinement, catmull_clark, loop_scheme, sqrt3};
 
 use super::ROUNDING;
 use super::meshes::*;

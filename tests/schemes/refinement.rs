@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use limitlab::mesh::{Faces, Mesh};
-use limitlab::subdivide::{Refinement, catmull_clark, doo_sabin, loop_scheme, sqrt3};
+use limitlab::schemes::{Refinement, catmull_clark, doo_sabin, loop_scheme, sqrt3};
 
 use super::ROUNDING;
 use super::meshes::*;

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 use limitlab::mesh::Mesh;
-use limitlab::subdivide::{Refinement, butterfly, labsik_greiner, sqrt3, unified_sqrt3};
+use limitlab::schemes::{Refinement, butterfly, labsik_greiner, sqrt3, unified_sqrt3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

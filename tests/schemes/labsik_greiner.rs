@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
 use limitlab::mesh::Mesh;
-use limitlab::subdivide::{Refinement, labsik_greiner};
+use limitlab::schemes::{Refinement, labsik_greiner};
 use nalgebra::{DMatrix, DVector};
 
 use super::ROUNDING;

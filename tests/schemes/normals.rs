@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec3};
 use limitlab::mesh::{Mesh, Topology};
-use limitlab::subdivide::doo_sabin::{self, Rule};
-use limitlab::subdivide::{Refinement, Tangents, catmull_clark, loop_scheme, sqrt3};
+use limitlab::schemes::doo_sabin::{self, Rule};
+use limitlab::schemes::{Refinement, Tangents, catmull_clark, loop_scheme, sqrt3};
 
 use super::ROUNDING;
 use super::meshes::*;

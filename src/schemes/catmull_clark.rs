@@ -7,6 +7,8 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::refined::{self, set_rows};
+use super::refinement::{Counts, Kind, Refinement, Step};
+use super::scheme::{Circulant, Definition, PaperNames, SingularSet};
 use super::star::{Circle, Tangents, centroid, for_each_star, require_closed, require_room, sides, twin};
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
@@ -14,6 +16,41 @@ use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::pages::large;
 use crate::parallel;
+
+/// h(n) = 1/(n(n+5)), d(n) = n² − n, w = 2, a face of m corners adds 4/m between all of them.
+///
+/// λ_min(A) ≥ (n−3)/(n+5) at the least valence n, and A is singular exactly on bipartite components of valence 3, from
+/// `xᵀMx = Σ_F (4/|F|)(Σ_{i∈F} x_i)² + 2 Σ_ij (x_i+x_j)² + Σ n(n−3) x_i²`: the edge terms vanish only for x_j = −x_i along
+/// every edge, the last only where n = 3, and the face terms then vanish by themselves, as all faces are even.
+/// λ_min(A) is 0.086 to 0.111 on irregular meshes of 20 000 vertices and on tori.
+pub(super) const DEFINITION: Definition = Definition {
+    name: "catmull-clark",
+    paper_names: PaperNames { system: "C", diagonal: "H", symmetric: "M" },
+    h: |n| 1.0 / (n as f64 * (n as f64 + 5.0)),
+    vertex_weight: |n| n as f64 * n as f64 - n as f64,
+    edge_weight: 2.0,
+    circulant: Some(|m| Circulant { identity: 0.0, constant: 4.0 / m, cosine: 0.0 }),
+    needs_triangles: false,
+    lambda_min_at: |n, _| (n as f64 - 3.0) / (n as f64 + 5.0),
+    usual_lambda_min: 0.085,
+    singular: SingularSet::Bipartite { valence: Some(3) },
+    // ((2 + cos θ)/3)((2 + cos φ)/3).
+    regular_symbol: (1.0 / 9.0, 4.0 / 9.0),
+    refinement: Refinement::CatmullClark,
+    first_rule: None,
+};
+
+/// All that defines the refinement.
+pub(super) const STEP: Step = Step {
+    name: "catmull-clark",
+    kind: Kind::Primal,
+    needs_triangles: false,
+    refine,
+    refined_topology,
+    counts: |c| Counts { vertices: c.vertices + c.edges() + c.faces, faces: c.corners, corners: 4 * c.corners },
+    limit_positions,
+    limit_normals,
+};
 
 /// One step.
 ///

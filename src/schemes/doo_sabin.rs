@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::refined::{self, push_ends, set_by_edge, set_rows};
+use super::refinement::{Counts, Kind, Step};
 use super::star::{CHUNK, Circle, Tangents, centroid, for_each_star, require_closed, require_room, twin};
 use crate::Result;
 use crate::mesh::incidence::{split_by_face, split_rows};
@@ -73,6 +74,18 @@ fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: Rule, 
         };
     }
 }
+
+/// All that defines the refinement.
+pub(super) const STEP: Step = Step {
+    name: "doo-sabin",
+    kind: Kind::Dual,
+    needs_triangles: false,
+    refine,
+    refined_topology,
+    counts: |c| Counts { vertices: c.corners, faces: c.faces + c.edges() + c.vertices, corners: 4 * c.corners },
+    limit_positions: |mesh, topology| limit_positions(Rule::DooSabin, mesh, topology),
+    limit_normals: |mesh, topology| limit_normals(Rule::DooSabin, mesh, topology),
+};
 
 /// One step of Doo-Sabin: [`refine_by`] with [`Rule::DooSabin`].
 ///

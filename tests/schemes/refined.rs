@@ -4,8 +4,8 @@ use glam::DVec3;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces, union};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Faces, Mesh, Topology, builtin};
-use limitlab::subdivide::doo_sabin::{self, Rule};
-use limitlab::subdivide::{Refinement, catmull_clark, loop_scheme, sqrt3, unified_sqrt3};
+use limitlab::schemes::doo_sabin::{self, Rule};
+use limitlab::schemes::{Refinement, catmull_clark, loop_scheme, sqrt3, unified_sqrt3};
 
 use super::meshes::*;
 

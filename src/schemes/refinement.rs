@@ -1,0 +1,238 @@
+//! The refinements: each is a [`Step`] in a file of its own, and this is the list.
+
+use std::fmt;
+use std::str::FromStr;
+
+use glam::DVec3;
+
+use super::{butterfly, catmull_clark, doo_sabin, labsik_greiner, loop_scheme, sqrt3};
+use crate::memory::require;
+use crate::mesh::{Mesh, Topology};
+use crate::{Error, Result};
+
+/// What a refinement does with the vertices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Vertices stay, under their numbers, and move.
+    Primal,
+    /// Vertices become faces.
+    Dual,
+    /// Vertices stay where they are.
+    Interpolatory,
+}
+
+/// How large a mesh is, closed ones alone.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Counts {
+    pub(super) vertices: u64,
+    pub(super) faces: u64,
+    pub(super) corners: u64,
+}
+
+impl Counts {
+    pub(super) fn edges(&self) -> u64 {
+        self.corners / 2
+    }
+
+    /// After the split of every triangle in four.
+    pub(super) fn in_four(self) -> Self {
+        Counts { vertices: self.vertices + self.edges(), faces: 4 * self.faces, corners: 4 * self.corners }
+    }
+
+    /// After the split of every triangle in three.
+    pub(super) fn in_three(self) -> Self {
+        Counts { vertices: self.vertices + self.faces, faces: 3 * self.faces, corners: 3 * self.corners }
+    }
+}
+
+/// All that defines a refinement.
+pub(super) struct Step {
+    pub(super) name: &'static str,
+    pub(super) kind: Kind,
+    pub(super) needs_triangles: bool,
+    pub(super) refine: fn(&Mesh, &Topology) -> Result<Mesh>,
+    /// Of a mesh, its topology and what `refine` made of it.
+    pub(super) refined_topology: fn(&Mesh, &Topology, &Mesh) -> Topology,
+    pub(super) counts: fn(Counts) -> Counts,
+    pub(super) limit_positions: fn(&Mesh, &Topology) -> Result<Vec<DVec3>>,
+    pub(super) limit_normals: fn(&Mesh, &Topology) -> Result<Vec<DVec3>>,
+}
+
+/// A stationary refinement that needs nothing but the mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Refinement {
+    CatmullClark,
+    Loop,
+    DooSabin,
+    Sqrt3,
+    Butterfly,
+    LabsikGreiner,
+}
+
+impl Refinement {
+    /// All of them, in the order in which messages list them.
+    pub const ALL: [Refinement; 6] = [
+        Refinement::CatmullClark,
+        Refinement::Loop,
+        Refinement::DooSabin,
+        Refinement::Sqrt3,
+        Refinement::Butterfly,
+        Refinement::LabsikGreiner,
+    ];
+
+    fn step(self) -> &'static Step {
+        match self {
+            Refinement::CatmullClark => &catmull_clark::STEP,
+            Refinement::Loop => &loop_scheme::STEP,
+            Refinement::DooSabin => &doo_sabin::STEP,
+            Refinement::Sqrt3 => &sqrt3::STEP,
+            Refinement::Butterfly => &butterfly::STEP,
+            Refinement::LabsikGreiner => &labsik_greiner::STEP,
+        }
+    }
+
+    /// The name on the command line, which `parse` reads back.
+    pub fn name(self) -> &'static str {
+        self.step().name
+    }
+
+    /// What becomes of the vertices.
+    pub fn kind(self) -> Kind {
+        self.step().kind
+    }
+
+    /// Whether the refinement is defined on triangles only.
+    pub fn needs_triangles(self) -> bool {
+        self.step().needs_triangles
+    }
+
+    /// One step. The scheme's own `refine` says how the result is numbered and what it refuses.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] for a mesh that is not a closed manifold or, where the scheme needs triangles, has
+    /// another face.
+    ///
+    /// # Panics
+    /// If `topology` is not that of `mesh`.
+    pub fn refine(self, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
+        (self.step().refine)(mesh, topology)
+    }
+
+    /// The topology of `refined`, which is what [`refine`](Self::refine) made of `mesh`. Equal to [`Topology::new`] of
+    /// its faces, at a fraction of the cost: index arithmetic on the coarse topology gives it.
+    ///
+    /// # Panics
+    /// If the three do not belong together.
+    ///
+    /// ```
+    /// use limitlab::mesh::{Topology, builtin};
+    /// use limitlab::schemes::Refinement;
+    /// let mesh = builtin::builtin("cube")?;
+    /// let topology = Topology::new(&mesh.faces, mesh.len());
+    /// let refined = Refinement::CatmullClark.refine(&mesh, &topology)?;
+    /// let finer = Refinement::CatmullClark.refined_topology(&mesh, &topology, &refined);
+    /// assert_eq!(finer, Topology::new(&refined.faces, refined.len()));
+    /// # Ok::<(), limitlab::Error>(())
+    /// ```
+    pub fn refined_topology(self, mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+        (self.step().refined_topology)(mesh, topology, refined)
+    }
+
+    /// Refuses, before the work, `levels` steps whose meshes have more corners than 32-bit indices name, or for which
+    /// memory has no room. O(levels).
+    ///
+    /// # Errors
+    /// [`Error::Computation`] or [`Error::Memory`] with the numbers of faces and vertices.
+    pub fn check_size(self, mesh: &Mesh, levels: usize) -> Result<()> {
+        let count = |n: usize| n as u64;
+        let mut counts = Counts {
+            vertices: count(mesh.len()),
+            faces: count(mesh.faces.len()),
+            corners: count(mesh.faces.corners().len()),
+        };
+        let mut bytes = 0u64;
+        for _ in 0..levels {
+            // Before a step the coarse mesh and its topology are there, after it the fine mesh.
+            let coarse = 24 * counts.vertices + 24 * counts.corners;
+            counts = (self.step().counts)(counts);
+            bytes = coarse + 24 * counts.vertices + 4 * counts.faces + 4 * counts.corners;
+            if counts.corners > u64::from(u32::MAX) {
+                break;
+            }
+        }
+        let Counts { vertices, faces, corners } = counts;
+        let what = || format!("the surface after {levels} refinements with {faces} faces and {vertices} vertices");
+        if corners > u64::from(u32::MAX) {
+            return Err(Error::Computation(format!(
+                "a surface after {levels} refinements has {faces} faces or more, which 32-bit indices do not reach: \
+                 refine fewer levels"
+            )));
+        }
+        require(bytes, what, "refine fewer levels")?;
+        Ok(())
+    }
+
+    /// `levels` steps; none gives a copy. The topology of each level comes from that of the level before.
+    ///
+    /// # Errors
+    /// As [`check_size`](Self::check_size) and [`refine`](Self::refine).
+    ///
+    /// # Panics
+    /// If a face names a vertex that is not there (the validator reports such faces before).
+    pub fn refine_n(self, mesh: &Mesh, levels: usize) -> Result<Mesh> {
+        self.check_size(mesh, levels)?;
+        let mut topology = Topology::new(&mesh.faces, mesh.len());
+        let mut coarse = None;
+        for level in 1..=levels {
+            let mesh = coarse.as_ref().unwrap_or(mesh);
+            let refined = self.refine(mesh, &topology)?;
+            if level < levels {
+                topology = self.refined_topology(mesh, &topology, &refined);
+            }
+            coarse = Some(refined);
+        }
+        Ok(coarse.unwrap_or_else(|| mesh.clone()))
+    }
+
+    /// The limit points of all vertices; under dual refinements the centroids of the faces that they become, under the
+    /// interpolatory ones the vertices themselves.
+    ///
+    /// # Errors
+    /// As [`refine`](Self::refine).
+    ///
+    /// # Panics
+    /// If `topology` is not that of `mesh`.
+    pub fn limit_positions(self, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+        (self.step().limit_positions)(mesh, topology)
+    }
+
+    /// The unit normals of the limit surface at the [`limit_positions`](Self::limit_positions); zero where
+    /// [`Tangents::normal`](super::Tangents::normal) is.
+    ///
+    /// # Errors
+    /// As [`refine`](Self::refine).
+    ///
+    /// # Panics
+    /// If `topology` is not that of `mesh`.
+    pub fn limit_normals(self, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+        (self.step().limit_normals)(mesh, topology)
+    }
+}
+
+impl fmt::Display for Refinement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Refinement {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let found = Refinement::ALL.into_iter().find(|r| r.name() == name);
+        found.ok_or_else(|| {
+            let known = Refinement::ALL.map(Refinement::name).join(", ");
+            Error::Unknown(format!("unknown refinement {name:?}: choose one of {known}"))
+        })
+    }
+}
