@@ -2,7 +2,7 @@
 //! passes through given points.
 //!
 //! A subdivision scheme sends the control points `V` (N×3) to limit points `A V`; interpolation asks for the
-//! `V` with `A V = P`. This crate assembles `A = H·M` for five schemes, solves the system by direct and
+//! `V` with `A V = P`. This crate assembles `A = H·M` for six schemes, solves the system by direct and
 //! iterative methods, and explains the convergence by spectra and proven bounds.
 //!
 //! The rooms, each of which uses only the ones above it: [`error`], [`output`], [`mesh`], [`schemes`],

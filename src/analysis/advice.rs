@@ -18,7 +18,6 @@ const ANOTHER_SYSTEM: &str = "use --scheme nasri, which is never singular, or --
 pub struct Failed {
     /// As it was asked for; `None` where the program chose.
     method: Option<Method>,
-    scheme: Scheme,
     outcome: Outcome,
     max_error: f64,
     tolerance: f64,
@@ -45,7 +44,6 @@ impl Failed {
         let largest = mesh.positions.iter().fold(DVec3::ZERO, |m, p| m.max(p.abs())).max_element();
         Failed {
             method,
-            scheme,
             outcome: report.outcome,
             max_error: report.last().max,
             tolerance: stop.tolerance,
@@ -68,14 +66,11 @@ impl Failed {
         if let Some(component) = self.unreachable() {
             return format!(
                 "the points have a part that no control mesh reaches, {:.3e} at each of the {} vertices of the \
-                 component of vertex {}: {}its graph is bipartite, so that the matrix is singular; {ANOTHER_SYSTEM}",
+                 component of vertex {}, which has {}, so that the matrix is singular; {ANOTHER_SYSTEM}",
                 unit * component.unreachable.length(),
                 component.vertices,
                 component.first_vertex,
-                match self.scheme.singular_set() {
-                    SingularSet::Bipartite { valence: Some(n) } => format!("all its valences are {n} and "),
-                    SingularSet::Bipartite { valence: None } | SingularSet::Never => String::new(),
-                }
+                self.verdict.set.condition().unwrap_or_default()
             );
         }
         let reachable = unit * 2.0 * self.max_error;
@@ -96,7 +91,7 @@ impl Failed {
                 "the matrix is singular, but these points have a control mesh: use --method auto".into()
             }
             _ if chosen => "use --method auto".into(),
-            _ => match self.scheme.singular_set() {
+            _ => match self.verdict.set {
                 SingularSet::Bipartite { .. } => format!("the matrix is singular, or nearly so; {ANOTHER_SYSTEM}"),
                 SingularSet::Never => format!(
                     "the error that can be reached is larger than the tolerance: use --tol-absolute {reachable:.0e}"

@@ -30,6 +30,8 @@ pub struct SingularComponent {
 /// The verdict of theory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Singularity {
+    /// Which components the scheme's matrix is singular on.
+    pub set: SingularSet,
     /// Connected components of the mesh.
     pub components: usize,
     pub singular: Vec<SingularComponent>,
@@ -71,9 +73,10 @@ impl Singularity {
     /// Decides from the mesh alone. The points are the mesh's positions. O(corners).
     pub fn detect(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Self {
         let (component, components) = topology.components(&mesh.faces);
+        let set = scheme.singular_set();
         let mut verdict =
-            Singularity { components, singular: Vec::new(), colouring: vec![0; mesh.len()], excited: false };
-        let SingularSet::Bipartite { valence } = scheme.singular_set() else {
+            Singularity { set, components, singular: Vec::new(), colouring: vec![0; mesh.len()], excited: false };
+        let SingularSet::Bipartite { valence } = set else {
             return verdict;
         };
         let mut colour = colour(mesh, topology);

@@ -10,7 +10,7 @@ use super::rows::Rows;
 use crate::error::{Error, Result};
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::parallel;
-use crate::schemes::{Masks, Scheme};
+use crate::schemes::{Masks, Scheme, SingularSet};
 
 /// The limit system `A V = P` of one mesh: `A = H·M` explicitly, with both factors.
 ///
@@ -130,7 +130,7 @@ pub(super) fn check_boundary(faces: &Faces, topology: &Topology, scheme: Scheme)
         return Err(Error::Computation(format!(
             "{} boundary edges, and the masks of {scheme} need whole faces around every vertex; close the holes{}",
             topology.boundary_edges(),
-            match names(|s| s.edges_only() && (triangles || !s.needs_triangles())) {
+            match names(|s| triangles && s.edges_only() && s.singular_set() == SingularSet::Never) {
                 none if none.is_empty() => none,
                 names => format!(", or use --boundary as-interior with --scheme {names}"),
             }

@@ -6,9 +6,8 @@ use glam::DVec3;
 use super::normals::{Rotation, rotate_rings};
 use super::zheng_cai::{Constraints, FirstRefinement};
 use crate::mesh::{Mesh, Topology};
-use crate::schemes::Refinement;
-use crate::schemes::Scheme;
 use crate::schemes::doo_sabin::{self, Rule};
+use crate::schemes::{Kind, Refinement, Scheme};
 use crate::{Error, Result};
 
 /// What is wanted of the surface.
@@ -44,11 +43,11 @@ pub struct Surface {
 /// Catmull-Clark, Loop and √3: original vertices keep their numbers; given normals are met by turned rings
 /// ([`rotate_rings`]), which need two levels or more. Nasri and Zheng-Cai: the first level is the scheme's own first
 /// refinement, whose type-V faces Zheng-Cai corrects always and Nasri if normals or handles are given; all further
-/// ones are Doo-Sabin. Time and memory are those of the refinements.
+/// ones are Doo-Sabin. Mid-edge: plain refinement. Time and memory are those of the refinements.
 ///
 /// # Errors
-/// Too few levels for normals or handles, handles under a primal scheme; those of [`rotate_rings`],
-/// [`FirstRefinement::new`] and the refinement.
+/// Too few levels for normals or handles, handles under a primal scheme, either under mid-edge; those of
+/// [`rotate_rings`], [`FirstRefinement::new`] and the refinement.
 ///
 /// # Panics
 /// If a list has not one entry a vertex, or `topology` gives another than that of `control`.
@@ -136,6 +135,12 @@ fn primal(control: Mesh, scheme: Refinement, request: &Request) -> Result<Surfac
         let stays = request.levels == 0;
         return Ok(Surface::plain(if stays { control } else { scheme.refine_n(&control, request.levels)? }));
     };
+    if scheme.kind() != Kind::Primal {
+        return Err(Error::Computation(format!(
+            "given normals turn the rings of vertices that stay, or tilt the faces of Doo-Sabin surfaces, and {scheme} has \
+             neither: use --scheme zheng-cai, nasri or catmull-clark"
+        )));
+    }
     let needed = request.rotation.levels + 1;
     if request.levels < needed {
         return Err(too_few("given normals turn the rings of", needed));

@@ -8,9 +8,9 @@ use glam::{DVec2, DVec3};
 
 use super::refined::{self, push_ends, set_by_edge, set_rows};
 use super::refinement::{Counts, Kind, Step};
-use super::star::{CHUNK, Circle, Tangents, centroid, for_each_star, require_closed, require_room, twin};
+use super::star::{CHUNK, Circle, Tangents, centroid, for_each_star, put_stars, require_closed, require_room, twin};
 use crate::Result;
-use crate::mesh::incidence::{split_by_face, split_rows};
+use crate::mesh::incidence::split_by_face;
 use crate::mesh::{Faces, Mesh, Topology};
 use crate::pages::filled;
 use crate::pages::large;
@@ -124,15 +124,7 @@ pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
         let next = |c| incidence.next(&mesh.faces, c);
         [next(c), c, next(t), t]
     });
-    parallel::parts(split_rows(incidence.offsets(), CHUNK, of_vertices), |range, mut part| {
-        let mut star = Vec::new();
-        for v in range {
-            topology.star(&mesh.faces, v, &mut star);
-            let (face, rest) = part.split_at_mut(star.len());
-            face.copy_from_slice(&star);
-            part = rest;
-        }
-    });
+    put_stars(mesh, topology, of_vertices);
 
     let mut offsets = large(Vec::with_capacity(mesh.faces.len() + count / 2 + mesh.len() + 1));
     offsets.push(0);

@@ -8,6 +8,7 @@
 //! | [`loop_scheme`] | Loop 1987 | triangles | no |
 //! | [`doo_sabin`] | Doo & Sabin 1978, and the first step of Zheng & Cai 2005; systems of Nasri and of Zheng & Cai | any polygons | no |
 //! | [`sqrt3`] | Kobbelt 2000 | triangles | no |
+//! | [`mid_edge`] | Peters & Reif 1997 | any polygons | no |
 //! | [`unified_sqrt3`] | Lin & Luo, α per vertex | triangles | where α = 1 |
 //! | [`butterfly`] | modified Butterfly, Zorin, Schröder & Sweldens 1996 | triangles | yes |
 //! | [`labsik_greiner`] | interpolatory √3, Labsik & Greiner 2000 | triangles | yes |
@@ -34,6 +35,7 @@ pub mod doo_sabin;
 mod interpolatory;
 pub mod labsik_greiner;
 pub mod loop_scheme;
+pub mod mid_edge;
 mod nasri;
 mod refined;
 mod refinement;

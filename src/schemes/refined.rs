@@ -6,7 +6,7 @@
 //! [`Topology::new`] leaves without twins (a triangle and its back: the two faces of a vertex of valence 2 come to share
 //! two edges). Such meshes are recognised, and left to it.
 
-use super::star::{next_in_triangle, prev_in_triangle};
+use super::star::{next_in_triangle, prev_in_triangle, stars};
 use crate::mesh::topology::Scatter;
 use crate::mesh::{Incidence, Mesh, Topology};
 use crate::pages::large;
@@ -179,6 +179,34 @@ pub(super) fn of_corners(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> To
         [c, leaving.min(entering), leaving.max(entering), place[c as usize]]
     });
     let offsets = parallel::collect(count + 1, |c| 4 * c as u32);
+    closed(refined, offsets, corners, twins)
+}
+
+/// After the mid-edge split: a vertex for every edge; the old faces, then the corners around every vertex.
+pub(super) fn of_midpoints(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+    let (faces, incidence, twin) = (&mesh.faces, &topology.incidence, topology.twins());
+    if has_valence_below_three(incidence) {
+        return Topology::new(&refined.faces, refined.len());
+    }
+    let count = twin.len();
+    let stars = stars(mesh, topology);
+    // Where each corner stands in the face of its vertex.
+    let place = Scatter::new(count);
+    parallel::each(count, |p| place.set(stars[p], (count + p) as u32));
+    let place = place.into_vec();
+
+    let mut twins = large(vec![0; 2 * count]);
+    let (of_faces, of_vertices) = twins.split_at_mut(count);
+    set_rows(of_faces, |c| [place[incidence.next(faces, c) as usize]]);
+    set_rows(of_vertices, |p| [incidence.prev(faces, stars[p as usize])]);
+
+    let mut corners = large(vec![0; 2 * count]);
+    set_by_edge(&mut corners, topology, |c| {
+        let t = twin[c as usize];
+        let [a, b] = [place[c as usize], place[t as usize]];
+        [c, t, a.min(b), a.max(b)]
+    });
+    let offsets = parallel::collect(count / 2 + 1, |e| 4 * e as u32);
     closed(refined, offsets, corners, twins)
 }
 

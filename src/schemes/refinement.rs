@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use glam::DVec3;
 
-use super::{butterfly, catmull_clark, doo_sabin, labsik_greiner, loop_scheme, sqrt3};
+use super::{butterfly, catmull_clark, doo_sabin, labsik_greiner, loop_scheme, mid_edge, sqrt3};
 use crate::memory::require;
 use crate::mesh::{Mesh, Topology};
 use crate::{Error, Result};
@@ -67,17 +67,19 @@ pub enum Refinement {
     Sqrt3,
     Butterfly,
     LabsikGreiner,
+    MidEdge,
 }
 
 impl Refinement {
     /// All of them, in the order in which messages list them.
-    pub const ALL: [Refinement; 6] = [
+    pub const ALL: [Refinement; 7] = [
         Refinement::CatmullClark,
         Refinement::Loop,
         Refinement::DooSabin,
         Refinement::Sqrt3,
         Refinement::Butterfly,
         Refinement::LabsikGreiner,
+        Refinement::MidEdge,
     ];
 
     fn step(self) -> &'static Step {
@@ -88,6 +90,7 @@ impl Refinement {
             Refinement::Sqrt3 => &sqrt3::STEP,
             Refinement::Butterfly => &butterfly::STEP,
             Refinement::LabsikGreiner => &labsik_greiner::STEP,
+            Refinement::MidEdge => &mid_edge::STEP,
         }
     }
 

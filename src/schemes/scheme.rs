@@ -5,7 +5,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::doo_sabin::Rule;
-use super::{Refinement, catmull_clark, loop_scheme, nasri, sqrt3, zheng_cai};
+use super::{Refinement, catmull_clark, loop_scheme, mid_edge, nasri, sqrt3, zheng_cai};
 use crate::error::Error;
 use crate::mesh::Faces;
 
@@ -45,6 +45,17 @@ pub enum SingularSet {
     Bipartite {
         valence: Option<usize>,
     },
+}
+
+impl SingularSet {
+    /// What a component has on which A is singular, in words; `None` where it never is.
+    pub fn condition(self) -> Option<String> {
+        match self {
+            SingularSet::Never => None,
+            SingularSet::Bipartite { valence: None } => Some("a bipartite graph".into()),
+            SingularSet::Bipartite { valence: Some(n) } => Some(format!("all valences {n} and a bipartite graph")),
+        }
+    }
 }
 
 /// All that defines a scheme.
@@ -88,6 +99,8 @@ pub enum Scheme {
     Nasri,
     /// Doo-Sabin with the modified first step `(V + centroid)/2`: Zheng-Cai Eq. 6.
     ZhengCai,
+    /// Peters & Reif's midpoints of edges: A = ½(I + D⁻¹Adj), in none of the papers.
+    MidEdge,
 }
 
 /// How the papers name the three matrices of a scheme: `system = diagonal · symmetric`.
@@ -104,7 +117,8 @@ impl PaperNames {
 }
 
 impl Scheme {
-    pub const ALL: [Scheme; 5] = [Scheme::CatmullClark, Scheme::Loop, Scheme::Sqrt3, Scheme::Nasri, Scheme::ZhengCai];
+    pub const ALL: [Scheme; 6] =
+        [Scheme::CatmullClark, Scheme::Loop, Scheme::Sqrt3, Scheme::Nasri, Scheme::ZhengCai, Scheme::MidEdge];
 
     fn definition(self) -> &'static Definition {
         match self {
@@ -113,6 +127,7 @@ impl Scheme {
             Scheme::Sqrt3 => &sqrt3::DEFINITION,
             Scheme::Nasri => &nasri::DEFINITION,
             Scheme::ZhengCai => &zheng_cai::DEFINITION,
+            Scheme::MidEdge => &mid_edge::DEFINITION,
         }
     }
 

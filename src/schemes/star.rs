@@ -5,8 +5,10 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use crate::mesh::frame::magnitude;
+use crate::mesh::incidence::split_rows;
 use crate::mesh::topology::NONE;
 use crate::mesh::{Incidence, Mesh, Topology};
+use crate::pages::large;
 use crate::parallel::{self, find_first};
 use crate::{Error, Result};
 
@@ -148,6 +150,26 @@ pub(crate) fn neighbor_sum(mesh: &Mesh, topology: &Topology, v: usize) -> (usize
     (star.len(), sum)
 }
 
+/// The corners at each vertex in counter-clockwise order, one vertex after the other as in the incidence.
+pub(crate) fn stars(mesh: &Mesh, topology: &Topology) -> Vec<u32> {
+    let mut stars = large(vec![0; mesh.faces.corners().len()]);
+    put_stars(mesh, topology, &mut stars);
+    stars
+}
+
+/// As [`stars`], into memory that is there already.
+pub(crate) fn put_stars(mesh: &Mesh, topology: &Topology, stars: &mut [u32]) {
+    parallel::parts(split_rows(topology.incidence.offsets(), CHUNK, stars), |range, mut part| {
+        let mut star = Vec::new();
+        for v in range {
+            topology.star(&mesh.faces, v, &mut star);
+            let (here, rest) = part.split_at_mut(star.len());
+            here.copy_from_slice(&star);
+            part = rest;
+        }
+    });
+}
+
 /// Calls `visit(v, corners)` for every vertex with its corners in counter-clockwise order.
 pub(crate) fn for_each_star(mesh: &Mesh, topology: &Topology, mut visit: impl FnMut(usize, &[u32])) {
     let mut star = Vec::new();
@@ -265,14 +287,14 @@ impl Tangents {
 }
 
 /// The tangents of schemes whose tangent mask is (cos, sin)(2πj/n) on the neighbours in counter-clockwise
-/// order: Loop and √3.
+/// order: Loop, √3 and mid-edge.
 pub(crate) fn ring_tangents(mesh: &Mesh, topology: &Topology) -> Vec<Tangents> {
     let mut tangents = Vec::with_capacity(mesh.len());
     let mut circle = Circle::default();
     for_each_star(mesh, topology, |v, star| {
         let mut pair = Tangents::default();
         for (&c, &weights) in star.iter().zip(circle.of(star.len())) {
-            let w = mesh.faces.corners()[next_in_triangle(c)];
+            let w = mesh.faces.corners()[topology.incidence.next(&mesh.faces, c) as usize];
             pair.add(weights, mesh.positions[w as usize] - mesh.positions[v]);
         }
         tangents.push(pair);

@@ -5,9 +5,8 @@ use glam::DVec3;
 use limitlab::assemble::LimitSystem;
 use limitlab::mesh::Mesh;
 use limitlab::mesh::generate::{random_polygons, random_triangulation};
-use limitlab::schemes::Scheme;
 use limitlab::schemes::doo_sabin::{self, Rule};
-use limitlab::schemes::{Refinement, catmull_clark, loop_scheme, sqrt3};
+use limitlab::schemes::{Refinement, Scheme, catmull_clark, loop_scheme, mid_edge, sqrt3};
 use rayon::prelude::*;
 
 use crate::common::meshes::*;
@@ -22,6 +21,7 @@ fn limits(scheme: Scheme, mesh: &Mesh) -> Vec<DVec3> {
         Scheme::Sqrt3 => sqrt3::limit_positions(mesh, &topology),
         Scheme::Nasri => doo_sabin::limit_positions(Rule::DooSabin, mesh, &topology),
         Scheme::ZhengCai => doo_sabin::limit_positions(Rule::ZhengCai, mesh, &topology),
+        Scheme::MidEdge => mid_edge::limit_positions(mesh, &topology),
     }
     .unwrap()
 }

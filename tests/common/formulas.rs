@@ -48,7 +48,7 @@ fn weights(scheme: Scheme, n: f64) -> (f64, f64) {
             ((1.0 - b) / n, n * b / (1.0 - b))
         }
         Scheme::Nasri => (1.0 / n, 0.0),
-        Scheme::ZhengCai => (1.0 / (2.0 * n), n),
+        Scheme::ZhengCai | Scheme::MidEdge => (1.0 / (2.0 * n), n),
     }
 }
 
@@ -71,7 +71,7 @@ pub fn assemble(scheme: Scheme, mesh: &Mesh) -> Plain {
     }
     let edge = match scheme {
         Scheme::CatmullClark => 2.0,
-        Scheme::Loop | Scheme::Sqrt3 => 1.0,
+        Scheme::Loop | Scheme::Sqrt3 | Scheme::MidEdge => 1.0,
         Scheme::Nasri | Scheme::ZhengCai => 0.0,
     };
     if edge > 0.0 {
@@ -86,7 +86,7 @@ pub fn assemble(scheme: Scheme, mesh: &Mesh) -> Plain {
             for (j, &w) in face.iter().enumerate() {
                 let entry = match scheme {
                     Scheme::CatmullClark => 4.0 / size,
-                    Scheme::Loop | Scheme::Sqrt3 => continue,
+                    Scheme::Loop | Scheme::Sqrt3 | Scheme::MidEdge => continue,
                     Scheme::Nasri => {
                         let own = if i == j { 0.25 } else { 0.0 };
                         let angle = TAU * (i as f64 - j as f64) / size;

@@ -70,6 +70,12 @@ pub fn small_polygons(seed: u64) -> Mesh {
     renumbered(&mesh, seed + 1)
 }
 
+/// Whether `scheme` has a solution for any points of closed quads: the mid-edge scheme's matrix is singular on them if they
+/// have no handle.
+pub fn soluble_on_quads(scheme: Scheme) -> bool {
+    !scheme.needs_triangles() && scheme != Scheme::MidEdge
+}
+
 /// A random mesh on which `scheme` is defined.
 pub fn small_mesh(scheme: Scheme, seed: u64) -> Mesh {
     if scheme.needs_triangles() { small_triangles(seed) } else { small_polygons(seed) }

@@ -8,8 +8,7 @@ use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::normals::{Rotation, rotate_rings};
 use limitlab::interpolate::thall::*;
 use limitlab::mesh::{Faces, Mesh, Topology, builtin};
-use limitlab::schemes::Scheme;
-use limitlab::schemes::{Refinement, catmull_clark};
+use limitlab::schemes::{Refinement, Scheme, catmull_clark};
 use limitlab::solvers::iteration::Iterate;
 use limitlab::solvers::{Outcome, Setup, Stop, run, run_watched, solve};
 

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use limitlab::mesh::{Mesh, Topology};
 use limitlab::schemes::doo_sabin::{self, Rule};
-use limitlab::schemes::{Refinement, catmull_clark, loop_scheme, sqrt3};
+use limitlab::schemes::{Refinement, catmull_clark, loop_scheme, mid_edge, sqrt3};
 
 use super::ROUNDING;
 use super::meshes::*;
@@ -165,6 +165,35 @@ fn doo_sabin_limits_are_the_centroids_that_stay() {
                 };
                 assert!(radius(&fine) <= radius(&once) / 8.0 + ROUNDING);
             }
+        }
+    }
+}
+
+/// The face of vertex v after the first step is face F + v, then for ever: its centroid stays, and its first harmonic
+/// shrinks by cos(π/n) a step.
+#[test]
+fn mid_edge_limits_are_the_centroids_that_stay() {
+    for mesh in polygon_meshes().into_iter().chain(triangle_meshes()) {
+        let topology = topology(&mesh);
+        let limits = mid_edge::limit_positions(&mesh, &topology).unwrap();
+        let once = mid_edge::refine(&mesh, &topology).unwrap();
+        let fine = Refinement::MidEdge.refine_n(&once, 4).unwrap();
+        for (v, limit) in limits.iter().enumerate() {
+            let face = mesh.faces.len() + v;
+            assert!((face_centroid(&once, face) - *limit).length() < ROUNDING);
+            assert!((face_centroid(&fine, face) - *limit).length() < ROUNDING);
+            let harmonic = |m: &Mesh| {
+                let corners = m.faces.face(face);
+                let step = TAU / corners.len() as f64;
+                let parts = corners.iter().enumerate().map(|(j, &c)| {
+                    let (sin, cos) = (step * j as f64).sin_cos();
+                    [cos * m.positions[c as usize], sin * m.positions[c as usize]]
+                });
+                let [cos, sin] = parts.fold([DVec3::ZERO; 2], |[a, b], [c, d]| [a + c, b + d]);
+                (cos.length_squared() + sin.length_squared()).sqrt()
+            };
+            let shrunk = (0.5 * TAU / topology.incidence.face_count(v) as f64).cos().powi(4);
+            assert!((harmonic(&fine) - shrunk * harmonic(&once)).abs() < ROUNDING);
         }
     }
 }

@@ -20,7 +20,7 @@ const PRIMAL: [(Refinement, TangentsOf); 3] = [
 
 fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
     match scheme {
-        Refinement::CatmullClark | Refinement::DooSabin => polygon_meshes(),
+        Refinement::CatmullClark | Refinement::DooSabin | Refinement::MidEdge => polygon_meshes(),
         _ => triangle_meshes(),
     }
 }
@@ -31,7 +31,9 @@ fn normals(scheme: Refinement, mesh: &Mesh) -> Vec<DVec3> {
         Refinement::CatmullClark => catmull_clark::limit_normals(mesh, &topology),
         Refinement::Loop => loop_scheme::limit_normals(mesh, &topology),
         Refinement::Sqrt3 => sqrt3::limit_normals(mesh, &topology),
-        Refinement::Butterfly | Refinement::LabsikGreiner => scheme.limit_normals(mesh, &topology),
+        Refinement::Butterfly | Refinement::LabsikGreiner | Refinement::MidEdge => {
+            scheme.limit_normals(mesh, &topology)
+        }
         _ => doo_sabin::limit_normals(Rule::DooSabin, mesh, &topology),
     }
     .unwrap()
@@ -190,6 +192,39 @@ fn doo_sabin_normals_are_those_of_a_finely_refined_mesh() {
     }
 }
 
+/// The face of a vertex approaches the tangent plane, and so do the surroundings: like a power of the number of steps at
+/// valence 3, where the face lies in the plane.
+#[test]
+fn mid_edge_normals_are_those_of_a_finely_refined_mesh() {
+    for mesh in [prism(3), prism(5), pyramid(6), bipyramid(5), bipyramid(7)] {
+        let normals = normals(Refinement::MidEdge, &mesh);
+        let valences = topology(&mesh).incidence;
+        let center: DVec3 = mesh.positions.iter().sum::<DVec3>() / mesh.len() as f64;
+        let at = |levels: usize| {
+            let fine = Refinement::MidEdge.refine_n(&mesh, levels).unwrap();
+            let seen = |v: usize| {
+                let face = fine.faces.face(mesh.faces.len() + v);
+                let corners: Vec<DVec3> = face.iter().map(|&c| fine.positions[c as usize]).collect();
+                let pairs = corners.iter().zip(corners.iter().cycle().skip(1));
+                let own = pairs.map(|(a, b)| a.cross(*b)).sum::<DVec3>().normalize();
+                let around = |&c: &u32| (discrete_normal(&fine, c as usize) - normals[v]).length();
+                (own, face.iter().map(around).fold(0.0, f64::max))
+            };
+            (0..mesh.len()).map(seen).collect::<Vec<_>>()
+        };
+        let (coarse, fine) = (at(4), at(8));
+        for (v, normal) in normals.iter().enumerate() {
+            assert!(normal.dot(mesh.positions[v] - center) > 0.0);
+            // Of an n-gon the other harmonics must die out first.
+            let n = valences.face_count(v);
+            let allowed = if n == 3 { 1e-9 } else { 0.01 };
+            assert!((fine[v].0 - *normal).length() < allowed, "{v} of valence {n}: {} {normal}", fine[v].0);
+            let (before, after) = (coarse[v].1, fine[v].1);
+            assert!(after < 0.02 || after < 0.75 * before, "{v} of valence {n}: {before} then {after}");
+        }
+    }
+}
+
 /// A step halves both tangents of a face and turns nothing: the type-F face has the same normal.
 #[test]
 fn doo_sabin_face_normals_stay() {
@@ -213,6 +248,7 @@ fn normals_turn_with_the_mesh_and_do_not_see_shifts_and_scales() {
         Refinement::DooSabin,
         Refinement::Butterfly,
         Refinement::LabsikGreiner,
+        Refinement::MidEdge,
     ] {
         for mesh in meshes_for(scheme) {
             let points = mesh.positions.iter().map(|p| 1e-6 * (turn * *p) + DVec3::splat(2e-6));
@@ -233,6 +269,7 @@ fn stars_without_a_plane_have_zero_normals() {
         Refinement::DooSabin,
         Refinement::Butterfly,
         Refinement::LabsikGreiner,
+        Refinement::MidEdge,
     ] {
         let mut line = bipyramid(5);
         for (v, p) in line.positions.iter_mut().enumerate() {

@@ -2,14 +2,14 @@
 
 use glam::{DMat3, DVec3};
 use limitlab::mesh::{Faces, Mesh};
-use limitlab::schemes::{Refinement, catmull_clark, doo_sabin, loop_scheme, sqrt3};
+use limitlab::schemes::{Kind, Refinement, catmull_clark, doo_sabin, loop_scheme, sqrt3};
 
 use super::ROUNDING;
 use super::meshes::*;
 
 fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
     match scheme {
-        Refinement::CatmullClark | Refinement::DooSabin => polygon_meshes(),
+        Refinement::CatmullClark | Refinement::DooSabin | Refinement::MidEdge => polygon_meshes(),
         Refinement::Loop | Refinement::Sqrt3 | Refinement::Butterfly | Refinement::LabsikGreiner => triangle_meshes(),
     }
 }
@@ -50,12 +50,13 @@ fn counts_and_topology_after_each_step() {
                     Refinement::Loop | Refinement::Butterfly => (v + e, 4 * f),
                     Refinement::DooSabin => (c, f + e + v),
                     Refinement::Sqrt3 | Refinement::LabsikGreiner => (v + f, c),
+                    Refinement::MidEdge => (e, f + v),
                 };
                 assert_eq!((fine.len(), fine.faces.len()), expected, "{scheme} {level}");
                 assert_manifold(&fine, euler);
                 match scheme {
                     Refinement::CatmullClark => assert_eq!(fine.faces.uniform_size(), Some(4)),
-                    Refinement::DooSabin => {
+                    Refinement::DooSabin | Refinement::MidEdge => {
                         let incidence = topology(&fine).incidence;
                         assert!((0..fine.len()).all(|v| incidence.face_count(v) == 4));
                     }
@@ -70,7 +71,7 @@ fn counts_and_topology_after_each_step() {
 #[test]
 fn valences_of_old_vertices_stay() {
     for scheme in Refinement::ALL {
-        if scheme == Refinement::DooSabin {
+        if scheme.kind() == Kind::Dual {
             continue;
         }
         for mesh in meshes_for(scheme) {
@@ -101,6 +102,10 @@ fn faces_are_numbered_as_documented() {
     let mut last = doo_sabin.face(4 + 6 + 3).to_vec();
     last.sort_unstable();
     assert_eq!(last, [5, 8, 11]);
+    // The edges of the tetrahedron make an octahedron; face 0 has the edges of half-edges 0 to 2 in their order.
+    let mid_edge = refine(Refinement::MidEdge);
+    assert_eq!((mid_edge.len(), mid_edge.uniform_size()), (4 + 4, Some(3)));
+    assert_eq!(mid_edge.face(0), [0, 1, 2]);
 }
 
 #[test]

@@ -201,8 +201,11 @@ fn meshes(scheme: Scheme) -> Vec<Mesh> {
     let mut meshes = if scheme.needs_triangles() {
         vec![noisy("icosphere:1"), noisy("bipyramid:9"), noisy("irregular-tri:60")]
     } else {
-        vec![noisy("torus:6x5"), noisy("irregular-quad:50"), noisy("irregular-poly:60"), noisy("prism:5")]
+        vec![noisy("torus:6x5"), noisy("irregular-poly:60"), noisy("prism:5")]
     };
+    if soluble_on_quads(scheme) {
+        meshes.push(noisy("irregular-quad:50"));
+    }
     meshes.extend((1..4).map(|seed| scattered(&small_triangles(seed), seed)));
     meshes
 }
@@ -400,7 +403,8 @@ fn sor_at_1_is_gauss_seidel_at_every_sweep() {
 /// error needs no more than the number promised for ε = tolerance/(√h_max ‖H^-½e_0‖₂).
 #[test]
 fn chebyshev_keeps_its_promise() {
-    for scheme in Scheme::ALL {
+    // The proven interval of the mid-edge scheme begins at 0.
+    for scheme in Scheme::ALL.into_iter().filter(|&scheme| scheme != Scheme::MidEdge) {
         let name = if scheme.needs_triangles() { "irregular-tri:300" } else { "torus:16x15" };
         let mesh = noisy(name);
         let system = system(&mesh, scheme);

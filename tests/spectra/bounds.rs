@@ -111,7 +111,7 @@ fn proven_bounds_hold_on_hundreds_of_random_meshes() {
             Scheme::CatmullClark | Scheme::Nasri => 4.0,
             Scheme::Loop => 2.5,
             Scheme::Sqrt3 => 8.0 / 3.0,
-            Scheme::ZhengCai => 2.0,
+            Scheme::ZhengCai | Scheme::MidEdge => 2.0,
         };
         assert!(b.jacobi_lambda_max <= ceiling + slack, "{name}");
         let promise = Promise::new(&system.bounds);

@@ -42,7 +42,8 @@ fn extreme_values_and_multiplicities_are_those_of_the_torus() {
                 }
             }
             let ends = ends(&system).expect("no dense part");
-            assert!((ends.lambda_min.value - exact[0]).abs() < 1e-9 * exact[0]);
+            // The mid-edge scheme's is 0 on tori with even sides.
+            assert!((ends.lambda_min.value - exact[0]).abs() < (1e-9 * exact[0]).max(1e-13));
             assert!((ends.lambda_max.value - 1.0).abs() < 1e-13);
             let jacobi = ends.jacobi_lambda_max.value * system.diagonal[0];
             assert!((jacobi - 1.0).abs() < 1e-13);

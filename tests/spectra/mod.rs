@@ -31,6 +31,7 @@ fn torus_symbols(scheme: Scheme, n: usize, m: usize) -> Vec<f64> {
             Scheme::Nasri => (3.0 + s.cos()) / 4.0 * (3.0 + t.cos()) / 4.0,
             Scheme::ZhengCai => 0.5 + (1.0 + s.cos()) * (1.0 + t.cos()) / 8.0,
             Scheme::Loop | Scheme::Sqrt3 => 0.5 + (s.cos() + t.cos() + (s + t).cos()) / 6.0,
+            Scheme::MidEdge => 0.5 + (s.cos() + t.cos()) / 4.0,
         })
         .collect();
     all.sort_by(f64::total_cmp);

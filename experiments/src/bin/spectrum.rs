@@ -357,14 +357,17 @@ fn of_a_mesh(verdict: &Singularity) -> String {
         verdict.components,
         if kernel > 0 {
             format!(
-                "**singular**: {kernel} components (the first begins at vertex {}) have all valences 3 and a \
-                 bipartite graph, the null vectors are their ±1 colourings, and the points {} a part that no control \
-                 points reach.",
+                "**singular**: {kernel} components (the first begins at vertex {}) have {}, the null vectors are \
+                 their ±1 colourings, and the points {} a part that no control points reach.",
                 verdict.singular[0].first_vertex,
+                verdict.set.condition().unwrap_or_default(),
                 if verdict.excited { "have" } else { "do not have" }
             )
         } else {
-            "non-singular: no component with all valences 3 and a bipartite graph, or a scheme that never is.".into()
+            match verdict.set.condition() {
+                Some(condition) => format!("non-singular: no component has {condition}."),
+                None => "non-singular, as on every closed mesh under this scheme.".into(),
+            }
         }
     );
     if kernel > 0 {

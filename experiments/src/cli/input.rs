@@ -24,13 +24,13 @@ use limitlab::solvers::Stop;
 /// How a mesh is read and prepared.
 #[derive(Args, Clone, Debug)]
 pub struct MeshFlags {
-    /// Scheme: catmull-clark, loop, sqrt3, nasri or zheng-cai; loop on triangles, else catmull-clark, unless told
+    /// Scheme: catmull-clark, loop, sqrt3, nasri, zheng-cai or mid-edge; loop on triangles, else catmull-clark, unless told
     #[arg(long, value_name = "NAME")]
     pub scheme: Option<Scheme>,
     /// Move every vertex by a Gaussian of standard deviation A × the mean edge length, from SEED (1 unless told)
     #[arg(long, value_name = "A[:SEED]")]
     pub noise: Option<Noise>,
-    /// An open mesh: refuse it, or treat boundary vertices as interior (loop and sqrt3 only)
+    /// An open mesh: refuse it, or treat boundary vertices as interior (loop, sqrt3 and mid-edge only)
     #[arg(long, value_name = "refuse|as-interior", default_value_t = Boundary::Refuse)]
     pub boundary: Boundary,
     /// Print the whole report on the mesh's defects as JSON and stop

@@ -12,8 +12,7 @@ use super::surface::refine_n;
 use crate::analysis::splitting::Layout;
 use crate::interpolate::thall::angle;
 use crate::mesh::{Faces, Mesh, Topology};
-use crate::schemes::Tangents;
-use crate::schemes::sqrt3;
+use crate::schemes::{Tangents, sqrt3};
 use crate::{Error, Result};
 
 /// Rings about a vertex that determine the surface there.

@@ -15,7 +15,8 @@ pub fn keeps_surfaces(mesh: &Mesh, topology: &Topology, euler: i64) {
 /// One step, if the faces allow it.
 fn step(refinement: Refinement, mesh: &Mesh, topology: &Topology, euler: i64) -> Option<(Mesh, Topology)> {
     let fine = on_any_threads(|| refinement.refine(mesh, topology).ok());
-    let needs_triangles = !matches!(refinement, Refinement::CatmullClark | Refinement::DooSabin);
+    let of_any = [Refinement::CatmullClark, Refinement::DooSabin, Refinement::MidEdge];
+    let needs_triangles = !of_any.contains(&refinement);
     let refused = needs_triangles && mesh.faces.uniform_size() != Some(3);
     assert_eq!(fine.is_none(), refused, "{refinement}");
     let fine = fine?;

@@ -17,8 +17,7 @@ use limitlab::error::Error;
 use limitlab::mesh::io;
 use limitlab::mesh::order::Order;
 use limitlab::output::{allow_replacing, check_target};
-use limitlab::schemes::Refinement;
-use limitlab::schemes::Scheme;
+use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::Method;
 use limitlab_experiments::cli::{self, CommonFlags, MeshFlags, StopFlags};
 

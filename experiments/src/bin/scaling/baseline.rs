@@ -4,8 +4,7 @@
 
 use glam::DVec3;
 use limitlab::mesh::{Incidence, Mesh};
-use limitlab::schemes::Masks;
-use limitlab::schemes::Scheme;
+use limitlab::schemes::{Masks, Scheme};
 use limitlab::solvers::chebyshev::Recurrence;
 use rayon::prelude::*;
 

@@ -192,7 +192,7 @@ fn family(scheme: Scheme, n: usize) -> String {
     match scheme {
         Scheme::CatmullClark => format!("irregular-quad:{}", n & !1),
         Scheme::Loop | Scheme::Sqrt3 => format!("irregular-tri:{n}"),
-        Scheme::Nasri | Scheme::ZhengCai => format!("irregular-poly:{n}"),
+        Scheme::Nasri | Scheme::ZhengCai | Scheme::MidEdge => format!("irregular-poly:{n}"),
     }
 }
 

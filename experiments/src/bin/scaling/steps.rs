@@ -10,8 +10,7 @@ use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Mesh, Topology, io};
-use limitlab::schemes::Scheme;
-use limitlab::schemes::{Refinement, sqrt3, unified_sqrt3};
+use limitlab::schemes::{Refinement, Scheme, sqrt3, unified_sqrt3};
 use limitlab_experiments::cli::Printer;
 use limitlab_experiments::report::{Cell, Column, Table};
 

@@ -9,9 +9,8 @@ use limitlab::analysis::splitting::LocalScheme;
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::pia::{TwoStepsBack, passes};
 use limitlab::mesh::validate::Boundary;
-use limitlab::schemes::Refinement;
-use limitlab::schemes::Scheme;
 use limitlab::schemes::loop_scheme::loop_beta;
+use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::{Outcome, Setup, Stop, run_watched};
 
 use super::finding::{Evidence, Finding};

@@ -10,8 +10,7 @@ use limitlab::analysis::spectrum::spectrum;
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
 use limitlab::interpolate::thall::{Inverse, LocalIteration};
 use limitlab::mesh::{Mesh, Topology};
-use limitlab::schemes::Scheme;
-use limitlab::schemes::{Refinement, catmull_clark};
+use limitlab::schemes::{Refinement, Scheme, catmull_clark};
 use limitlab::solvers::{Outcome, Setup, Stop, solve};
 
 use super::finding::{Evidence, Finding};

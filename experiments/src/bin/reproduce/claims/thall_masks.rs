@@ -330,8 +330,14 @@ fn full_step(lab: &Lab) -> Result<Finding> {
 
 fn other_schemes(lab: &Lab) -> Result<Finding> {
     let mut evidence = Vec::new();
-    let bounds = [4.0, 2.5, 8.0 / 3.0, 4.0, 2.0];
-    for (scheme, bound) in Scheme::ALL.into_iter().zip(bounds) {
+    let bounds = [
+        (Scheme::CatmullClark, 4.0),
+        (Scheme::Loop, 2.5),
+        (Scheme::Sqrt3, 8.0 / 3.0),
+        (Scheme::Nasri, 4.0),
+        (Scheme::ZhengCai, 2.0),
+    ];
+    for (scheme, bound) in bounds {
         let subjects = if scheme.needs_triangles() { lab.triangles() } else { lab.polygons() };
         let rows = each(subjects, |subject| {
             let system = subject.system(scheme)?;

@@ -9,8 +9,7 @@ use limitlab::interpolate::thall::{
     AttributeRule, MedialAtom, medial_shifts, normal_deviations, refine_attributes, scaled_distances,
 };
 use limitlab::mesh::{Mesh, Topology};
-use limitlab::schemes::Scheme;
-use limitlab::schemes::{Refinement, catmull_clark};
+use limitlab::schemes::{Refinement, Scheme, catmull_clark};
 use limitlab::solvers::{Setup, Stop, run};
 
 use super::finding::{Evidence, Finding};

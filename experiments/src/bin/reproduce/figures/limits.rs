@@ -3,8 +3,7 @@
 use glam::DVec3;
 
 use limitlab::Result;
-use limitlab::schemes::Refinement;
-use limitlab::schemes::Scheme;
+use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::Setup;
 use limitlab_experiments::report::{Figure, Picture, Points};
 

@@ -6,8 +6,7 @@ use limitlab::Result;
 use limitlab::interpolate::normals::{Rotation, rotate_rings};
 use limitlab::interpolate::thall::normal_deviations;
 use limitlab::mesh::{Faces, Mesh, Topology, builtin};
-use limitlab::schemes::Scheme;
-use limitlab::schemes::{Refinement, catmull_clark};
+use limitlab::schemes::{Refinement, Scheme, catmull_clark};
 use limitlab::solvers::Setup;
 use limitlab_experiments::report::{Colour, Finish, Picture, Points, Vectors, View};
 

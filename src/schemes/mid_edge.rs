@@ -1,0 +1,137 @@
+//! The mid-edge scheme (Peters & Reif 1997, "the simplest subdivision scheme for smoothing polyhedra") on any closed
+//! polygon mesh: the new vertices are the midpoints of the edges, and there is a new face in every old face, and one about
+//! every old vertex.
+//!
+//! The face about a vertex v of valence n has the corners (v + v_j)/2, and each further step joins the midpoints of its
+//! sides: its centroid ½v + ½ mean v_j stays, and the first harmonic of its corners shrinks by cos(π/n).
+
+use glam::DVec3;
+
+use super::refined::{self, set_rows};
+use super::refinement::{Counts, Kind, Refinement, Step};
+use super::scheme::{Definition, PaperNames, SingularSet};
+use super::star::{Tangents, blend_with_neighbors, require_closed, require_room, ring_tangents, stars, twin};
+use crate::Result;
+use crate::mesh::{Faces, Mesh, Topology};
+use crate::pages::large;
+use crate::parallel;
+
+/// h(n) = 1/(2n), d(n) = n, w = 1: A = ½(I + D⁻¹Adj) with the adjacency matrix of the edges and their numbers D.
+///
+/// `xᵀMx = Σ_i n_i x_i² + 2 Σ_ij x_i x_j = Σ_ij (x_i + x_j)²` over the edges, so λ_min(A) ≥ 0, and A is singular exactly
+/// where x_j = −x_i along every edge of a component is possible: on bipartite ones, of any valence. (Every closed mesh of
+/// quads without a handle is one.) On irregular meshes of triangles λ_min(A) is 0.19 to 0.25.
+pub(super) const DEFINITION: Definition = Definition {
+    name: "mid-edge",
+    paper_names: PaperNames::OURS,
+    h: |n| 0.5 / n as f64,
+    vertex_weight: |n| n as f64,
+    edge_weight: 1.0,
+    circulant: None,
+    needs_triangles: false,
+    lambda_min_at: |_, _| 0.0,
+    usual_lambda_min: 0.19,
+    singular: SingularSet::Bipartite { valence: None },
+    // ½ + ¼(cos θ + cos φ).
+    regular_symbol: (0.0, 0.5),
+    refinement: Refinement::MidEdge,
+    first_rule: None,
+};
+
+/// All that defines the refinement.
+pub(super) const STEP: Step = Step {
+    name: "mid-edge",
+    kind: Kind::Dual,
+    needs_triangles: false,
+    refine,
+    refined_topology,
+    counts: |c| Counts { vertices: c.edges(), faces: c.faces + c.vertices, corners: 2 * c.corners },
+    limit_positions,
+    limit_normals,
+};
+
+/// One step.
+///
+/// Vertices: the midpoints of the edges, by their first half-edges. Faces: those of the old faces, whose corner c lies on
+/// the edge of the old corner c, then those of the old vertices, counter-clockwise.
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold or the result is too large for 32-bit
+/// indices.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+///
+/// ```
+/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::schemes::mid_edge;
+/// let cube = builtin::builtin("cube")?;
+/// let topology = Topology::new(&cube.faces, cube.len());
+/// let cuboctahedron = mid_edge::refine(&cube, &topology)?;
+/// assert_eq!((cuboctahedron.len(), cuboctahedron.faces.len()), (12, 6 + 8));
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
+    require_closed(mesh, topology)?;
+    require_room(mesh, 2)?;
+    let (points, old) = (&mesh.positions, mesh.faces.corners());
+    let edges = topology.edge_numbers();
+    let mut positions = large(Vec::with_capacity(topology.edges()));
+    edges.extend(&mut positions, |c| {
+        let [v, w] = [c, twin(topology, c)].map(|c| points[old[c as usize] as usize]);
+        0.5 * v + 0.5 * w
+    });
+    let count = old.len();
+    let mut corners = large(vec![0; 2 * count]);
+    let (of_faces, of_vertices) = corners.split_at_mut(count);
+    let stars = stars(mesh, topology);
+    set_rows(of_faces, |c| [edges.of(c)]);
+    set_rows(of_vertices, |p| [edges.of(stars[p as usize])]);
+    let mut offsets = large(Vec::with_capacity(mesh.faces.len() + mesh.len() + 1));
+    offsets.push(0);
+    parallel::extend(&mut offsets, mesh.faces.len(), |_| |f| mesh.faces.range(f).end as u32);
+    offsets.extend(topology.incidence.offsets()[1..].iter().map(|&end| count as u32 + end));
+    Ok(Mesh::new(positions, Faces::from_parts(offsets, corners)))
+}
+
+/// The topology of `refined`, which is what [`refine`] made of `mesh`: that of [`Topology::new`], by index arithmetic
+/// from the coarse one.
+///
+/// # Panics
+/// If the three do not belong together.
+pub fn refined_topology(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+    refined::of_midpoints(mesh, topology, refined)
+}
+
+/// The limit mask of a vertex of valence `n`: ½ at the vertex, 1/(2n) at each neighbour.
+pub fn limit_mask(n: usize) -> [f64; 2] {
+    [0.5, 0.5 / n as f64]
+}
+
+/// The limit points of all vertices: the centroids of their faces after a step, which all further ones keep.
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold.
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_positions(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+    require_closed(mesh, topology)?;
+    Ok(blend_with_neighbors(mesh, topology, limit_mask))
+}
+
+/// The unit normals of the limit surface at the [`limit_positions`]; zero where [`Tangents::normal`] is. cos(2πj/n) and
+/// sin(2πj/n) on the neighbours are the left eigenvectors of a step of their face, for the pair cos(π/n)e^{±iπ/n}.
+///
+/// At valence 3 its square ¼ is an eigenvalue of the surroundings too: they approach the tangent plane like 1/m with the
+/// number m of steps, and the face itself lies in it.
+///
+/// # Errors
+/// As [`limit_positions`].
+///
+/// # Panics
+/// If `topology` is not that of `mesh`.
+pub fn limit_normals(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
+    require_closed(mesh, topology)?;
+    Ok(ring_tangents(mesh, topology).iter().map(Tangents::normal).collect())
+}
