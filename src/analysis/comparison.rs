@@ -11,7 +11,9 @@ use super::sweep::rounding_floor;
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::diagonal;
-use crate::solvers::{Method, Setup, Solution, Stop, run};
+use crate::solvers::anderson::WINDOW;
+use crate::solvers::jacobi::THALL_OMEGA;
+use crate::solvers::{Method, Setup, Solution, Stop, System, run};
 
 /// A method with its parameter in words: a line of a comparison.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,8 +56,8 @@ const SAFETY: f64 = 0.98;
 /// the interval grow.
 const EXCESS: f64 = 1e-6;
 
-/// The set-up that is meant by a method's name alone: Jacobi and W-PIA at their best ω, Chebyshev with the proven
-/// interval where that is positive, else with an estimated one. `spectrum` is asked only where it is needed.
+/// The set-up that is meant by a method's name alone: Jacobi and W-PIA at their best ω, Anderson's acceleration of PIA, the
+/// heavy ball with an estimated interval, Chebyshev with the proven one where that is positive, else with an estimated one. `spectrum` is asked only where it is needed.
 ///
 /// # Errors
 /// Those of `spectrum`.
@@ -76,10 +78,13 @@ pub fn standard_setup<'a>(
         Method::Ssor => Setup::Ssor { omega: SSOR_OMEGA, order },
         Method::Pia => Setup::Pia { omega: 1.0 },
         Method::WPia => Setup::Pia { omega: spectrum()?.a.optimal_omega() },
+        // ω = 1 for a scheme's matrix.
+        Method::Anderson => Setup::AndersonPia { omega: 1.0 / system.lambda_max(), window: WINDOW },
+        Method::HeavyBall => Setup::HeavyBall { spectrum: estimated(system, &spectrum()?) },
         Method::Chebyshev if system.bounds.lambda_min > 0.0 => {
             Setup::Chebyshev { spectrum: (system.bounds.lambda_min, system.bounds.lambda_max) }
         }
-        Method::Chebyshev => estimated_chebyshev(system, &spectrum()?),
+        Method::Chebyshev => Setup::Chebyshev { spectrum: estimated(system, &spectrum()?) },
         Method::Cg => Setup::Cg,
         Method::PcgJacobi => Setup::PcgJacobi,
         Method::PcgSsor => Setup::PcgSsor { omega: SSOR_OMEGA },
@@ -87,10 +92,11 @@ pub fn standard_setup<'a>(
     })
 }
 
-fn estimated_chebyshev(system: &LimitSystem, spectrum: &Spectrum) -> Setup<'static> {
+/// The interval of the heavy ball, and of Chebyshev, by estimates.
+fn estimated(system: &LimitSystem, spectrum: &Spectrum) -> (f64, f64) {
     let highest = system.bounds.lambda_max.min((1.0 + EXCESS) * spectrum.a.max);
     let lowest = if spectrum.a.min < VANISHING * highest { LOWEST * highest } else { SAFETY * spectrum.a.min };
-    Setup::Chebyshev { spectrum: (lowest, highest) }
+    (lowest, highest)
 }
 
 /// The method that `auto` stands for: Chebyshev with proven bounds where the one for λ_min is positive (no inner
@@ -120,11 +126,12 @@ pub fn entries<'a>(
             Method::Lu | Method::Cholesky | Method::Ldlt => "faer",
             Method::Jacobi | Method::WPia => "optimal",
             Method::Chebyshev if proven => "proven",
-            Method::Chebyshev => "estimated",
+            Method::HeavyBall | Method::Chebyshev => "estimated",
+            Method::Anderson => "of pia",
             Method::Cg => "preconditioned by H",
             Method::PcgJacobi => "diag(M)",
             Method::PcgIc0 => "no fill",
-            _ => "",
+            Method::Thall | Method::GaussSeidel | Method::Sor | Method::Ssor | Method::Pia | Method::PcgSsor => "",
         };
         let setup = standard_setup(system, method, order, &|| Ok(*spectrum))?;
         lines.push(entry(method, variant, setup));
@@ -135,8 +142,14 @@ pub fn entries<'a>(
                 lines.push(entry(method, "nalgebra-sparse", Setup::SecondCholesky));
             }
             Method::Cg => lines.push(entry(method, "on M itself", Setup::PlainCg)),
+            Method::Anderson => {
+                let of_jacobi = |omega| Setup::AndersonJacobi { omega, window: WINDOW };
+                lines.push(entry(method, "of thall", of_jacobi(THALL_OMEGA)));
+                lines.push(entry(method, "of jacobi", of_jacobi(spectrum.jacobi.optimal_omega())));
+            }
             Method::Chebyshev if proven => {
-                lines.push(entry(method, "estimated", estimated_chebyshev(system, spectrum)));
+                let setup = Setup::Chebyshev { spectrum: estimated(system, spectrum) };
+                lines.push(entry(method, "estimated", setup));
             }
             _ => {}
         }
@@ -155,8 +168,20 @@ fn parameter(variant: &str, setup: Setup, order_name: &str) -> String {
         Setup::Sor { omega, .. } | Setup::Ssor { omega, .. } => {
             vec![format!("ω={}", four_digits(omega)), order]
         }
-        Setup::Chebyshev { spectrum: (min, max) } => vec![format!("λ ∈ [{}, {}]", four_digits(min), four_digits(max))],
-        _ => Vec::new(),
+        Setup::HeavyBall { spectrum: (min, max) } | Setup::Chebyshev { spectrum: (min, max) } => {
+            vec![format!("λ ∈ [{}, {}]", four_digits(min), four_digits(max))]
+        }
+        Setup::AndersonPia { omega, window } | Setup::AndersonJacobi { omega, window } => {
+            vec![format!("m={window}"), format!("ω={}", four_digits(omega))]
+        }
+        Setup::Lu
+        | Setup::Cholesky
+        | Setup::SecondCholesky
+        | Setup::Ldlt
+        | Setup::Cg
+        | Setup::PlainCg
+        | Setup::PcgJacobi
+        | Setup::PcgIc0 => Vec::new(),
     };
     if !variant.is_empty() {
         words.push(variant.into());

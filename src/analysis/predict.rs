@@ -11,9 +11,9 @@ use crate::solvers::gauss_seidel::sweep;
 use crate::solvers::ssor::symmetric_sweep;
 
 /// The predicted factor per iteration of a method on a system with the given spectra. For relaxation it is the
-/// spectral radius of the error matrix; for Chebyshev and conjugate gradients (√κ−1)/(√κ+1), which conjugate
-/// gradients may beat. `None` for direct methods, and where no prediction is made (plain and incomplete-Cholesky
-/// conjugate gradients).
+/// spectral radius of the error matrix; for the heavy ball, Chebyshev and conjugate gradients (√κ−1)/(√κ+1), which
+/// conjugate gradients may beat. `None` for direct methods, and where no prediction is made (Anderson acceleration, plain
+/// and incomplete-Cholesky conjugate gradients).
 ///
 /// # Errors
 /// If the spectral radius of a sweep cannot be computed.
@@ -21,6 +21,8 @@ pub fn predicted_rate(system: &LimitSystem, spectrum: &Spectrum, setup: Setup) -
     let zero = || vec![DVec3::ZERO; system.len()];
     Ok(match setup {
         Setup::Lu | Setup::Cholesky | Setup::SecondCholesky | Setup::Ldlt | Setup::PlainCg | Setup::PcgIc0 => None,
+        // Between the relaxation's own rate and that of full GMRES.
+        Setup::AndersonPia { .. } | Setup::AndersonJacobi { .. } => None,
         Setup::Jacobi { omega } => Some(spectrum.jacobi.radius(omega)),
         Setup::Pia { omega } => Some(spectrum.a.radius(omega)),
         Setup::Sor { omega, order } => {
@@ -44,7 +46,9 @@ pub fn predicted_rate(system: &LimitSystem, spectrum: &Spectrum, setup: Setup) -
                 symmetric_sweep(system, &points, omega, order, x);
             })?)
         }
-        Setup::Chebyshev { spectrum: (min, max) } => Some(Extremes { min, max }.krylov_rate()),
+        Setup::HeavyBall { spectrum: (min, max) } | Setup::Chebyshev { spectrum: (min, max) } => {
+            Some(Extremes { min, max }.krylov_rate())
+        }
         Setup::Cg => Some(spectrum.a.krylov_rate()),
         Setup::PcgJacobi => Some(spectrum.jacobi.krylov_rate()),
         Setup::PcgSsor { omega } => {

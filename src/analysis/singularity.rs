@@ -135,7 +135,9 @@ impl Singularity {
         let soluble = match method {
             Method::Lu | Method::Cholesky | Method::Ldlt => return Prediction::Refuses,
             // Updates lie in the range of A = H M, which is H^-1-orthogonal to the null space.
-            Method::Pia | Method::WPia | Method::Chebyshev | Method::Cg => Prediction::MinimumNorm,
+            Method::Pia | Method::WPia | Method::Anderson | Method::HeavyBall | Method::Chebyshev | Method::Cg => {
+                Prediction::MinimumNorm
+            }
             Method::Jacobi
             | Method::Thall
             | Method::GaussSeidel

@@ -12,13 +12,8 @@ use super::system::{Rows, System};
 
 /// The Chebyshev iteration at work.
 pub struct Chebyshev<'a, S> {
-    system: &'a S,
-    points: &'a [DVec3],
+    iterates: ThreeTerm<'a, S>,
     recurrence: Recurrence,
-    current: Vec<DVec3>,
-    /// The iterate before the current one; after [`Iterate::errors`], the next.
-    other: Vec<DVec3>,
-    rows: Rows,
 }
 
 impl<'a, S: System> Chebyshev<'a, S> {
@@ -27,20 +22,44 @@ impl<'a, S: System> Chebyshev<'a, S> {
     /// # Panics
     /// Unless 0 < λ_min ≤ λ_max.
     pub fn new(system: &'a S, points: &'a [DVec3], spectrum: (f64, f64)) -> Self {
-        Chebyshev {
-            system,
-            points,
-            recurrence: Recurrence::new(spectrum),
-            current: points.to_vec(),
-            other: points.to_vec(),
-            rows: Rows::new(points.len()),
-        }
+        Chebyshev { iterates: ThreeTerm::new(system, points), recurrence: Recurrence::new(spectrum) }
     }
 }
 
 impl<S: System> Iterate for Chebyshev<'_, S> {
     fn errors(&mut self) -> Errors {
-        let (gamma, tau) = self.recurrence.coefficients();
+        self.iterates.prepare(self.recurrence.coefficients())
+    }
+
+    fn advance(&mut self) -> Result<(), Failure> {
+        self.recurrence.step();
+        self.iterates.accept();
+        Ok(())
+    }
+
+    fn points(&self) -> &[DVec3] {
+        &self.iterates.current
+    }
+}
+
+/// `V_{k+1} = V_k + γ (V_k − V_{k−1}) + τ (P − A V_k)`: the residual, its norms and the next iterate in one pass.
+pub(super) struct ThreeTerm<'a, S> {
+    system: &'a S,
+    points: &'a [DVec3],
+    pub(super) current: Vec<DVec3>,
+    /// The iterate before the current one, which is itself at the start; then the next.
+    other: Vec<DVec3>,
+    rows: Rows,
+}
+
+impl<'a, S: System> ThreeTerm<'a, S> {
+    pub(super) fn new(system: &'a S, points: &'a [DVec3]) -> Self {
+        let (current, other) = (points.to_vec(), points.to_vec());
+        ThreeTerm { system, points, current, other, rows: Rows::new(points.len()) }
+    }
+
+    /// The errors of the current iterate; the next one is written over the one before it.
+    pub(super) fn prepare(&mut self, (gamma, tau): (f64, f64)) -> Errors {
         let current = &self.current;
         self.rows
             .residual(self.system, self.points, current, &mut self.other, |i, e, other, _| {
@@ -50,14 +69,8 @@ impl<S: System> Iterate for Chebyshev<'_, S> {
             .errors
     }
 
-    fn advance(&mut self) -> Result<(), Failure> {
-        self.recurrence.step();
+    pub(super) fn accept(&mut self) {
         std::mem::swap(&mut self.current, &mut self.other);
-        Ok(())
-    }
-
-    fn points(&self) -> &[DVec3] {
-        &self.current
     }
 }
 

@@ -7,10 +7,12 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::anderson::Anderson;
 use super::chebyshev::Chebyshev;
 use super::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use super::direct::{Cholesky, Direct, Factorization, Kind, SecondOpinion, SparseLu};
 use super::gauss_seidel::Sor;
+use super::heavy_ball::HeavyBall;
 use super::incomplete_cholesky::IncompleteCholesky;
 use super::iteration::{Errors, Failure, Iterate, Report, Step, Stop, solve};
 use super::jacobi::{Jacobi, THALL_OMEGA};
@@ -43,6 +45,10 @@ pub enum Method {
     Pia,
     /// PIA with a weight.
     WPia,
+    /// Anderson acceleration of PIA, of Thall's masks or of Jacobi.
+    Anderson,
+    /// PIA with momentum.
+    HeavyBall,
     /// Chebyshev iteration on A.
     Chebyshev,
     /// Conjugate gradients (CG-PIA), preconditioned by H: they see the spectrum of A.
@@ -56,7 +62,7 @@ pub enum Method {
 }
 
 impl Method {
-    pub const ALL: [Method; 15] = [
+    pub const ALL: [Method; 17] = [
         Method::Lu,
         Method::Cholesky,
         Method::Ldlt,
@@ -67,6 +73,8 @@ impl Method {
         Method::Ssor,
         Method::Pia,
         Method::WPia,
+        Method::Anderson,
+        Method::HeavyBall,
         Method::Chebyshev,
         Method::Cg,
         Method::PcgJacobi,
@@ -86,6 +94,8 @@ impl Method {
             Method::Ssor => "ssor",
             Method::Pia => "pia",
             Method::WPia => "w-pia",
+            Method::Anderson => "anderson",
+            Method::HeavyBall => "heavy-ball",
             Method::Chebyshev => "chebyshev",
             Method::Cg => "cg",
             Method::PcgJacobi => "pcg-jacobi",
@@ -144,6 +154,19 @@ pub enum Setup<'a> {
     },
     Pia {
         omega: f64,
+    },
+    /// PIA accelerated with the last `window` differences.
+    AndersonPia {
+        omega: f64,
+        window: usize,
+    },
+    /// Jacobi accelerated, or Thall's masks.
+    AndersonJacobi {
+        omega: f64,
+        window: usize,
+    },
+    HeavyBall {
+        spectrum: (f64, f64),
     },
     Chebyshev {
         spectrum: (f64, f64),
@@ -248,6 +271,9 @@ fn prepare<'a>(system: &'a LimitSystem, points: &'a [DVec3], setup: Setup<'a>) -
         Setup::Sor { omega, order } => Box::new(Sor::new(system, points, omega, order)),
         Setup::Ssor { omega, order } => Box::new(Ssor::new(system, points, omega, order)),
         Setup::Pia { omega } => Box::new(Pia::new(system, points, omega)),
+        Setup::AndersonPia { omega, window } => Box::new(Anderson::of_pia(system, points, omega, window)),
+        Setup::AndersonJacobi { omega, window } => Box::new(Anderson::of_jacobi(system, points, omega, window)),
+        Setup::HeavyBall { spectrum } => Box::new(HeavyBall::new(system, points, spectrum)),
         Setup::Chebyshev { spectrum } => Box::new(Chebyshev::new(system, points, spectrum)),
         Setup::Cg => cg(system, points, Preconditioner::weights(system)),
         Setup::PlainCg => cg(system, points, Preconditioner::identity(system)),

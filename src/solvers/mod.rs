@@ -1,11 +1,13 @@
 //! Methods for `A V = P`, one file each, behind one interface: a [`System`] in, control points and a
 //! [`Report`] with the whole history out. This room knows no meshes and no schemes.
 
+pub mod anderson;
 pub mod chebyshev;
 pub mod coloured;
 pub mod conjugate_gradient;
 pub mod direct;
 pub mod gauss_seidel;
+pub mod heavy_ball;
 pub mod incomplete_cholesky;
 pub mod iteration;
 pub mod jacobi;

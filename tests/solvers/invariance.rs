@@ -12,7 +12,7 @@ use crate::common::tol;
 
 fn is_krylov(setup: Setup) -> bool {
     use Setup::*;
-    matches!(setup, Cg | PlainCg | PcgJacobi | PcgSsor { .. } | PcgIc0)
+    matches!(setup, Cg | PlainCg | PcgJacobi | PcgSsor { .. } | PcgIc0 | AndersonPia { .. } | AndersonJacobi { .. })
 }
 
 const FEW: Stop = Stop { tolerance: 0.0, max_iterations: 12 };

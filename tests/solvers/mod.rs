@@ -1,6 +1,7 @@
 //! The methods held against manufactured solutions, direct solves, loops made by hand with dense matrices, closed-form
 //! rates; and what they say of singular systems and other impossible tasks.
 
+mod accelerated;
 mod foreign;
 mod handmade;
 mod invariance;

@@ -26,7 +26,7 @@ const STAND_INS: [&str; 9] = [
 /// Meshes with convergence plots, one for every scheme they suit.
 const PLOTTED: [&str; 4] = ["irregular-quad:1000", "irregular-tri:1000", "psb_m104_horse_233v", "spot_2930v_quad"];
 /// The lines of a comparison that have a column.
-const COLUMNS: [(Method, &str); 18] = [
+const COLUMNS: [(Method, &str); 22] = [
     (Method::Lu, ""),
     (Method::Cholesky, "faer"),
     (Method::Cholesky, "nalgebra-sparse"),
@@ -38,6 +38,10 @@ const COLUMNS: [(Method, &str); 18] = [
     (Method::Ssor, ""),
     (Method::Pia, ""),
     (Method::WPia, ""),
+    (Method::Anderson, "of pia"),
+    (Method::Anderson, "of thall"),
+    (Method::Anderson, "of jacobi"),
+    (Method::HeavyBall, ""),
     (Method::Chebyshev, "proven"),
     (Method::Chebyshev, "estimated"),
     (Method::Cg, "preconditioned by H"),
@@ -97,7 +101,7 @@ fn empty_tables() -> Vec<Table> {
 /// The method, with the variant where the method has several.
 fn column_name(method: Method, variant: &str) -> String {
     match method {
-        Method::Cholesky | Method::Chebyshev | Method::Cg => format!("{method} {variant}"),
+        Method::Cholesky | Method::Anderson | Method::Chebyshev | Method::Cg => format!("{method} {variant}"),
         _ => method.name().into(),
     }
 }
