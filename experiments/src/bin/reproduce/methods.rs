@@ -4,6 +4,7 @@ use limitlab::Result;
 use limitlab::analysis::comparison::{SOR_OMEGA, SSOR_OMEGA, entries};
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::schemes::Scheme;
+use limitlab::solvers::anderson::WINDOW;
 use limitlab::solvers::{Method, Stop, run as solve};
 use limitlab_experiments::report::{Cell, Column, Figure, LinePlot, Scale, Series, Table};
 
@@ -90,7 +91,7 @@ fn empty_tables() -> Vec<Table> {
                 "Updates of all vertices until max_i ‖p_i − (A v)_i‖ ≤ {tolerance:e} of the bounding box's diagonal; \
                  start V = P, file order for in-place sweeps, at most {LIMIT} iterations. A direct method makes one: \
                  the solve. jacobi and w-pia run at their best ω, sor at ω = {SOR_OMEGA}, ssor and pcg-ssor at \
-                 {SSOR_OMEGA}. Where the tolerance was not reached, the cell says how the run ended. Meshes of at \
+                 {SSOR_OMEGA}; anderson keeps {WINDOW} differences, heavy-ball has an estimated interval. Where the tolerance was not reached, the cell says how the run ended. Meshes of at \
                  most {LARGEST} vertices."
             ));
             table
