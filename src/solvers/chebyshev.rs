@@ -7,12 +7,13 @@
 
 use glam::DVec3;
 
-use super::iteration::{Errors, Failure, Iterate};
+use super::iteration::{Errors, Failure, Iterate, Start};
 use super::system::{Rows, System};
 
 /// The Chebyshev iteration at work.
 pub struct Chebyshev<'a, S> {
     iterates: ThreeTerm<'a, S>,
+    spectrum: (f64, f64),
     recurrence: Recurrence,
 }
 
@@ -22,7 +23,7 @@ impl<'a, S: System> Chebyshev<'a, S> {
     /// # Panics
     /// Unless 0 < λ_min ≤ λ_max.
     pub fn new(system: &'a S, points: &'a [DVec3], spectrum: (f64, f64)) -> Self {
-        Chebyshev { iterates: ThreeTerm::new(system, points), recurrence: Recurrence::new(spectrum) }
+        Chebyshev { iterates: ThreeTerm::new(system, points), spectrum, recurrence: Recurrence::new(spectrum) }
     }
 }
 
@@ -39,6 +40,13 @@ impl<S: System> Iterate for Chebyshev<'_, S> {
 
     fn points(&self) -> &[DVec3] {
         &self.iterates.current
+    }
+}
+
+impl<S: System> Start for Chebyshev<'_, S> {
+    fn start_at(&mut self, at: &[DVec3]) {
+        self.recurrence = Recurrence::new(self.spectrum);
+        self.iterates.start_at(at);
     }
 }
 
@@ -67,6 +75,11 @@ impl<'a, S: System> ThreeTerm<'a, S> {
                 *other = v + gamma * (v - *other) + tau * e;
             })
             .errors
+    }
+
+    pub(super) fn start_at(&mut self, at: &[DVec3]) {
+        self.current.copy_from_slice(at);
+        self.other.copy_from_slice(at);
     }
 
     pub(super) fn accept(&mut self) {

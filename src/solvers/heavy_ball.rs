@@ -10,7 +10,7 @@
 use glam::DVec3;
 
 use super::chebyshev::ThreeTerm;
-use super::iteration::{Errors, Failure, Iterate};
+use super::iteration::{Errors, Failure, Iterate, Start};
 use super::system::System;
 
 /// The heavy-ball method at work.
@@ -44,9 +44,14 @@ impl<'a, S: System> HeavyBall<'a, S> {
     /// Unless 0 < λ_min ≤ λ_max.
     pub fn new(system: &'a S, points: &'a [DVec3], spectrum: (f64, f64)) -> Self {
         let (beta, alpha) = constants(spectrum);
-        let first = (0.0, alpha / (1.0 + beta));
-        HeavyBall { iterates: ThreeTerm::new(system, points), coming: first, later: (beta, alpha) }
+        let coming = first(beta, alpha);
+        HeavyBall { iterates: ThreeTerm::new(system, points), coming, later: (beta, alpha) }
     }
+}
+
+/// The coefficients of the first step.
+fn first(beta: f64, alpha: f64) -> (f64, f64) {
+    (0.0, alpha / (1.0 + beta))
 }
 
 /// β and α for eigenvalues within an interval.
@@ -70,5 +75,12 @@ impl<S: System> Iterate for HeavyBall<'_, S> {
 
     fn points(&self) -> &[DVec3] {
         &self.iterates.current
+    }
+}
+
+impl<S: System> Start for HeavyBall<'_, S> {
+    fn start_at(&mut self, at: &[DVec3]) {
+        self.coming = first(self.later.0, self.later.1);
+        self.iterates.start_at(at);
     }
 }

@@ -147,6 +147,15 @@ pub trait Iterate {
     fn points(&self) -> &[DVec3];
 }
 
+/// A method that can begin elsewhere than at V = P.
+pub trait Start: Iterate {
+    /// Goes back to the first iterate, which becomes `at`. To be called before the first errors are asked for.
+    ///
+    /// # Panics
+    /// If there is not one point a vertex.
+    fn start_at(&mut self, at: &[DVec3]);
+}
+
 /// An error this many times the smallest one so far is divergence, if it also rose [`RISES`] times in a row.
 /// Tuned: errors of convergent runs of all methods here rose less than 100-fold.
 pub const GROWTH: f64 = 1e3;
@@ -164,8 +173,24 @@ pub const PROGRESS: f64 = 1e-8;
 /// Runs `method` until a stopping rule applies. The start is the method's current iterate. The watch sees every
 /// iterate and may stop the run.
 pub fn solve(method: &mut dyn Iterate, stop: &Stop, watch: &mut dyn FnMut(&Step) -> ControlFlow<()>) -> Report {
+    let size = largest(method.points());
+    solve_in_scale(method, size, stop, watch)
+}
+
+/// The largest coordinate.
+pub(super) fn largest(points: &[DVec3]) -> f64 {
+    points.iter().fold(0.0f64, |m, p| m.max(p.abs().max_element()))
+}
+
+/// As [`solve`], for data whose largest coordinate is `size`.
+pub(super) fn solve_in_scale(
+    method: &mut dyn Iterate,
+    size: f64,
+    stop: &Stop,
+    watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
+) -> Report {
     let mut history: Vec<Errors> = Vec::new();
-    let mut rules = Rules::new(method.points());
+    let mut rules = Rules { rounding: f64::EPSILON * size, ..Rules::default() };
     loop {
         let mut errors = method.errors();
         let iteration = history.len();
@@ -210,12 +235,6 @@ struct Rules {
 }
 
 impl Rules {
-    /// For a run that starts at its data.
-    fn new(points: &[DVec3]) -> Self {
-        let largest = points.iter().fold(0.0f64, |m, p| m.max(p.abs().max_element()));
-        Rules { rounding: f64::EPSILON * largest, ..Rules::default() }
-    }
-
     fn judge(&mut self, error: f64) -> Option<Outcome> {
         if !error.is_finite() {
             return Some(Outcome::Diverged);

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::iteration::{Errors, Failure, Iterate};
+use super::iteration::{Errors, Failure, Iterate, Start};
 use super::pia::Relaxation;
 use super::system::System;
 
@@ -41,5 +41,11 @@ impl<S: System> Iterate for Jacobi<'_, S> {
 
     fn points(&self) -> &[DVec3] {
         &self.relaxation.current
+    }
+}
+
+impl<S: System> Start for Jacobi<'_, S> {
+    fn start_at(&mut self, at: &[DVec3]) {
+        self.relaxation.current.copy_from_slice(at);
     }
 }

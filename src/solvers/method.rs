@@ -14,7 +14,7 @@ use super::direct::{Cholesky, Direct, Factorization, Kind, SecondOpinion, Sparse
 use super::gauss_seidel::Sor;
 use super::heavy_ball::HeavyBall;
 use super::incomplete_cholesky::IncompleteCholesky;
-use super::iteration::{Errors, Failure, Iterate, Report, Step, Stop, solve};
+use super::iteration::{Errors, Failure, Report, Start, Step, Stop, largest, solve_in_scale};
 use super::jacobi::{Jacobi, THALL_OMEGA};
 use super::pia::Pia;
 use super::ssor::Ssor;
@@ -240,29 +240,71 @@ pub fn run_watched(
     stop: &Stop,
     watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
 ) -> Solution {
+    run_from(system, points, points, setup, stop, watch)
+}
+
+/// As [`run_watched`], from V = `start` instead of V = P: that of a mesh that has moved a little, or of a solution to be
+/// made better. A direct method solves for the difference.
+///
+/// # Panics
+/// As [`run`], and if there is not one point of the start a vertex.
+///
+/// ```
+/// use std::ops::ControlFlow;
+///
+/// use limitlab::assemble::LimitSystem;
+/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::schemes::Scheme;
+/// use limitlab::solvers::{Setup, Stop, run, run_from};
+///
+/// let mesh = builtin::builtin("icosphere:2")?;
+/// let topology = Topology::new(&mesh.faces, mesh.len());
+/// let system = LimitSystem::new(&mesh, &topology, Scheme::Loop)?;
+/// let stop = Stop { tolerance: 1e-9, max_iterations: 100 };
+/// let first = run(&system, &mesh.positions, Setup::Cg, &stop);
+/// let mut points = mesh.positions.clone();
+/// points[7] *= 1.001;
+/// let watch = &mut |_: &_| ControlFlow::Continue(());
+/// let again = run_from(&system, &points, &first.points, Setup::Cg, &stop, watch);
+/// assert!(again.report.iterations < first.report.iterations);
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn run_from(
+    system: &LimitSystem,
+    points: &[DVec3],
+    start: &[DVec3],
+    setup: Setup,
+    stop: &Stop,
+    watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
+) -> Solution {
     assert_eq!(points.len(), system.len(), "one point a vertex");
-    let start = Instant::now();
+    assert_eq!(start.len(), system.len(), "one point of the start a vertex");
+    let size = largest(points).max(largest(start));
+    let begin = Instant::now();
     let prepared = prepare(system, points, setup);
-    let setup_seconds = start.elapsed().as_secs_f64();
+    let setup_seconds = begin.elapsed().as_secs_f64();
     let (mut method, fill) = match prepared {
         Ok(prepared) => prepared,
-        Err(failure) => return not_set_up(system, points, failure, setup_seconds),
+        Err(failure) => return not_set_up(system, (points, start), failure, setup_seconds),
     };
-    let start = Instant::now();
-    let report = solve(method.as_mut(), stop, watch);
+    let begin = Instant::now();
+    if !std::ptr::eq(points, start) {
+        method.start_at(start);
+    }
+    let report = solve_in_scale(method.as_mut(), size, stop, watch);
     Solution {
         points: method.points().to_vec(),
         report,
         setup_seconds,
-        solve_seconds: start.elapsed().as_secs_f64(),
+        solve_seconds: begin.elapsed().as_secs_f64(),
         fill,
     }
 }
 
-type Prepared<'a> = (Box<dyn Iterate + 'a>, Option<usize>);
+type Prepared<'a> = (Box<dyn Start + 'a>, Option<usize>);
 
 fn prepare<'a>(system: &'a LimitSystem, points: &'a [DVec3], setup: Setup<'a>) -> Result<Prepared<'a>, Failure> {
-    let method: Box<dyn Iterate + 'a> = match setup {
+    let method: Box<dyn Start + 'a> = match setup {
         Setup::Lu => return direct(system, points, SparseLu::new(system)?),
         Setup::Cholesky => return direct(system, points, Cholesky::new(&system.m, Kind::Llt)?),
         Setup::Ldlt => return direct(system, points, Cholesky::new(&system.m, Kind::Ldlt)?),
@@ -287,7 +329,7 @@ fn prepare<'a>(system: &'a LimitSystem, points: &'a [DVec3], setup: Setup<'a>) -
     Ok((method, None))
 }
 
-fn cg<'a>(system: &'a LimitSystem, points: &'a [DVec3], preconditioner: Preconditioner) -> Box<dyn Iterate + 'a> {
+fn cg<'a>(system: &'a LimitSystem, points: &'a [DVec3], preconditioner: Preconditioner) -> Box<dyn Start + 'a> {
     Box::new(ConjugateGradient::new(system, points, preconditioner))
 }
 
@@ -301,10 +343,15 @@ fn direct<'a, F: Factorization + 'a>(
     Ok((Box::new(method), fill))
 }
 
-fn not_set_up(system: &LimitSystem, points: &[DVec3], failure: Failure, setup_seconds: f64) -> Solution {
-    let errors: Errors = Rows::new(points.len()).errors(system, points, points);
+fn not_set_up(
+    system: &LimitSystem,
+    (points, start): (&[DVec3], &[DVec3]),
+    failure: Failure,
+    setup_seconds: f64,
+) -> Solution {
+    let errors: Errors = Rows::new(points.len()).errors(system, points, start);
     Solution {
-        points: points.to_vec(),
+        points: start.to_vec(),
         report: Report { outcome: failure.outcome, iterations: 0, history: vec![errors], detail: Some(failure.detail) },
         setup_seconds,
         solve_seconds: 0.0,

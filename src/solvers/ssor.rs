@@ -6,7 +6,7 @@
 use glam::DVec3;
 
 use super::gauss_seidel::sweep;
-use super::iteration::{Errors, Failure, Iterate};
+use super::iteration::{Errors, Failure, Iterate, Start};
 use super::system::{Rows, System};
 
 /// Symmetric SOR at work.
@@ -41,6 +41,12 @@ impl<S: System> Iterate for Ssor<'_, S> {
 
     fn points(&self) -> &[DVec3] {
         &self.current
+    }
+}
+
+impl<S: System> Start for Ssor<'_, S> {
+    fn start_at(&mut self, at: &[DVec3]) {
+        self.current.copy_from_slice(at);
     }
 }
 

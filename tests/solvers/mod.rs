@@ -11,3 +11,4 @@ mod rates;
 mod setups;
 mod singular;
 mod solutions;
+mod starts;

@@ -13,7 +13,7 @@ use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::iteration::{Errors, Failure, Iterate, Outcome};
+use super::iteration::{Errors, Failure, Iterate, Outcome, Start};
 use super::system::{Rows, System};
 use crate::memory::require;
 
@@ -113,6 +113,12 @@ impl<S: System, F: Factorization> Iterate for Direct<'_, S, F> {
 
     fn points(&self) -> &[DVec3] {
         &self.current
+    }
+}
+
+impl<S: System, F: Factorization> Start for Direct<'_, S, F> {
+    fn start_at(&mut self, at: &[DVec3]) {
+        self.current.copy_from_slice(at);
     }
 }
 
