@@ -14,12 +14,11 @@ use super::direct::{Cholesky, Direct, Factorization, Kind, SecondOpinion, Sparse
 use super::gauss_seidel::Sor;
 use super::heavy_ball::HeavyBall;
 use super::incomplete_cholesky::IncompleteCholesky;
-use super::iteration::{Errors, Failure, Report, Start, Step, Stop, largest, solve_in_scale};
+use super::iteration::{Errors, Failure, Outcome, Report, Start, Step, Stop, largest, solve_in_scale};
 use super::jacobi::{Jacobi, THALL_OMEGA};
 use super::pia::Pia;
 use super::ssor::Ssor;
-use super::system::Rows;
-use crate::assemble::LimitSystem;
+use super::system::{Rows, System};
 use crate::error::Error;
 
 /// A method, without its parameters.
@@ -201,8 +200,8 @@ pub struct Solution {
     pub fill: Option<usize>,
 }
 
-/// Solves `A V = P` from V = P. A set-up that fails (a singular matrix, a breakdown) is an outcome with the start
-/// as its history, and V = P.
+/// Solves `A V = P` from V = P, on a stored matrix or without one. A set-up that fails (a singular matrix, a breakdown, a
+/// factorization of a matrix that is not [stored](System::stored)) is an outcome with the start as its history, and V = P.
 ///
 /// # Panics
 /// If there is not one point a vertex, or an order names a vertex that the system lacks.
@@ -225,7 +224,7 @@ pub struct Solution {
 /// assert!(v.length() > mesh.positions[0].length());
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn run(system: &LimitSystem, points: &[DVec3], setup: Setup, stop: &Stop) -> Solution {
+pub fn run<S: System>(system: &S, points: &[DVec3], setup: Setup, stop: &Stop) -> Solution {
     run_watched(system, points, setup, stop, &mut |_| ControlFlow::Continue(()))
 }
 
@@ -233,8 +232,8 @@ pub fn run(system: &LimitSystem, points: &[DVec3], setup: Setup, stop: &Stop) ->
 ///
 /// # Panics
 /// As [`run`].
-pub fn run_watched(
-    system: &LimitSystem,
+pub fn run_watched<S: System>(
+    system: &S,
     points: &[DVec3],
     setup: Setup,
     stop: &Stop,
@@ -269,8 +268,8 @@ pub fn run_watched(
 /// assert!(again.report.iterations < first.report.iterations);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn run_from(
-    system: &LimitSystem,
+pub fn run_from<S: System>(
+    system: &S,
     points: &[DVec3],
     start: &[DVec3],
     setup: Setup,
@@ -303,12 +302,13 @@ pub fn run_from(
 
 type Prepared<'a> = (Box<dyn Start + 'a>, Option<usize>);
 
-fn prepare<'a>(system: &'a LimitSystem, points: &'a [DVec3], setup: Setup<'a>) -> Result<Prepared<'a>, Failure> {
+fn prepare<'a, S: System>(system: &'a S, points: &'a [DVec3], setup: Setup<'a>) -> Result<Prepared<'a>, Failure> {
+    let stored = || system.stored().ok_or_else(|| without_entries(setup));
     let method: Box<dyn Start + 'a> = match setup {
-        Setup::Lu => return direct(system, points, SparseLu::new(system)?),
-        Setup::Cholesky => return direct(system, points, Cholesky::new(&system.m, Kind::Llt)?),
-        Setup::Ldlt => return direct(system, points, Cholesky::new(&system.m, Kind::Ldlt)?),
-        Setup::SecondCholesky => return direct(system, points, SecondOpinion::new(&system.m)?),
+        Setup::Lu => return direct(system, points, SparseLu::new(stored()?)?),
+        Setup::Cholesky => return direct(system, points, Cholesky::new(&stored()?.m, Kind::Llt)?),
+        Setup::Ldlt => return direct(system, points, Cholesky::new(&stored()?.m, Kind::Ldlt)?),
+        Setup::SecondCholesky => return direct(system, points, SecondOpinion::new(&stored()?.m)?),
         Setup::Jacobi { omega } => Box::new(Jacobi::new(system, points, omega)),
         Setup::Sor { omega, order } => Box::new(Sor::new(system, points, omega, order)),
         Setup::Ssor { omega, order } => Box::new(Ssor::new(system, points, omega, order)),
@@ -322,19 +322,27 @@ fn prepare<'a>(system: &'a LimitSystem, points: &'a [DVec3], setup: Setup<'a>) -
         Setup::PcgJacobi => cg(system, points, Preconditioner::jacobi(system)),
         Setup::PcgSsor { omega } => cg(system, points, Preconditioner::Ssor { omega }),
         Setup::PcgIc0 => {
-            let factor = IncompleteCholesky::new(&system.m)?;
+            let factor = IncompleteCholesky::new(&stored()?.m)?;
             cg(system, points, Preconditioner::IncompleteCholesky(factor))
         }
     };
     Ok((method, None))
 }
 
-fn cg<'a>(system: &'a LimitSystem, points: &'a [DVec3], preconditioner: Preconditioner) -> Box<dyn Start + 'a> {
+/// A factorization is asked of a system without stored matrices.
+fn without_entries(setup: Setup) -> Failure {
+    Failure {
+        outcome: Outcome::Breakdown,
+        detail: format!("{setup:?} factors the matrix, and this system does not store it: assemble a LimitSystem"),
+    }
+}
+
+fn cg<'a, S: System>(system: &'a S, points: &'a [DVec3], preconditioner: Preconditioner) -> Box<dyn Start + 'a> {
     Box::new(ConjugateGradient::new(system, points, preconditioner))
 }
 
-fn direct<'a, F: Factorization + 'a>(
-    system: &'a LimitSystem,
+fn direct<'a, S: System, F: Factorization + 'a>(
+    system: &'a S,
     points: &'a [DVec3],
     factorization: F,
 ) -> Result<Prepared<'a>, Failure> {
@@ -343,8 +351,8 @@ fn direct<'a, F: Factorization + 'a>(
     Ok((Box::new(method), fill))
 }
 
-fn not_set_up(
-    system: &LimitSystem,
+fn not_set_up<S: System>(
+    system: &S,
     (points, start): (&[DVec3], &[DVec3]),
     failure: Failure,
     setup_seconds: f64,

@@ -27,6 +27,11 @@ pub trait System: Sync {
     /// An upper bound of the eigenvalues of A, which tells its scale: 1 for a scheme's matrix, whose rows sum to 1.
     fn lambda_max(&self) -> f64;
 
+    /// The stored matrices, where there are any: what factorizations need.
+    fn stored(&self) -> Option<&LimitSystem> {
+        None
+    }
+
     /// Row `i` of the product, (A x)_i, for x of one number or one point a vertex. In-place relaxation calls it while
     /// `x` changes.
     fn row<P: Point>(&self, i: usize, x: &[P]) -> P;
@@ -59,6 +64,10 @@ impl System for LimitSystem {
 
     fn lambda_max(&self) -> f64 {
         self.bounds.lambda_max
+    }
+
+    fn stored(&self) -> Option<&LimitSystem> {
+        Some(self)
     }
 
     #[inline]

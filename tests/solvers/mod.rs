@@ -2,6 +2,7 @@
 //! rates; and what they say of singular systems and other impossible tasks.
 
 mod accelerated;
+mod back_ends;
 mod foreign;
 mod handmade;
 mod invariance;

@@ -28,11 +28,8 @@ use limitlab::mesh::order::{Numbering, Order};
 use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Faces, Incidence, Mesh, Topology, builtin::builtin, io};
 use limitlab::schemes::Scheme;
-use limitlab::solvers::chebyshev::Chebyshev;
-use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use limitlab::solvers::gauss_seidel::{by_colours, in_waves};
-use limitlab::solvers::iteration::Iterate;
-use limitlab::solvers::{Method, Report, Setup, Stop, run, solve};
+use limitlab::solvers::{Method, Report, Setup, Stop, run};
 use limitlab_experiments::cli::{self, CommonFlags, List, Printer, Progress, number};
 use limitlab_experiments::report::{Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette};
 
@@ -493,13 +490,8 @@ fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<
             let topology = Topology::new(&mesh.faces, mesh.len());
             let operator = Operator::new(&mesh.faces, &topology, scheme)?;
             let since = Instant::now();
-            let mut iterate: Box<dyn Iterate> = if method == Method::Cg {
-                let h = Preconditioner::weights(&operator);
-                Box::new(ConjugateGradient::new(&operator, points, h))
-            } else {
-                Box::new(Chebyshev::new(&operator, points, (estimate, 1.0)))
-            };
-            let report = solve(iterate.as_mut(), &stop, &mut |_| std::ops::ControlFlow::Continue(()));
+            let setup = if method == Method::Cg { Setup::Cg } else { Setup::Chebyshev { spectrum: (estimate, 1.0) } };
+            let report = run(&operator, points, setup, &stop).report;
             start(&mut solve_seconds, since);
             Outcome { iterations: report.iterations, status: report.outcome.name(), solve_seconds }
         }

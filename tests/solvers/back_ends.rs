@@ -1,0 +1,66 @@
+//! Every method under every scheme on both back ends: the stored matrix, and the operator without one.
+
+use limitlab::assemble::{LimitSystem, Operator};
+use limitlab::mesh::Mesh;
+use limitlab::schemes::Scheme;
+use limitlab::solvers::{Outcome, Setup, Stop, run};
+
+use super::setups::*;
+use crate::common::meshes::*;
+
+/// The methods that need the entries of the matrix.
+fn factors(setup: Setup) -> bool {
+    DIRECT.iter().any(|d| d.1 == setup) || setup == Setup::PcgIc0
+}
+
+/// Meshes whose rows are of every kind: triangles, quads, polygons, mixed.
+fn meshes(scheme: Scheme) -> Vec<Mesh> {
+    let names: &[&str] = match scheme.needs_triangles() {
+        true => &["icosphere:1", "irregular-tri:80"],
+        false => &["icosphere:1", "irregular-poly:80", "torus:7x6", "prism:7"],
+    };
+    let mut meshes: Vec<Mesh> = names.iter().map(|name| noisy(name)).collect();
+    if soluble_on_quads(scheme) {
+        meshes.push(noisy("irregular-quad:80"));
+    }
+    meshes
+}
+
+fn hold(scheme: Scheme, mesh: &Mesh, explicit: &LimitSystem, free: &Operator) {
+    let points = &mesh.positions;
+    let stop = Stop { tolerance: 1e-9 * mesh.diagonal(), max_iterations: 20_000 };
+    let order = reversed(mesh.len());
+    for (method, setup) in all(explicit, &order) {
+        let what = format!("{method}, {scheme}, {} vertices", mesh.len());
+        let stored = run(explicit, points, setup, &stop);
+        let found = run(free, points, setup, &stop);
+        if factors(setup) {
+            assert_eq!((found.report.outcome, found.report.iterations), (Outcome::Breakdown, 0), "{what}");
+            assert!(found.report.detail.is_some_and(|d| d.contains("does not store")), "{what}");
+            assert_eq!(&found.points, points);
+            continue;
+        }
+        let (stored, found) = (stored.report, found.report);
+        assert_eq!(stored.outcome, Outcome::Converged, "{what}");
+        assert_eq!(found.outcome, stored.outcome, "{what}");
+        // Anderson's coefficients are quotients of differences, which grow the last digits' differences.
+        let accelerated = matches!(setup, Setup::AndersonPia { .. } | Setup::AndersonJacobi { .. });
+        let allowed = 1 + if accelerated { stored.iterations / 10 } else { 0 };
+        let counts = (stored.iterations, found.iterations);
+        assert!(counts.0.abs_diff(counts.1) <= allowed, "{what}: {counts:?}");
+        for (a, b) in stored.history.iter().zip(&found.history).take(5) {
+            assert!((a.max - b.max).abs() <= 1e-11 * (1.0 + a.max), "{what}: {:e} and {:e}", a.max, b.max);
+        }
+    }
+}
+
+#[test]
+fn every_method_under_every_scheme_runs_on_both_back_ends_alike() {
+    for scheme in Scheme::ALL {
+        for mesh in meshes(scheme) {
+            let topology = topology(&mesh);
+            let free = Operator::new(&mesh.faces, &topology, scheme).expect("an operator");
+            hold(scheme, &mesh, &system(&mesh, scheme), &free);
+        }
+    }
+}
