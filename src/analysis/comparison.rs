@@ -151,7 +151,20 @@ pub fn entries<'a>(
                 let setup = Setup::Chebyshev { spectrum: estimated(system, spectrum) };
                 lines.push(entry(method, "estimated", setup));
             }
-            _ => {}
+            Method::Lu
+            | Method::Ldlt
+            | Method::Jacobi
+            | Method::Thall
+            | Method::GaussSeidel
+            | Method::Sor
+            | Method::Ssor
+            | Method::Pia
+            | Method::WPia
+            | Method::HeavyBall
+            | Method::Chebyshev
+            | Method::PcgJacobi
+            | Method::PcgSsor
+            | Method::PcgIc0 => {}
         }
     }
     Ok(lines)
