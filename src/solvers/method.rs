@@ -44,10 +44,6 @@ pub enum Method {
     Pia,
     /// PIA with a weight.
     WPia,
-    /// Anderson acceleration of PIA, of Thall's masks or of Jacobi.
-    Anderson,
-    /// PIA with momentum.
-    HeavyBall,
     /// Chebyshev iteration on A.
     Chebyshev,
     /// Conjugate gradients (CG-PIA), preconditioned by H: they see the spectrum of A.
@@ -58,6 +54,10 @@ pub enum Method {
     PcgSsor,
     /// Conjugate gradients preconditioned by incomplete Cholesky without fill.
     PcgIc0,
+    /// Anderson acceleration of PIA, of Thall's masks or of Jacobi.
+    Anderson,
+    /// PIA with momentum.
+    HeavyBall,
 }
 
 impl Method {
@@ -72,13 +72,13 @@ impl Method {
         Method::Ssor,
         Method::Pia,
         Method::WPia,
-        Method::Anderson,
-        Method::HeavyBall,
         Method::Chebyshev,
         Method::Cg,
         Method::PcgJacobi,
         Method::PcgSsor,
         Method::PcgIc0,
+        Method::Anderson,
+        Method::HeavyBall,
     ];
 
     pub fn name(self) -> &'static str {

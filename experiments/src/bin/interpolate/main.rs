@@ -38,8 +38,8 @@ struct Arguments {
     /// The mesh to write (.obj, .off, .ply): the control mesh, or the surface with --subdivide or --limit
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, anderson, heavy-ball, chebyshev, cg, pcg-jacobi,
-    /// pcg-ssor, pcg-ic0; two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); halstead (the fairest
+    /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
+    /// pcg-ssor, pcg-ic0, anderson, heavy-ball; two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); halstead (the fairest
     /// surface, with --scheme catmull-clark: a control mesh two refinements down); butterfly and labsik-greiner (with
     /// --subdivide: schemes that pass through the vertices of triangle meshes with no system solved). auto is
     /// chebyshev in mixed precision without a stored matrix, cg where that makes no progress, and ldlt where neither

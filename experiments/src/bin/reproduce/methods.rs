@@ -39,10 +39,6 @@ const COLUMNS: [(Method, &str); 22] = [
     (Method::Ssor, ""),
     (Method::Pia, ""),
     (Method::WPia, ""),
-    (Method::Anderson, "of pia"),
-    (Method::Anderson, "of thall"),
-    (Method::Anderson, "of jacobi"),
-    (Method::HeavyBall, ""),
     (Method::Chebyshev, "proven"),
     (Method::Chebyshev, "estimated"),
     (Method::Cg, "preconditioned by H"),
@@ -50,6 +46,10 @@ const COLUMNS: [(Method, &str); 22] = [
     (Method::PcgJacobi, ""),
     (Method::PcgSsor, ""),
     (Method::PcgIc0, ""),
+    (Method::Anderson, "of pia"),
+    (Method::Anderson, "of thall"),
+    (Method::Anderson, "of jacobi"),
+    (Method::HeavyBall, ""),
 ];
 /// Relative to the diagonal of the bounding box.
 const TOLERANCES: [f64; 3] = [1e-3, 1e-6, 1e-10];
