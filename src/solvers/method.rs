@@ -263,8 +263,7 @@ pub fn run_watched<S: System>(
 /// let first = run(&system, &mesh.positions, Setup::Cg, &stop);
 /// let mut points = mesh.positions.clone();
 /// points[7] *= 1.001;
-/// let watch = &mut |_: &_| ControlFlow::Continue(());
-/// let again = run_from(&system, &points, &first.points, Setup::Cg, &stop, watch);
+/// let again = run_from(&system, &points, &first.points, Setup::Cg, &stop, &mut |_| ControlFlow::Continue(()));
 /// assert!(again.report.iterations < first.report.iterations);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
