@@ -254,17 +254,20 @@ pub fn run_watched<S: System>(
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::mesh::{Topology, builtin};
 /// use limitlab::schemes::Scheme;
-/// use limitlab::solvers::{Setup, Stop, run, run_from};
+/// use limitlab::solvers::{Setup, Step, Stop, run, run_from};
 ///
 /// let mesh = builtin::builtin("icosphere:2")?;
 /// let topology = Topology::new(&mesh.faces, mesh.len());
 /// let system = LimitSystem::new(&mesh, &topology, Scheme::Loop)?;
-/// let stop = Stop { tolerance: 1e-9, max_iterations: 100 };
-/// let first = run(&system, &mesh.positions, Setup::Cg, &stop);
-/// let mut points = mesh.positions.clone();
-/// points[7] *= 1.001;
-/// let again = run_from(&system, &points, &first.points, Setup::Cg, &stop, &mut |_| ControlFlow::Continue(()));
-/// assert!(again.report.iterations < first.report.iterations);
+/// // A rough solution, then on from there: the iterations of one run.
+/// let (setup, points) = (Setup::Pia { omega: 1.0 }, &mesh.positions);
+/// let stop = |tolerance| Stop { tolerance, max_iterations: 1000 };
+/// let rough = run(&system, points, setup, &stop(1e-3));
+/// let watch = &mut |_: &Step<'_>| ControlFlow::Continue(());
+/// let fine = run_from(&system, points, &rough.points, setup, &stop(1e-9), watch);
+/// let whole = run(&system, points, setup, &stop(1e-9));
+/// assert_eq!(rough.report.iterations + fine.report.iterations, whole.report.iterations);
+/// assert_eq!(fine.points, whole.points);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn run_from<S: System>(
