@@ -35,11 +35,12 @@ pub struct CommonFlags {
 }
 
 impl CommonFlags {
-    /// Prepares the process for work: signals, then threads.
+    /// Prepares the process for work: addresses, signals, then threads.
     ///
     /// # Errors
     /// If threads were started before.
     pub fn apply(&self) -> Result<()> {
+        process::share_addresses();
         process::heed_signals();
         process::start_threads(self.threads, |text| self.remark(text))
     }

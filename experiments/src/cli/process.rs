@@ -65,6 +65,23 @@ pub(super) fn start_threads(asked: Option<u16>, remark: impl Fn(String)) -> Resu
     require_small()
 }
 
+/// Where addresses are limited (`ulimit -v`), all threads share one arena of the allocator. glibc would set 64 MB of
+/// addresses aside for each, and where it finds them only later, takes them from work that was found to have room: a run in
+/// thirty of those near a limit ended by an abort. To be called before other threads are started.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+pub(super) fn share_addresses() {
+    let limits = std::fs::read_to_string("/proc/self/limits").unwrap_or_default();
+    let soft = limits.lines().find_map(|line| line.strip_prefix("Max address space")?.split_whitespace().next());
+    if soft.is_some_and(|soft| soft != "unlimited") {
+        // SAFETY: the call sets a parameter of the allocator, and touches no memory of the program; there is no other
+        // thread yet that it could meet. Where it is refused, all stays as it was.
+        unsafe { libc::mallopt(libc::M_ARENA_MAX, 1) };
+    }
+}
+
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub(super) fn share_addresses() {}
+
 /// From now on SIGHUP, SIGINT and SIGTERM remove temporary files and say which files are complete, before they end the
 /// process as they would have without; a file that reaches its size limit (SIGXFSZ) is an error of writing. A signal
 /// that is ignored (`nohup`) stays so. Where the system gives no thread for it, signals end the process at once.
