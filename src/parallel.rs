@@ -146,6 +146,11 @@ pub fn extend<T: Send, F: FnMut(usize) -> T>(vector: &mut Vec<T>, count: usize, 
     unsafe { vector.set_len(length + count) };
 }
 
+/// Appends a copy of `values`.
+pub fn append<T: Copy + Send + Sync>(vector: &mut Vec<T>, values: &[T]) {
+    extend(vector, values.len(), |_| |i| values[i]);
+}
+
 /// The first number below `count` of which `is_it` holds.
 pub fn find_first(count: usize, is_it: impl Fn(usize) -> bool + Sync) -> Option<usize> {
     fn shared(count: usize, chunk: &(dyn Fn(Range<usize>) -> Option<usize> + Sync)) -> Option<usize> {

@@ -67,8 +67,9 @@ impl<'a> Source<'a> {
     /// The kind of every row.
     pub(super) fn kinds(&self) -> Vec<Kind> {
         let n = self.valences.len();
+        let edges_only = self.scheme.edges_only();
         let of_size = |size: usize| match size {
-            _ if self.scheme.edges_only() => Kind::Edges,
+            _ if edges_only => Kind::Edges,
             3 => Kind::Edges,
             4 => Kind::Quads,
             _ => Kind::Polygons,

@@ -80,11 +80,11 @@ impl LimitSystem {
         let blocks = FaceBlocks::new(&mesh.faces, masks);
         let rows = Rows::new(&mesh.faces, topology, &blocks, &by_valence, &valence);
         let arrays = rows.arrays()?;
-        let h = valence.iter().map(|&n| by_valence[n as usize][0]);
+        let h = parallel::collect(valence.len(), |v| by_valence[valence[v] as usize][0]);
         let bounds = SpectralBounds::gershgorin(&arrays.diagonal);
         let pattern = Arc::new(Pattern::new(arrays.offsets, arrays.columns));
         Ok(LimitSystem {
-            h: h.collect(),
+            h,
             m: Csr::new(Arc::clone(&pattern), arrays.m),
             a: Csr::new(pattern, arrays.a),
             diagonal: arrays.diagonal,

@@ -13,7 +13,7 @@ use super::thall::angle;
 use crate::error::short;
 use crate::mesh::frame::direction;
 use crate::mesh::{Mesh, Topology};
-use crate::schemes::{Kind, Refinement};
+use crate::schemes::{Class, Refinement};
 use crate::{Error, Result};
 
 /// When and how far rings are turned. Angles in radians.
@@ -73,7 +73,7 @@ pub fn unit_normals(normals: &[Option<DVec3>]) -> Result<Vec<Option<DVec3>>> {
 /// vertex where the surface has no normal; what the scheme refuses. All name the vertex.
 ///
 /// # Panics
-/// If the scheme is not [primal](Kind::Primal), `normals` has not one entry a vertex, or
+/// If the scheme is not [primal](Class::Primal), `normals` has not one entry a vertex, or
 /// `rotation.levels` is 0.
 pub fn rotate_rings(
     control: &Mesh,
@@ -81,7 +81,7 @@ pub fn rotate_rings(
     normals: &[Option<DVec3>],
     rotation: Rotation,
 ) -> Result<Rotated> {
-    assert_eq!(scheme.kind(), Kind::Primal, "a refinement that keeps its vertices and moves them");
+    assert_eq!(scheme.class(), Class::Primal, "a refinement that keeps its vertices and moves them");
     assert_eq!(normals.len(), control.len(), "one entry a vertex");
     assert!(rotation.levels > 0, "at least one level");
     let wanted = unit_normals(normals)?;

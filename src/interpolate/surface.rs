@@ -7,7 +7,7 @@ use super::normals::{Rotation, rotate_rings};
 use super::zheng_cai::{Constraints, FirstRefinement};
 use crate::mesh::{Mesh, Topology};
 use crate::schemes::doo_sabin::{self, Rule};
-use crate::schemes::{Kind, Refinement, Scheme};
+use crate::schemes::{Class, Refinement, Scheme};
 use crate::{Error, Result};
 
 /// What is wanted of the surface.
@@ -135,7 +135,7 @@ fn primal(control: Mesh, scheme: Refinement, request: &Request) -> Result<Surfac
         let stays = request.levels == 0;
         return Ok(Surface::plain(if stays { control } else { scheme.refine_n(&control, request.levels)? }));
     };
-    if scheme.kind() != Kind::Primal {
+    if scheme.class() != Class::Primal {
         return Err(Error::Computation(format!(
             "given normals turn the rings of vertices that stay, or tilt the faces of Doo-Sabin surfaces, and {scheme} has \
              neither: use --scheme zheng-cai, nasri or catmull-clark"

@@ -1,5 +1,7 @@
 //! Along a space-filling curve: which meshes lie scattered through memory, and the way to bring them together.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use glam::DVec3;
 
 use super::order::Numbering;
@@ -40,10 +42,16 @@ pub fn along_curve(mesh: &Mesh) -> Option<(Mesh, Numbering)> {
     let numbering = Numbering::new(morton_cells(&mesh.positions));
     let place = numbering.place();
     let old = mesh.faces.corners();
-    if parallel::any(old.len(), |c| old[c] as usize >= n) {
+    let missing = AtomicBool::new(false);
+    let corners = parallel::collect(old.len(), |c| {
+        place.get(old[c] as usize).copied().unwrap_or_else(|| {
+            missing.store(true, Ordering::Relaxed);
+            0
+        })
+    });
+    if missing.into_inner() {
         return None;
     }
-    let corners = parallel::collect(old.len(), |c| place[old[c] as usize]);
     let moved = Faces::from_parts(mesh.faces.offsets().to_vec(), corners);
     let smallest = parallel::collect(moved.len(), |f| moved.face(f).iter().copied().min().unwrap_or(0));
     let by_smallest = counting_sort(&smallest, n);

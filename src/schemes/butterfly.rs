@@ -8,12 +8,13 @@ use glam::DVec3;
 
 use super::interpolatory::{RegularMask, SQRT_3, tangents, vertices};
 use super::loop_scheme::{refined_topology, split_in_four};
-use super::refinement::{Counts, Kind, Step};
+use super::refinement::{Class, RefinementRules, Size};
 use super::ring::{Place, Rings, Rule};
 use super::star::{Tangents, next_in_triangle, prev_in_triangle, require_room, require_triangles, twin};
 use crate::Result;
 use crate::mesh::{Mesh, Topology};
 use crate::pages::large;
+use crate::parallel;
 
 /// On the command line and in messages.
 const NAME: &str = "butterfly";
@@ -62,13 +63,13 @@ pub fn extraordinary_mask(n: usize) -> Vec<f64> {
 }
 
 /// All that defines the refinement.
-pub(super) const STEP: Step = Step {
+pub(super) const RULES: RefinementRules = RefinementRules {
     name: NAME,
-    kind: Kind::Interpolatory,
+    class: Class::Interpolatory,
     needs_triangles: true,
     refine,
     refined_topology: |_, topology, refined| refined_topology(topology, refined),
-    counts: Counts::in_four,
+    size: Size::in_four,
     limit_positions: |mesh, topology| vertices(NAME, mesh, topology),
     limit_normals,
 };
@@ -92,7 +93,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     let rings = Rings::new(mesh, topology, rule)?;
     let edges = topology.edge_numbers();
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
-    positions.extend_from_slice(&mesh.positions);
+    parallel::append(&mut positions, &mesh.positions);
     edges.extend(&mut positions, |c| {
         let t = twin(topology, c);
         match [c, t].map(|c| rings.is_extraordinary(c)) {

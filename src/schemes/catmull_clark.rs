@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::refined::{self, set_rows};
-use super::refinement::{Counts, Kind, Refinement, Step};
+use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{Circulant, Definition, PaperNames, SingularSet};
 use super::star::{Circle, Tangents, centroid, for_each_star, require_closed, require_room, sides, twin};
 use crate::Result;
@@ -41,13 +41,13 @@ pub(super) const DEFINITION: Definition = Definition {
 };
 
 /// All that defines the refinement.
-pub(super) const STEP: Step = Step {
+pub(super) const RULES: RefinementRules = RefinementRules {
     name: "catmull-clark",
-    kind: Kind::Primal,
+    class: Class::Primal,
     needs_triangles: false,
     refine,
     refined_topology,
-    counts: |c| Counts { vertices: c.vertices + c.edges() + c.faces, faces: c.corners, corners: 4 * c.corners },
+    size: |c| Size { vertices: c.vertices + c.edges() + c.faces, faces: c.corners, corners: 4 * c.corners },
     limit_positions,
     limit_normals,
 };

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::refined::{self, push_ends, set_by_edge, set_rows};
-use super::refinement::{Counts, Kind, Step};
+use super::refinement::{Class, RefinementRules, Size};
 use super::star::{CHUNK, Circle, Tangents, centroid, for_each_star, put_stars, require_closed, require_room, twin};
 use crate::Result;
 use crate::mesh::incidence::split_by_face;
@@ -76,13 +76,13 @@ fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: Rule, 
 }
 
 /// All that defines the refinement.
-pub(super) const STEP: Step = Step {
+pub(super) const RULES: RefinementRules = RefinementRules {
     name: "doo-sabin",
-    kind: Kind::Dual,
+    class: Class::Dual,
     needs_triangles: false,
     refine,
     refined_topology,
-    counts: |c| Counts { vertices: c.corners, faces: c.faces + c.edges() + c.vertices, corners: 4 * c.corners },
+    size: |c| Size { vertices: c.corners, faces: c.faces + c.edges() + c.vertices, corners: 4 * c.corners },
     limit_positions: |mesh, topology| limit_positions(Rule::DooSabin, mesh, topology),
     limit_normals: |mesh, topology| limit_normals(Rule::DooSabin, mesh, topology),
 };
@@ -131,7 +131,8 @@ pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     parallel::extend(&mut offsets, mesh.faces.len(), |_| |f| mesh.faces.range(f).end as u32);
     push_ends(&mut offsets, count, 4, count / 2);
     let first = 3 * count as u32;
-    offsets.extend(incidence.offsets()[1..].iter().map(|&end| first + end));
+    let ends = &incidence.offsets()[1..];
+    parallel::extend(&mut offsets, ends.len(), |_| |v| first + ends[v]);
     Ok(Mesh::new(corner_points(mesh, rule), Faces::from_parts(offsets, corners)))
 }
 

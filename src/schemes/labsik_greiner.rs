@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::interpolatory::{RegularMask, SQRT_3, tangents, vertices};
-use super::refinement::{Counts, Kind, Step};
+use super::refinement::{Class, RefinementRules, Size};
 use super::ring::{Place, Rings, Rule};
 use super::sqrt3::{flip, refined_topology};
 use super::star::{Tangents, prev_in_triangle, require_room, require_triangles, twin};
@@ -81,13 +81,13 @@ pub fn extraordinary_mask(n: usize) -> (f64, Vec<f64>) {
 }
 
 /// All that defines the refinement.
-pub(super) const STEP: Step = Step {
+pub(super) const RULES: RefinementRules = RefinementRules {
     name: NAME,
-    kind: Kind::Interpolatory,
+    class: Class::Interpolatory,
     needs_triangles: true,
     refine,
     refined_topology,
-    counts: Counts::in_three,
+    size: Size::in_three,
     limit_positions: |mesh, topology| vertices(NAME, mesh, topology),
     limit_normals,
 };
@@ -109,7 +109,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     let rule = Rule { name: NAME, place: Place::Triangle, mask: extraordinary_mask, amplitudes };
     let rings = Rings::new(mesh, topology, rule)?;
     let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
-    positions.extend_from_slice(&mesh.positions);
+    parallel::append(&mut positions, &mesh.positions);
     let center = |f: usize| {
         let own = [0, 1, 2].map(|i| 3 * f as u32 + i);
         let extraordinary = own.map(|c| rings.is_extraordinary(c));

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::refined::{self, set_rows};
-use super::refinement::{Counts, Kind, Refinement, Step};
+use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{Definition, PaperNames, SingularSet, from_limit_weight};
 use super::star::{
     Tangents, blend_with_neighbors, prev_in_triangle, push_blends, require_room, require_triangles, ring_tangents, twin,
@@ -59,13 +59,13 @@ pub(super) const DEFINITION: Definition = Definition {
 };
 
 /// All that defines the refinement.
-pub(super) const STEP: Step = Step {
+pub(super) const RULES: RefinementRules = RefinementRules {
     name: "loop",
-    kind: Kind::Primal,
+    class: Class::Primal,
     needs_triangles: true,
     refine,
     refined_topology: |_, topology, refined| refined_topology(topology, refined),
-    counts: Counts::in_four,
+    size: Size::in_four,
     limit_positions,
     limit_normals,
 };

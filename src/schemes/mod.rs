@@ -46,6 +46,6 @@ mod star;
 pub mod unified_sqrt3;
 mod zheng_cai;
 
-pub use refinement::{Kind, Refinement};
+pub use refinement::{Class, Refinement};
 pub use scheme::{Masks, PaperNames, Scheme, SingularSet};
 pub use star::Tangents;

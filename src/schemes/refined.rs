@@ -43,7 +43,7 @@ pub(super) fn of_quads(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
     set_rows(at_faces, |c| [4 * c + 2]);
 
     let mut offsets = large(Vec::with_capacity(refined.len() + 1));
-    offsets.extend_from_slice(incidence.offsets());
+    parallel::append(&mut offsets, incidence.offsets());
     push_ends(&mut offsets, count, 4, count / 2);
     let first = 3 * count as u32;
     parallel::extend(&mut offsets, faces.len(), |_| |f| first + faces.range(f).end as u32);
@@ -90,7 +90,7 @@ pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
     });
 
     let mut offsets = large(Vec::with_capacity(refined.len() + 1));
-    offsets.extend_from_slice(incidence.offsets());
+    parallel::append(&mut offsets, incidence.offsets());
     push_ends(&mut offsets, count, 6, count / 2);
     closed(refined, offsets, corners, twins)
 }
@@ -131,7 +131,7 @@ pub(super) fn of_flips(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
     });
 
     let mut offsets = large(Vec::with_capacity(refined.len() + 1));
-    offsets.extend_from_slice(incidence.offsets());
+    parallel::append(&mut offsets, incidence.offsets());
     push_ends(&mut offsets, count, 6, mesh.faces.len());
     closed(refined, offsets, corners, twins)
 }

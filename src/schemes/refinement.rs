@@ -1,4 +1,4 @@
-//! The refinements: each is a [`Step`] in a file of its own, and this is the list.
+//! The refinements: each is a [`RefinementRules`] in a file of its own, and this is the list.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,7 +12,7 @@ use crate::{Error, Result};
 
 /// What a refinement does with the vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum Class {
     /// Vertices stay, under their numbers, and move.
     Primal,
     /// Vertices become faces.
@@ -23,37 +23,37 @@ pub enum Kind {
 
 /// How large a mesh is, closed ones alone.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Counts {
+pub(super) struct Size {
     pub(super) vertices: u64,
     pub(super) faces: u64,
     pub(super) corners: u64,
 }
 
-impl Counts {
+impl Size {
     pub(super) fn edges(&self) -> u64 {
         self.corners / 2
     }
 
     /// After the split of every triangle in four.
     pub(super) fn in_four(self) -> Self {
-        Counts { vertices: self.vertices + self.edges(), faces: 4 * self.faces, corners: 4 * self.corners }
+        Size { vertices: self.vertices + self.edges(), faces: 4 * self.faces, corners: 4 * self.corners }
     }
 
     /// After the split of every triangle in three.
     pub(super) fn in_three(self) -> Self {
-        Counts { vertices: self.vertices + self.faces, faces: 3 * self.faces, corners: 3 * self.corners }
+        Size { vertices: self.vertices + self.faces, faces: 3 * self.faces, corners: 3 * self.corners }
     }
 }
 
 /// All that defines a refinement.
-pub(super) struct Step {
+pub(super) struct RefinementRules {
     pub(super) name: &'static str,
-    pub(super) kind: Kind,
+    pub(super) class: Class,
     pub(super) needs_triangles: bool,
     pub(super) refine: fn(&Mesh, &Topology) -> Result<Mesh>,
     /// Of a mesh, its topology and what `refine` made of it.
     pub(super) refined_topology: fn(&Mesh, &Topology, &Mesh) -> Topology,
-    pub(super) counts: fn(Counts) -> Counts,
+    pub(super) size: fn(Size) -> Size,
     pub(super) limit_positions: fn(&Mesh, &Topology) -> Result<Vec<DVec3>>,
     pub(super) limit_normals: fn(&Mesh, &Topology) -> Result<Vec<DVec3>>,
 }
@@ -82,31 +82,31 @@ impl Refinement {
         Refinement::MidEdge,
     ];
 
-    fn step(self) -> &'static Step {
+    fn rules(self) -> &'static RefinementRules {
         match self {
-            Refinement::CatmullClark => &catmull_clark::STEP,
-            Refinement::Loop => &loop_scheme::STEP,
-            Refinement::DooSabin => &doo_sabin::STEP,
-            Refinement::Sqrt3 => &sqrt3::STEP,
-            Refinement::Butterfly => &butterfly::STEP,
-            Refinement::LabsikGreiner => &labsik_greiner::STEP,
-            Refinement::MidEdge => &mid_edge::STEP,
+            Refinement::CatmullClark => &catmull_clark::RULES,
+            Refinement::Loop => &loop_scheme::RULES,
+            Refinement::DooSabin => &doo_sabin::RULES,
+            Refinement::Sqrt3 => &sqrt3::RULES,
+            Refinement::Butterfly => &butterfly::RULES,
+            Refinement::LabsikGreiner => &labsik_greiner::RULES,
+            Refinement::MidEdge => &mid_edge::RULES,
         }
     }
 
     /// The name on the command line, which `parse` reads back.
     pub fn name(self) -> &'static str {
-        self.step().name
+        self.rules().name
     }
 
     /// What becomes of the vertices.
-    pub fn kind(self) -> Kind {
-        self.step().kind
+    pub fn class(self) -> Class {
+        self.rules().class
     }
 
     /// Whether the refinement is defined on triangles only.
     pub fn needs_triangles(self) -> bool {
-        self.step().needs_triangles
+        self.rules().needs_triangles
     }
 
     /// One step. The scheme's own `refine` says how the result is numbered and what it refuses.
@@ -118,7 +118,7 @@ impl Refinement {
     /// # Panics
     /// If `topology` is not that of `mesh`.
     pub fn refine(self, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-        (self.step().refine)(mesh, topology)
+        (self.rules().refine)(mesh, topology)
     }
 
     /// The topology of `refined`, which is what [`refine`](Self::refine) made of `mesh`. Equal to [`Topology::new`] of
@@ -138,7 +138,7 @@ impl Refinement {
     /// # Ok::<(), limitlab::Error>(())
     /// ```
     pub fn refined_topology(self, mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
-        (self.step().refined_topology)(mesh, topology, refined)
+        (self.rules().refined_topology)(mesh, topology, refined)
     }
 
     /// Refuses, before the work, `levels` steps whose meshes have more corners than 32-bit indices name, or for which
@@ -148,7 +148,7 @@ impl Refinement {
     /// [`Error::Computation`] or [`Error::Memory`] with the numbers of faces and vertices.
     pub fn check_size(self, mesh: &Mesh, levels: usize) -> Result<()> {
         let count = |n: usize| n as u64;
-        let mut counts = Counts {
+        let mut size = Size {
             vertices: count(mesh.len()),
             faces: count(mesh.faces.len()),
             corners: count(mesh.faces.corners().len()),
@@ -156,14 +156,14 @@ impl Refinement {
         let mut bytes = 0u64;
         for _ in 0..levels {
             // Before a step the coarse mesh and its topology are there, after it the fine mesh.
-            let coarse = 24 * counts.vertices + 24 * counts.corners;
-            counts = (self.step().counts)(counts);
-            bytes = coarse + 24 * counts.vertices + 4 * counts.faces + 4 * counts.corners;
-            if counts.corners > u64::from(u32::MAX) {
+            let coarse = 24 * size.vertices + 24 * size.corners;
+            size = (self.rules().size)(size);
+            bytes = coarse + 24 * size.vertices + 4 * size.faces + 4 * size.corners;
+            if size.corners > u64::from(u32::MAX) {
                 break;
             }
         }
-        let Counts { vertices, faces, corners } = counts;
+        let Size { vertices, faces, corners } = size;
         let what = || format!("the surface after {levels} refinements with {faces} faces and {vertices} vertices");
         if corners > u64::from(u32::MAX) {
             return Err(Error::Computation(format!(
@@ -206,7 +206,7 @@ impl Refinement {
     /// # Panics
     /// If `topology` is not that of `mesh`.
     pub fn limit_positions(self, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-        (self.step().limit_positions)(mesh, topology)
+        (self.rules().limit_positions)(mesh, topology)
     }
 
     /// The unit normals of the limit surface at the [`limit_positions`](Self::limit_positions); zero where
@@ -218,7 +218,7 @@ impl Refinement {
     /// # Panics
     /// If `topology` is not that of `mesh`.
     pub fn limit_normals(self, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-        (self.step().limit_normals)(mesh, topology)
+        (self.rules().limit_normals)(mesh, topology)
     }
 }
 

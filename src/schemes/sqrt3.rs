@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::refined::{self, set_rows};
-use super::refinement::{Counts, Kind, Refinement, Step};
+use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{Definition, PaperNames, SingularSet, from_limit_weight};
 use super::star::{
     Tangents, blend_with_neighbors, centroid, push_blends, require_room, require_triangles, ring_tangents, twin,
@@ -62,13 +62,13 @@ pub(super) const DEFINITION: Definition = Definition {
 };
 
 /// All that defines the refinement.
-pub(super) const STEP: Step = Step {
+pub(super) const RULES: RefinementRules = RefinementRules {
     name: "sqrt3",
-    kind: Kind::Primal,
+    class: Class::Primal,
     needs_triangles: true,
     refine,
     refined_topology,
-    counts: Counts::in_three,
+    size: Size::in_three,
     limit_positions,
     limit_normals,
 };

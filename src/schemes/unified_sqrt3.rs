@@ -52,7 +52,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology, alpha: &[f64]) -> Result<(Mesh, 
     parallel::change(&mut shares, |v, d| *d = old[v] - alpha[v] * *d);
     parallel::extend(&mut positions, mesh.faces.len(), |_| |f| centroid(&shares, mesh.faces.face(f)));
     let mut parameters = large(Vec::with_capacity(count));
-    parameters.extend_from_slice(alpha);
+    parallel::append(&mut parameters, alpha);
     let sum = |face: &[u32]| face.iter().map(|&v| alpha[v as usize]).sum::<f64>();
     parallel::extend(&mut parameters, mesh.faces.len(), |_| |f| sum(mesh.faces.face(f)) / 3.0);
     Ok((Mesh::new(positions, flip(mesh, topology)), parameters))

@@ -16,7 +16,7 @@
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::iteration::{Errors, Failure, Iterate, Start};
+use super::iteration::{Errors, Failure, Iterate, WarmStart};
 use super::system::{Rows, System};
 use crate::parallel;
 
@@ -204,7 +204,7 @@ impl<S: System> Iterate for Anderson<'_, S> {
     }
 }
 
-impl<S: System> Start for Anderson<'_, S> {
+impl<S: System> WarmStart for Anderson<'_, S> {
     fn start_at(&mut self, at: &[DVec3]) {
         self.current.copy_from_slice(at);
         self.count = 0;

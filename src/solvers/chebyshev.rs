@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 
-use super::iteration::{Errors, Failure, Iterate, Start};
+use super::iteration::{Errors, Failure, Iterate, WarmStart};
 use super::system::{Rows, System};
 
 /// The Chebyshev iteration at work.
@@ -43,7 +43,7 @@ impl<S: System> Iterate for Chebyshev<'_, S> {
     }
 }
 
-impl<S: System> Start for Chebyshev<'_, S> {
+impl<S: System> WarmStart for Chebyshev<'_, S> {
     fn start_at(&mut self, at: &[DVec3]) {
         self.recurrence = Recurrence::new(self.spectrum);
         self.iterates.start_at(at);

@@ -8,7 +8,7 @@
 use glam::DVec3;
 
 use super::incomplete_cholesky::IncompleteCholesky;
-use super::iteration::{Errors, Failure, Iterate, Outcome, Start};
+use super::iteration::{Errors, Failure, Iterate, Outcome, WarmStart};
 use super::ssor::symmetric_sweep;
 use super::system::{Rows, System};
 
@@ -212,7 +212,7 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
     }
 }
 
-impl<S: System> Start for ConjugateGradient<'_, S> {
+impl<S: System> WarmStart for ConjugateGradient<'_, S> {
     fn start_at(&mut self, at: &[DVec3]) {
         self.current.copy_from_slice(at);
         (self.rho, self.next_rho, self.recursive) = (None, None, None);

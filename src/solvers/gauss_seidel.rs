@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::coloured::Coloured;
-use super::iteration::{Errors, Failure, Iterate, Outcome, PATIENCE, PROGRESS, Report, Start, Stop};
+use super::iteration::{Errors, Failure, Iterate, Outcome, PATIENCE, PROGRESS, Report, Stop, WarmStart};
 use super::system::{Rows, System};
 use super::wavefront::Wavefront;
 use crate::assemble::Operator;
@@ -53,7 +53,7 @@ impl<S: System> Iterate for Sor<'_, S> {
     }
 }
 
-impl<S: System> Start for Sor<'_, S> {
+impl<S: System> WarmStart for Sor<'_, S> {
     fn start_at(&mut self, at: &[DVec3]) {
         self.current.copy_from_slice(at);
     }

@@ -10,7 +10,7 @@
 use glam::DVec3;
 
 use super::chebyshev::ThreeTerm;
-use super::iteration::{Errors, Failure, Iterate, Start};
+use super::iteration::{Errors, Failure, Iterate, WarmStart};
 use super::system::System;
 
 /// The heavy-ball method at work.
@@ -78,7 +78,7 @@ impl<S: System> Iterate for HeavyBall<'_, S> {
     }
 }
 
-impl<S: System> Start for HeavyBall<'_, S> {
+impl<S: System> WarmStart for HeavyBall<'_, S> {
     fn start_at(&mut self, at: &[DVec3]) {
         self.coming = first(self.later.0, self.later.1);
         self.iterates.start_at(at);

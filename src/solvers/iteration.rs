@@ -148,7 +148,7 @@ pub trait Iterate {
 }
 
 /// A method that can begin elsewhere than at V = P.
-pub trait Start: Iterate {
+pub trait WarmStart: Iterate {
     /// Goes back to the first iterate, which becomes `at`. To be called before the first errors are asked for.
     ///
     /// # Panics

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::iteration::{Errors, Failure, Iterate, Start};
+use super::iteration::{Errors, Failure, Iterate, WarmStart};
 use super::pia::Relaxation;
 use super::system::System;
 
@@ -44,7 +44,7 @@ impl<S: System> Iterate for Jacobi<'_, S> {
     }
 }
 
-impl<S: System> Start for Jacobi<'_, S> {
+impl<S: System> WarmStart for Jacobi<'_, S> {
     fn start_at(&mut self, at: &[DVec3]) {
         self.relaxation.current.copy_from_slice(at);
     }

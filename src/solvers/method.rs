@@ -14,7 +14,7 @@ use super::direct::{Cholesky, Direct, Factorization, Kind, SecondOpinion, Sparse
 use super::gauss_seidel::Sor;
 use super::heavy_ball::HeavyBall;
 use super::incomplete_cholesky::IncompleteCholesky;
-use super::iteration::{Errors, Failure, Outcome, Report, Start, Step, Stop, largest, solve_in_scale};
+use super::iteration::{Errors, Failure, Outcome, Report, Step, Stop, WarmStart, largest, solve_in_scale};
 use super::jacobi::{Jacobi, THALL_OMEGA};
 use super::pia::Pia;
 use super::ssor::Ssor;
@@ -280,7 +280,8 @@ pub fn run_from<S: System>(
 ) -> Solution {
     assert_eq!(points.len(), system.len(), "one point a vertex");
     assert_eq!(start.len(), system.len(), "one point of the start a vertex");
-    let size = largest(points).max(largest(start));
+    let elsewhere = !std::ptr::eq(points, start);
+    let size = if elsewhere { largest(points).max(largest(start)) } else { largest(points) };
     let begin = Instant::now();
     let prepared = prepare(system, points, setup);
     let setup_seconds = begin.elapsed().as_secs_f64();
@@ -289,7 +290,7 @@ pub fn run_from<S: System>(
         Err(failure) => return not_set_up(system, (points, start), failure, setup_seconds),
     };
     let begin = Instant::now();
-    if !std::ptr::eq(points, start) {
+    if elsewhere {
         method.start_at(start);
     }
     let report = solve_in_scale(method.as_mut(), size, stop, watch);
@@ -302,11 +303,11 @@ pub fn run_from<S: System>(
     }
 }
 
-type Prepared<'a> = (Box<dyn Start + 'a>, Option<usize>);
+type Prepared<'a> = (Box<dyn WarmStart + 'a>, Option<usize>);
 
 fn prepare<'a, S: System>(system: &'a S, points: &'a [DVec3], setup: Setup<'a>) -> Result<Prepared<'a>, Failure> {
     let stored = || system.stored().ok_or_else(|| without_entries(setup));
-    let method: Box<dyn Start + 'a> = match setup {
+    let method: Box<dyn WarmStart + 'a> = match setup {
         Setup::Lu => return direct(system, points, SparseLu::new(stored()?)?),
         Setup::Cholesky => return direct(system, points, Cholesky::new(&stored()?.m, Kind::Llt)?),
         Setup::Ldlt => return direct(system, points, Cholesky::new(&stored()?.m, Kind::Ldlt)?),
@@ -339,7 +340,7 @@ fn without_entries(setup: Setup) -> Failure {
     }
 }
 
-fn cg<'a, S: System>(system: &'a S, points: &'a [DVec3], preconditioner: Preconditioner) -> Box<dyn Start + 'a> {
+fn cg<'a, S: System>(system: &'a S, points: &'a [DVec3], preconditioner: Preconditioner) -> Box<dyn WarmStart + 'a> {
     Box::new(ConjugateGradient::new(system, points, preconditioner))
 }
 

@@ -19,6 +19,6 @@ pub mod ssor;
 pub mod system;
 pub mod wavefront;
 
-pub use iteration::{Errors, Failure, Iterate, Outcome, Report, Start, Step, Stop, solve};
+pub use iteration::{Errors, Failure, Iterate, Outcome, Report, Step, Stop, WarmStart, solve};
 pub use method::{Method, Setup, Solution, run, run_from, run_watched};
 pub use system::System;

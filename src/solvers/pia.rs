@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use super::iteration::{Errors, Failure, Iterate, Start};
+use super::iteration::{Errors, Failure, Iterate, WarmStart};
 use super::system::{Rows, System};
 
 /// PIA and W-PIA at work.
@@ -38,7 +38,7 @@ impl<S: System> Iterate for Pia<'_, S> {
     }
 }
 
-impl<S: System> Start for Pia<'_, S> {
+impl<S: System> WarmStart for Pia<'_, S> {
     fn start_at(&mut self, at: &[DVec3]) {
         self.relaxation.current.copy_from_slice(at);
     }

@@ -6,7 +6,7 @@
 use glam::DVec3;
 
 use super::gauss_seidel::sweep;
-use super::iteration::{Errors, Failure, Iterate, Start};
+use super::iteration::{Errors, Failure, Iterate, WarmStart};
 use super::system::{Rows, System};
 
 /// Symmetric SOR at work.
@@ -44,7 +44,7 @@ impl<S: System> Iterate for Ssor<'_, S> {
     }
 }
 
-impl<S: System> Start for Ssor<'_, S> {
+impl<S: System> WarmStart for Ssor<'_, S> {
     fn start_at(&mut self, at: &[DVec3]) {
         self.current.copy_from_slice(at);
     }

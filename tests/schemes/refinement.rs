@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use limitlab::mesh::{Faces, Mesh};
-use limitlab::schemes::{Kind, Refinement, catmull_clark, doo_sabin, loop_scheme, sqrt3};
+use limitlab::schemes::{Class, Refinement, catmull_clark, doo_sabin, loop_scheme, sqrt3};
 
 use super::ROUNDING;
 use super::meshes::*;
@@ -71,7 +71,7 @@ fn counts_and_topology_after_each_step() {
 #[test]
 fn valences_of_old_vertices_stay() {
     for scheme in Refinement::ALL {
-        if scheme.kind() == Kind::Dual {
+        if scheme.class() == Class::Dual {
             continue;
         }
         for mesh in meshes_for(scheme) {

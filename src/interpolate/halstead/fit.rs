@@ -37,6 +37,8 @@ const MOST_REFINEMENTS: usize = 20;
 /// A fit that misses its points by more than this part of their size has failed: sums of ring points round at 10⁻¹⁵,
 /// and the rest is room for the growth of the factorization.
 const MISS: f64 = 1e-8;
+/// Rows of one task.
+const CHUNK: usize = 4096;
 
 /// Minimises xᵀKx, K the weighted forms of `fairness`, over the fine control points x, under the limit masks' equations
 /// at the interpolated vertices (all unless told), ℓ_v·x = P_v, and where a normal n is given under the tangent masks'
@@ -315,8 +317,14 @@ impl Kkt {
         for _ in 0..MOST_REFINEMENTS {
             factors.solve(&ones, &mut rest);
             x.iter_mut().zip(&rest).for_each(|(x, d)| *x += *d);
-            parallel::fill(&mut rest, |i| right[i] - matrix.row_times(i, &x));
-            let largest = rest.iter().map(|r| r.abs().max_element()).fold(0.0, f64::max);
+            let mut largest = vec![0.0f64; rest.len().div_ceil(CHUNK)];
+            parallel::chunks_with(&mut rest, CHUNK, &mut largest, |first, rest, largest| {
+                for (i, r) in (first..).zip(rest) {
+                    *r = right[i] - matrix.row_times(i, &x);
+                    *largest = largest.max(r.abs().max_element());
+                }
+            });
+            let largest = largest.into_iter().fold(0.0, f64::max);
             // The residual falls by a constant factor until it is rounding, and then no more.
             if largest.is_nan() || largest > 0.5 * smallest {
                 break;

@@ -13,7 +13,7 @@ use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::iteration::{Errors, Failure, Iterate, Outcome, Start};
+use super::iteration::{Errors, Failure, Iterate, Outcome, WarmStart};
 use super::system::{Rows, System};
 use crate::memory::require;
 
@@ -116,7 +116,7 @@ impl<S: System, F: Factorization> Iterate for Direct<'_, S, F> {
     }
 }
 
-impl<S: System, F: Factorization> Start for Direct<'_, S, F> {
+impl<S: System, F: Factorization> WarmStart for Direct<'_, S, F> {
     fn start_at(&mut self, at: &[DVec3]) {
         self.current.copy_from_slice(at);
     }

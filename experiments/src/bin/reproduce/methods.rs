@@ -103,7 +103,19 @@ fn empty_tables() -> Vec<Table> {
 fn column_name(method: Method, variant: &str) -> String {
     match method {
         Method::Cholesky | Method::Anderson | Method::Chebyshev | Method::Cg => format!("{method} {variant}"),
-        _ => method.name().into(),
+        Method::Lu
+        | Method::Ldlt
+        | Method::Jacobi
+        | Method::Thall
+        | Method::GaussSeidel
+        | Method::Sor
+        | Method::Ssor
+        | Method::Pia
+        | Method::WPia
+        | Method::HeavyBall
+        | Method::PcgJacobi
+        | Method::PcgSsor
+        | Method::PcgIc0 => method.name().into(),
     }
 }
 
