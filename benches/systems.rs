@@ -8,7 +8,7 @@ mod baseline;
 
 use std::hint::black_box;
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use faer::Mat;
 use faer::sparse::SparseColMat;
 use faer::sparse::linalg::matmul::sparse_dense_matmul;
@@ -18,7 +18,7 @@ use limitlab::assemble::{Csr, LimitSystem, Operator};
 use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::noise::add_noise;
-use limitlab::mesh::{Incidence, Mesh, Topology, builtin::builtin};
+use limitlab::mesh::{Incidence, Mesh, Surface, Topology, builtin::builtin};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
 use limitlab::solvers::system::{Rows, System};
@@ -44,26 +44,24 @@ fn triplets(a: &Csr) -> Vec<(usize, usize, f64)> {
 }
 
 fn assembly(c: &mut Criterion) {
-    let mesh = mesh();
-    let n = mesh.len();
-    let topology = Topology::new(&mesh.faces, n);
-    let system = LimitSystem::new(&mesh, &topology, SCHEME).expect("a system");
+    let surface = Surface::new(mesh()).expect("a closed mesh");
+    let (faces, incidence, n) = (surface.faces(), surface.incidence(), surface.len());
+    let system = LimitSystem::new(&surface, SCHEME).expect("a system");
     let entries = triplets(&system.a);
     let mut group = c.benchmark_group("assembly");
     group.sample_size(10);
-    group.bench_function("incidence", |b| b.iter(|| Incidence::new(&mesh.faces, n)));
-    group.bench_function("topology", |b| b.iter(|| Topology::new(&mesh.faces, n)));
+    group.bench_function("incidence", |b| b.iter(|| Incidence::new(faces, n)));
+    group.bench_function("topology", |b| b.iter(|| Topology::new(faces, n)));
     group.bench_function("A and M, explicit", |b| {
-        b.iter(|| LimitSystem::new(&mesh, &topology, SCHEME));
+        b.iter(|| LimitSystem::new(&surface, SCHEME));
     });
     group.bench_function("operator", |b| {
-        b.iter(|| Operator::new(&mesh.faces, &topology, SCHEME));
+        b.iter(|| Operator::new(&surface, SCHEME));
     });
-    let incidence = &topology.incidence;
-    group.bench_function("front order", |b| b.iter(|| in_fronts(&mesh.faces, incidence)));
-    let fronts = in_fronts(&mesh.faces, incidence);
+    group.bench_function("front order", |b| b.iter(|| in_fronts(faces, incidence)));
+    let fronts = in_fronts(faces, incidence);
     group.bench_function("operator in front order", |b| {
-        b.iter(|| Operator::closed_in_order(&mesh.faces, incidence, SCHEME, Some(&fronts)));
+        b.iter(|| Operator::in_order(&surface, SCHEME, Some(&fronts)));
     });
     // The libraries are given A's entries, summed already: their part is the conversion only.
     group.bench_function("faer, from triplets", |b| {
@@ -98,15 +96,14 @@ fn product<S: System>(rows: &mut Rows, system: &S, x: &[DVec3], y: &mut [DVec3])
 }
 
 fn sweep(c: &mut Criterion) {
-    let mesh = mesh();
-    let n = mesh.len();
-    let topology = Topology::new(&mesh.faces, n);
-    let system = LimitSystem::new(&mesh, &topology, SCHEME).expect("a system");
-    let file = Operator::new(&mesh.faces, &topology, SCHEME).expect("an operator");
-    let fronts = in_fronts(&mesh.faces, &topology.incidence);
-    let front = Operator::in_order(&mesh.faces, &topology, SCHEME, Some(&fronts));
+    let surface = Surface::new(mesh()).expect("a closed mesh");
+    let n = surface.len();
+    let system = LimitSystem::new(&surface, SCHEME).expect("a system");
+    let file = Operator::new(&surface, SCHEME).expect("an operator");
+    let fronts = in_fronts(surface.faces(), surface.incidence());
+    let front = Operator::in_order(&surface, SCHEME, Some(&fronts));
     let front = front.expect("an operator");
-    let x = &mesh.positions;
+    let x = surface.positions();
     let moved = fronts.there(x);
     let mut y = vec![DVec3::ZERO; n];
     let mut rows = Rows::new(n);
@@ -119,7 +116,7 @@ fn sweep(c: &mut Criterion) {
     group.bench_function("matrix-free, front order", |b| {
         b.iter(|| product(&mut rows, &front, &moved, &mut y));
     });
-    let plain = baseline::Plain::new(&mesh, SCHEME).expect("quads only");
+    let plain = baseline::Plain::new(surface.mesh(), SCHEME).expect("quads only");
     group.bench_function("plain index-only", |b| b.iter(|| plain.product(x, &mut y)));
 
     let entries = triplets(&system.a);
@@ -163,25 +160,24 @@ fn sweep(c: &mut Criterion) {
 }
 
 fn methods(c: &mut Criterion) {
-    let mesh = mesh();
-    let n = mesh.len();
-    let points = &mesh.positions;
-    let topology = Topology::new(&mesh.faces, n);
-    let system = LimitSystem::new(&mesh, &topology, SCHEME).expect("a system");
-    let fronts = in_fronts(&mesh.faces, &topology.incidence);
-    let front = Operator::in_order(&mesh.faces, &topology, SCHEME, Some(&fronts));
+    let surface = Surface::new(mesh()).expect("a closed mesh");
+    let points = surface.positions();
+    let system = LimitSystem::new(&surface, SCHEME).expect("a system");
+    let fronts = in_fronts(surface.faces(), surface.incidence());
+    let front = Operator::in_order(&surface, SCHEME, Some(&fronts));
     let front = front.expect("an operator");
     let moved = fronts.there(points);
-    let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 1000 };
+    let stop = Stop { tolerance: 1e-10 * surface.diagonal(), max_iterations: 1000 };
     let mut group = c.benchmark_group("solve to 1e-10");
     group.sample_size(10);
     group.bench_function("auto, from faces to control points", |b| {
-        b.iter(|| control_points(&mesh, None, SCHEME, &stop));
+        let solved = |mesh| control_points(&Surface::new(mesh).expect("a closed mesh"), SCHEME, &stop);
+        b.iter_batched(|| surface.mesh().clone(), solved, BatchSize::LargeInput);
     });
     group.bench_function("mixed precision", |b| {
         b.iter(|| mixed::solve(&front, &moved, &stop));
     });
-    let plain = baseline::Plain::new(&mesh, SCHEME).expect("quads only");
+    let plain = baseline::Plain::new(surface.mesh(), SCHEME).expect("quads only");
     group.bench_function("plain index-only chebyshev", |b| {
         b.iter(|| plain.chebyshev(points, INTERVAL, stop.tolerance, stop.max_iterations));
     });

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::memory::megabytes;
+use crate::mesh::validate::Validation;
 
 /// What data or the machine can do to a computation. Broken contracts of the library panic instead.
 #[derive(Debug, thiserror::Error)]
@@ -18,6 +19,9 @@ pub enum Error {
     /// A file's text or bytes are not what its format says, at a line where there is one.
     #[error("{}{}: {what}", path.display(), at_line(*line))]
     Parse { path: PathBuf, line: Option<usize>, what: String },
+    /// A mesh with defects: all of them.
+    #[error("{}", .0.summary_line())]
+    Defects(Box<Validation>),
     /// A mesh that was read but cannot be used: defects, a scheme that refuses it, a boundary.
     #[error("{mesh}: {what}")]
     Mesh { mesh: String, what: String },

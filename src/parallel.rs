@@ -160,11 +160,6 @@ pub fn find_first(count: usize, is_it: impl Fn(usize) -> bool + Sync) -> Option<
     shared(count, &|mut range| range.find(|&i| is_it(i)))
 }
 
-/// Whether `is_it` holds of any number below `count`.
-pub fn any(count: usize, is_it: impl Fn(usize) -> bool + Sync) -> bool {
-    find_first(count, is_it).is_some()
-}
-
 /// Whether `holds` of every number below `count`.
 pub fn all(count: usize, holds: impl Fn(usize) -> bool + Sync) -> bool {
     find_first(count, |i| !holds(i)).is_none()

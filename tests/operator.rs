@@ -11,7 +11,8 @@ use limitlab::mesh::curve::{along_curve, is_scattered};
 use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::generate::{dual, permute_vertices, random_polygons, shuffle_faces, union};
 use limitlab::mesh::order::{Numbering, Order, colouring};
-use limitlab::mesh::{Faces, Mesh, Topology, builtin::builtin, noise::add_noise};
+use limitlab::mesh::validate::Boundary;
+use limitlab::mesh::{Faces, Incidence, Mesh, Surface, builtin::builtin, noise::add_noise};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::chebyshev::Recurrence;
 use limitlab::solvers::coloured::Coloured;
@@ -28,8 +29,20 @@ fn mesh(name: &str) -> Mesh {
     mesh
 }
 
+fn surface(name: &str) -> Surface {
+    Surface::new(mesh(name)).expect("a closed mesh")
+}
+
+/// A disc of 9 triangles.
+fn open() -> Surface {
+    let fan = [[0u32, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
+    let strip = [[2, 1, 6], [2, 6, 3], [3, 6, 7], [3, 7, 4], [5, 4, 7]];
+    let mesh = Mesh::new(rough(8), Faces::from_lists(fan.iter().chain(&strip)));
+    Surface::examined(mesh, None, Boundary::AsInterior).expect("an open mesh")
+}
+
 /// Every kind of closed mesh: each face kind alone and mixed, faces of up to 300 corners, several components.
-fn meshes() -> Vec<(String, Mesh)> {
+fn surfaces() -> impl Iterator<Item = (String, Surface)> {
     let mut meshes: Vec<(String, Mesh)> = [
         "tetrahedron",
         "cube",
@@ -54,42 +67,40 @@ fn meshes() -> Vec<(String, Mesh)> {
     meshes.push(("three components".into(), several));
     meshes.push(("dual of a bipyramid".into(), dual(&mesh("bipyramid:40"))));
     meshes.extend((0..20).map(|seed| (format!("random polygons {seed}"), random_polygons(seed))));
-    meshes
+    meshes.into_iter().map(|(name, mesh)| (name, Surface::new(mesh).expect("a closed mesh")))
 }
 
 /// The operator with its rows in fronts.
 fn in_front_order(case: &Both) -> (Operator, Numbering) {
-    let topology = Topology::new(&case.mesh.faces, case.mesh.len());
-    let numbering = in_fronts(&case.mesh.faces, &topology.incidence);
-    let operator = Operator::in_order(&case.mesh.faces, &topology, case.scheme, Some(&numbering));
+    let numbering = in_fronts(case.surface.faces(), case.surface.incidence());
+    let operator = Operator::in_order(&case.surface, case.scheme, Some(&numbering));
     (operator.expect("an operator"), numbering)
 }
 
 struct Both {
     name: String,
-    mesh: Mesh,
+    surface: Surface,
     scheme: Scheme,
     explicit: LimitSystem,
     operator: Operator,
 }
 
-fn both(name: &str, mesh: Mesh, scheme: Scheme) -> Both {
-    let topology = Topology::new(&mesh.faces, mesh.len());
+fn both(name: &str, surface: Surface, scheme: Scheme) -> Both {
     Both {
         name: format!("{name}, {scheme}"),
         scheme,
-        explicit: LimitSystem::new(&mesh, &topology, scheme).expect("an explicit system"),
-        operator: Operator::new(&mesh.faces, &topology, scheme).expect("an operator"),
-        mesh,
+        explicit: LimitSystem::new(&surface, scheme).expect("an explicit system"),
+        operator: Operator::new(&surface, scheme).expect("an operator"),
+        surface,
     }
 }
 
 fn all() -> impl Iterator<Item = Both> {
-    meshes().into_iter().flat_map(|(name, mesh)| {
+    surfaces().flat_map(|(name, surface)| {
         Scheme::ALL
             .into_iter()
-            .filter(|s| s.first_unsuitable_face(&mesh.faces).is_none())
-            .map(|scheme| both(&name, mesh.clone(), scheme))
+            .filter(|s| s.first_unsuitable_face(surface.faces()).is_none())
+            .map(|scheme| both(&name, surface.clone(), scheme))
             .collect::<Vec<_>>()
     })
 }
@@ -168,22 +179,16 @@ fn renumbering_permutes_rows_and_the_front_order_is_a_permutation() {
         let n = case.operator.len();
         let x = rough(n);
         let expected = product(&case.explicit, &x);
-        let faces = &case.mesh.faces;
-        let topology = Topology::new(faces, n);
-        let front = in_fronts(faces, &topology.incidence);
-        let shuffled = Order::Random(5).order(&case.mesh, &topology.incidence);
+        let front = in_fronts(case.surface.faces(), case.surface.incidence());
+        let shuffled = Order::Random(5).order(case.surface.mesh(), case.surface.incidence());
         let file = Numbering::new((0..n as u32).collect());
         for numbering in [front, Numbering::new(shuffled), file] {
-            let moved = Operator::in_order(faces, &topology, case.scheme, Some(&numbering)).expect("an operator");
+            let moved = Operator::in_order(&case.surface, case.scheme, Some(&numbering)).expect("an operator");
             let once = product(&moved, &numbering.there(&x));
             assert_close(&case.name, &numbering.back(&once), &expected, ROUNDING);
             assert_eq!(numbering.back(moved.diagonal()), case.operator.diagonal());
             assert_eq!(numbering.back(moved.weights()), case.operator.weights());
             assert_eq!(moved.bounds(), case.operator.bounds());
-            let closed = Operator::closed_in_order(faces, &topology.incidence, case.scheme, Some(&numbering))
-                .expect("an operator");
-            let again = product(&closed, &numbering.there(&x));
-            assert!(again == once, "{}", case.name);
         }
     }
 }
@@ -191,12 +196,12 @@ fn renumbering_permutes_rows_and_the_front_order_is_a_permutation() {
 #[test]
 fn distances_beyond_16_bits_are_stored_in_full() {
     // 40 002 vertices in random order: most neighbours are further than 2¹⁵ apart in one row or another.
-    let ordered = mesh("torus:200x201");
+    let ordered = surface("torus:200x201");
     let n = ordered.len();
-    let topology = Topology::new(&ordered.faces, n);
-    let order = Order::Random(3).order(&ordered, &topology.incidence);
+    let order = Order::Random(3).order(ordered.mesh(), ordered.incidence());
+    let shuffled = Surface::new(permute_vertices(ordered.mesh(), &order)).expect("a closed mesh");
     for scheme in [Scheme::CatmullClark, Scheme::Nasri] {
-        let case = both("shuffled torus", permute_vertices(&ordered, &order), scheme);
+        let case = both("shuffled torus", shuffled.clone(), scheme);
         assert!(case.operator.reach() > 1 << 15);
         let x = rough(n);
         assert_close(&case.name, &product(&case.operator, &x), &product(&case.explicit, &x), ROUNDING);
@@ -208,17 +213,14 @@ fn distances_beyond_16_bits_are_stored_in_full() {
 
 #[test]
 fn a_boundary_treated_as_interior_is_the_same_in_both() {
-    // An open fan and a strip: 7 triangles.
-    let faces = Faces::from_lists([[0u32, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5], [2, 1, 6], [2, 6, 3], [3, 6, 7]]);
-    let open = Mesh::new(rough(8), faces);
+    let open = open();
     for scheme in [Scheme::Loop, Scheme::Sqrt3] {
         let case = both("open", open.clone(), scheme);
         let x = rough(8);
         let expected = product(&case.explicit, &x);
         assert_close(&case.name, &product(&case.operator, &x), &expected, ROUNDING);
     }
-    let topology = Topology::new(&open.faces, 8);
-    assert!(Operator::new(&open.faces, &topology, Scheme::CatmullClark).is_err());
+    assert!(Operator::new(&open, Scheme::CatmullClark).is_err());
 }
 
 #[test]
@@ -230,15 +232,14 @@ fn bands_change_no_bit() {
         ("irregular-poly:20000", 9),
         ("irregular-poly:20000", 24),
     ] {
-        let mesh = mesh(name);
-        let topology = Topology::new(&mesh.faces, mesh.len());
+        let surface = surface(name);
         for scheme in Scheme::ALL {
-            if scheme.first_unsuitable_face(&mesh.faces).is_some() {
+            if scheme.first_unsuitable_face(surface.faces()).is_some() {
                 continue;
             }
-            let front = in_fronts(&mesh.faces, &topology.incidence);
-            let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&front)).expect("an operator");
-            let r = rough(mesh.len());
+            let front = in_fronts(surface.faces(), surface.incidence());
+            let operator = Operator::in_order(&surface, scheme, Some(&front)).expect("an operator");
+            let r = rough(surface.len());
             let recurrence = Recurrence::new((0.1, 1.0));
             let first = recurrence.coefficients().1;
             let iterate = |band| {
@@ -250,7 +251,7 @@ fn bands_change_no_bit() {
             };
             let plain = iterate(None);
             let reach = operator.reach();
-            for band in [reach, reach + 17, 2 * reach, 10 * mesh.len()] {
+            for band in [reach, reach + 17, 2 * reach, 10 * surface.len()] {
                 assert!(iterate(Some(band)) == plain, "{name}, {scheme}, bands of {band}");
             }
             // The same iterates as by the method that works with residuals from x = r's own start.
@@ -278,8 +279,8 @@ fn in_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
 #[test]
 fn mixed_precision_meets_the_tolerance_with_any_number_of_threads() {
     for case in all() {
-        let points = &case.mesh.positions;
-        let stop = Stop { tolerance: 1e-11 * case.mesh.diagonal(), max_iterations: 10_000 };
+        let points = case.surface.positions();
+        let stop = Stop { tolerance: 1e-11 * case.surface.diagonal(), max_iterations: 10_000 };
         let bound = case.explicit.bounds.lambda_min;
         let solve = || mixed::solve(&case.operator, points, &stop);
         let (control, report) = in_threads(1, solve);
@@ -298,9 +299,9 @@ fn mixed_precision_meets_the_tolerance_with_any_number_of_threads() {
 #[test]
 fn sweeps_in_waves_are_the_sweeps_one_after_the_other() {
     for (name, band) in [("torus:60x40", 200), ("irregular-quad:3000", 700)] {
-        let case = both(name, mesh(name), Scheme::CatmullClark);
+        let case = both(name, surface(name), Scheme::CatmullClark);
         let (operator, numbering) = in_front_order(&case);
-        let points = numbering.there(&case.mesh.positions);
+        let points = numbering.there(case.surface.positions());
         for count in [1, 8, 11] {
             let mut expected = points.clone();
             Wavefront::in_bands(&operator, None).relax(1.1, count, &points, &mut expected);
@@ -327,24 +328,22 @@ fn sweeps_by_colours_are_the_sweeps_one_after_the_other() {
         ("irregular-quad:30000", Scheme::CatmullClark),
         ("icosphere:7", Scheme::Loop),
     ];
-    let large = large.map(|(name, scheme)| both(name, mesh(name), scheme));
-    let open = Faces::from_lists([[0u32, 1, 2], [0, 2, 3], [0, 3, 4], [2, 1, 5], [2, 5, 3], [3, 5, 6]]);
-    let open = both("open", Mesh::new(rough(7), open), Scheme::Sqrt3);
+    let large = large.map(|(name, scheme)| both(name, surface(name), scheme));
+    let open = both("open", open(), Scheme::Sqrt3);
     for case in all().chain(large).chain([open]) {
-        let (faces, n) = (&case.mesh.faces, case.mesh.len());
-        let topology = Topology::new(faces, n);
-        let numbering = in_colours(faces, &topology.incidence);
-        let operator = Operator::in_order(faces, &topology, case.scheme, Some(&numbering)).expect("an operator");
-        let points = numbering.there(&case.mesh.positions);
-        let order = Order::Multicolour.order(&case.mesh, &topology.incidence);
+        let (faces, incidence) = (case.surface.faces(), case.surface.incidence());
+        let numbering = in_colours(faces, incidence);
+        let operator = Operator::in_order(&case.surface, case.scheme, Some(&numbering)).expect("an operator");
+        let points = numbering.there(case.surface.positions());
+        let order = Order::Multicolour.order(case.surface.mesh(), incidence);
         let mut sor = Sor::new(&operator, &points, 1.1, None);
-        let mut explicit = Sor::new(&case.explicit, &case.mesh.positions, 1.1, Some(&order));
+        let mut explicit = Sor::new(&case.explicit, case.surface.positions(), 1.1, Some(&order));
         for _ in 0..3 {
             sor.advance().expect("a sweep");
             explicit.advance().expect("a sweep");
         }
         let coloured = Coloured::new(&operator);
-        let colours = colouring(faces, &topology.incidence);
+        let colours = colouring(faces, incidence);
         let colours = colours.into_iter().max().expect("vertices") as usize + 1;
         assert!(coloured.colours() <= colours, "{}", case.name);
         for threads in [1, 2, 3] {
@@ -352,11 +351,11 @@ fn sweeps_by_colours_are_the_sweeps_one_after_the_other() {
             in_threads(threads, || coloured.relax(1.1, 3, &points, &mut x));
             assert!(sor.points() == x, "{}, {threads} threads", case.name);
         }
-        let length = case.mesh.diagonal();
+        let length = case.surface.diagonal();
         let back = numbering.back(sor.points());
         assert_close(&case.name, &back, explicit.points(), 10.0 * ROUNDING * length);
         // In any other order runs are short, and right.
-        if n < 2000 {
+        if case.surface.len() < 2000 {
             let mut sor = Sor::new(&case.operator, &points, 0.9, None);
             sor.advance().expect("a sweep");
             let mut x = points.clone();
@@ -369,16 +368,14 @@ fn sweeps_by_colours_are_the_sweeps_one_after_the_other() {
 #[test]
 fn gauss_seidel_by_colours_solves_and_knows_when_it_cannot() {
     let solve = |name: &str, tolerance| {
-        let case = both(name, mesh(name), Scheme::CatmullClark);
-        let topology = Topology::new(&case.mesh.faces, case.mesh.len());
-        let numbering = in_colours(&case.mesh.faces, &topology.incidence);
-        let operator =
-            Operator::in_order(&case.mesh.faces, &topology, case.scheme, Some(&numbering)).expect("an operator");
-        let points = numbering.there(&case.mesh.positions);
+        let case = both(name, surface(name), Scheme::CatmullClark);
+        let numbering = in_colours(case.surface.faces(), case.surface.incidence());
+        let operator = Operator::in_order(&case.surface, case.scheme, Some(&numbering)).expect("an operator");
+        let points = numbering.there(case.surface.positions());
         let stop = Stop { tolerance, max_iterations: 1000 };
         let (control, report) = by_colours(&operator, &points, 1.0, &stop);
         let control = numbering.back(&control);
-        let errors = Rows::new(points.len()).errors(&case.explicit, &case.mesh.positions, &control);
+        let errors = Rows::new(points.len()).errors(&case.explicit, case.surface.positions(), &control);
         (report, errors.max)
     };
     let (report, error) = solve("irregular-quad:3000", 1e-10);
@@ -394,16 +391,16 @@ fn gauss_seidel_by_colours_solves_and_knows_when_it_cannot() {
 
 /// 163 842 vertices, above the size from which iterations are grouped, and what they are solved to.
 fn large() -> (Both, Operator, Numbering, Stop) {
-    let case = both("icosphere:7", mesh("icosphere:7"), Scheme::Loop);
+    let case = both("icosphere:7", surface("icosphere:7"), Scheme::Loop);
     let (operator, numbering) = in_front_order(&case);
-    let stop = Stop { tolerance: 1e-10 * case.mesh.diagonal(), max_iterations: 1000 };
+    let stop = Stop { tolerance: 1e-10 * case.surface.diagonal(), max_iterations: 1000 };
     (case, operator, numbering, stop)
 }
 
 #[test]
 fn gauss_seidel_in_waves_solves_large_meshes() {
     let (case, operator, numbering, stop) = large();
-    let points = numbering.there(&case.mesh.positions);
+    let points = numbering.there(case.surface.positions());
     let (control, report) = in_waves(&operator, &points, 1.0, &stop);
     assert_eq!(report.outcome, Outcome::Converged);
     let mut sor = Sor::new(&operator, &points, 1.0, None);
@@ -421,14 +418,14 @@ fn gauss_seidel_in_waves_solves_large_meshes() {
 #[test]
 fn large_meshes_take_the_banded_way_with_the_same_result_as_the_explicit_method() {
     let (case, operator, numbering, stop) = large();
-    let points = numbering.there(&case.mesh.positions);
+    let points = numbering.there(case.surface.positions());
     let bound = operator.bounds().lambda_min;
     let solve = || mixed::solve(&operator, &points, &stop);
     let one = in_threads(1, solve);
     assert!(one == in_threads(2, solve));
     assert_eq!(one.1.outcome, Outcome::Converged);
     let setup = Setup::Chebyshev { spectrum: (bound, 1.0) };
-    let reference = run(&case.explicit, &case.mesh.positions, setup, &stop);
+    let reference = run(&case.explicit, case.surface.positions(), setup, &stop);
     let expected = numbering.there(&reference.points);
     // Both are within tolerance/λ_min of the solution, in a norm close to the greatest difference.
     assert_close("icosphere:7", &one.0, &expected, 2.0 * stop.tolerance / bound);
@@ -437,13 +434,14 @@ fn large_meshes_take_the_banded_way_with_the_same_result_as_the_explicit_method(
 
 #[test]
 fn mixed_precision_stalls_on_inconsistent_data_of_a_singular_matrix() {
-    let case = both("cube", mesh("cube"), Scheme::CatmullClark);
+    let case = both("cube", surface("cube"), Scheme::CatmullClark);
     let stop = Stop { tolerance: 1e-10, max_iterations: 10_000 };
-    let (_, report) = mixed::solve(&case.operator, &case.mesh.positions, &stop);
+    let (_, report) = mixed::solve(&case.operator, case.surface.positions(), &stop);
     assert_eq!(report.outcome, Outcome::Stagnated);
     // The cube's own points have no part in the kernel.
-    let exact = both("cube", builtin("cube").expect("a mesh"), Scheme::CatmullClark);
-    let (_, report) = mixed::solve(&exact.operator, &exact.mesh.positions, &stop);
+    let exact = Surface::new(builtin("cube").expect("a mesh")).expect("a closed mesh");
+    let exact = both("cube", exact, Scheme::CatmullClark);
+    let (_, report) = mixed::solve(&exact.operator, exact.surface.positions(), &stop);
     assert_eq!(report.outcome, Outcome::Converged);
 }
 
@@ -452,11 +450,11 @@ fn an_interval_that_is_too_short_is_corrected() {
     // Odd prisms have λ_min ≈ 0.82/k² and no proven bound.
     let mut prism = mesh("prism:7");
     add_noise(&mut prism, 0.2, 9);
-    let case = both("prism:7", prism, Scheme::CatmullClark);
+    let case = both("prism:7", Surface::new(prism).expect("a closed mesh"), Scheme::CatmullClark);
     let stop = Stop { tolerance: 1e-10, max_iterations: 10_000 };
-    let (control, report) = mixed::solve(&case.operator, &case.mesh.positions, &stop);
+    let (control, report) = mixed::solve(&case.operator, case.surface.positions(), &stop);
     assert_eq!(report.outcome, Outcome::Converged, "{report:?}");
-    let lu = run(&case.explicit, &case.mesh.positions, Setup::Lu, &stop);
+    let lu = run(&case.explicit, case.surface.positions(), Setup::Lu, &stop);
     assert_close("prism:7", &control, &lu.points, 1e-8);
 }
 
@@ -465,8 +463,7 @@ fn scatter_is_recognised_and_mended() {
     for name in ["torus:300x300", "irregular-quad:90000", "irregular-tri:90000", "icosphere:6"] {
         let mesh = mesh(name);
         assert!(!is_scattered(&mesh.faces), "{name}");
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        let order = Order::Random(2).order(&mesh, &topology.incidence);
+        let order = Order::Random(2).order(&mesh, &Incidence::new(&mesh.faces, mesh.len()));
         for scattered in [permute_vertices(&mesh, &order), shuffle_faces(&permute_vertices(&mesh, &order), 4)] {
             assert!(is_scattered(&scattered.faces), "{name}");
             let (mended, order) = along_curve(&scattered).expect("good indices");
@@ -491,7 +488,7 @@ fn scatter_is_recognised_and_mended() {
 #[test]
 fn the_inverse_decays_as_on_the_infinite_grid() {
     // T⁻¹ of T = [1 4 1]/6 has the entries √3 (−q)^|k|, q = 2 − √3, and A = T ⊗ T; largest in ring m: 3 q^m.
-    let case = both("torus:64x64", mesh("torus:64x64"), Scheme::CatmullClark);
+    let case = both("torus:64x64", surface("torus:64x64"), Scheme::CatmullClark);
     let rings = decay(&case.operator, 1000, 1e-10);
     let q = 2.0 - 3f64.sqrt();
     assert!(rings.len() >= 17, "{rings:?}");
@@ -504,13 +501,13 @@ fn the_inverse_decays_as_on_the_infinite_grid() {
 #[test]
 fn local_edits_give_what_solving_anew_gives() {
     for case in all().filter(|c| c.explicit.bounds.lambda_min > 0.05) {
-        let points = &case.mesh.positions;
+        let points = case.surface.positions();
         let n = points.len();
-        let tolerance = 1e-11 * case.mesh.diagonal();
+        let tolerance = 1e-11 * case.surface.diagonal();
         let stop = Stop { tolerance, max_iterations: 1000 };
         let bound = case.explicit.bounds.lambda_min;
         let (control, _) = mixed::solve(&case.operator, points, &stop);
-        let mut editor = Editor::new(&case.operator, points.clone(), control);
+        let mut editor = Editor::new(&case.operator, points.to_vec(), control);
         let moves: Vec<(u32, DVec3)> =
             [0, n / 3, n - 1].map(|v| (v as u32, points[v] + DVec3::new(0.1, -0.2, 0.05))).to_vec();
         // Twice: an edit leaves a solution to edit.
@@ -532,13 +529,13 @@ fn local_edits_give_what_solving_anew_gives() {
 
 #[test]
 fn an_edit_of_many_points_solves_all_anew() {
-    let case = both("icosphere:5", mesh("icosphere:5"), Scheme::Loop);
-    let points = &case.mesh.positions;
+    let case = both("icosphere:5", surface("icosphere:5"), Scheme::Loop);
+    let points = case.surface.positions();
     let n = points.len();
-    let tolerance = 1e-10 * case.mesh.diagonal();
+    let tolerance = 1e-10 * case.surface.diagonal();
     let stop = Stop { tolerance, max_iterations: 1000 };
     let (control, _) = mixed::solve(&case.operator, points, &stop);
-    let mut editor = Editor::new(&case.operator, points.clone(), control);
+    let mut editor = Editor::new(&case.operator, points.to_vec(), control);
     for (count, anew) in [(1, false), (n / 10, true), (n, true), (2, false)] {
         let moves: Vec<(u32, DVec3)> = (0..count)
             .map(|k| k * n / count)
@@ -557,13 +554,13 @@ fn an_edit_of_many_points_solves_all_anew() {
 #[test]
 fn the_work_of_an_edit_does_not_grow_with_the_mesh() {
     let work = |name| {
-        let case = both(name, mesh(name), Scheme::Loop);
-        let points = case.mesh.positions.clone();
+        let case = both(name, surface(name), Scheme::Loop);
+        let points = case.surface.positions();
         let stop = Stop { tolerance: 1e-10, max_iterations: 1000 };
-        let (control, _) = mixed::solve(&case.operator, &points, &stop);
-        let mut editor = Editor::new(&case.operator, points.clone(), control);
+        let (control, _) = mixed::solve(&case.operator, points, &stop);
+        let mut editor = Editor::new(&case.operator, points.to_vec(), control);
         let edit = editor.edit(&[(20, points[20] + DVec3::X)], 1e-8, usize::MAX);
-        (edit.touched, case.mesh.len())
+        (edit.touched, case.surface.len())
     };
     let (small, _) = work("icosphere:5");
     let (large, n) = work("icosphere:7");
@@ -574,17 +571,16 @@ fn the_work_of_an_edit_does_not_grow_with_the_mesh() {
 fn auto_returns_to_file_order_and_meets_the_tolerance() {
     // Above and below the size from which vertices are renumbered, in good and in random order.
     for name in ["irregular-quad:3000", "irregular-quad:60000", "icosphere:6", "irregular-poly:60000"] {
-        let good = mesh(name);
-        let topology = Topology::new(&good.faces, good.len());
-        let order = Order::Random(2).order(&good, &topology.incidence);
-        let scattered = shuffle_faces(&permute_vertices(&good, &order), 4);
-        for mesh in [&good, &scattered] {
-            let scheme = Scheme::default_for(&mesh.faces);
-            let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 1000 };
-            let found = control_points(mesh, None, scheme, &stop).expect("a system");
+        let good = surface(name);
+        let order = Order::Random(2).order(good.mesh(), good.incidence());
+        let scattered = shuffle_faces(&permute_vertices(good.mesh(), &order), 4);
+        for surface in [good, Surface::new(scattered).expect("a closed mesh")] {
+            let scheme = Scheme::default_for(surface.faces());
+            let stop = Stop { tolerance: 1e-10 * surface.diagonal(), max_iterations: 1000 };
+            let found = control_points(&surface, scheme, &stop).expect("a system");
             assert_eq!(found.report.outcome, Outcome::Converged, "{name}");
-            let case = both(name, mesh.clone(), scheme);
-            let errors = Rows::new(mesh.len()).errors(&case.explicit, &mesh.positions, &found.points);
+            let explicit = LimitSystem::new(&surface, scheme).expect("an explicit system");
+            let errors = Rows::new(surface.len()).errors(&explicit, surface.positions(), &found.points);
             assert!(errors.max <= 1.01 * stop.tolerance, "{name}: {errors:?}");
         }
     }
@@ -592,6 +588,7 @@ fn auto_returns_to_file_order_and_meets_the_tolerance() {
     let mut prism = mesh("prism:401");
     add_noise(&mut prism, 0.1, 3);
     let stop = Stop { tolerance: 1e-9, max_iterations: 10_000 };
-    let found = control_points(&prism, None, Scheme::CatmullClark, &stop).expect("a system");
+    let prism = Surface::new(prism).expect("a closed mesh");
+    let found = control_points(&prism, Scheme::CatmullClark, &stop).expect("a system");
     assert_eq!(found.report.outcome, Outcome::Converged, "{:?}", found.report);
 }

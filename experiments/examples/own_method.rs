@@ -7,7 +7,7 @@ use glam::DVec3;
 use limitlab::analysis::comparison::{Row, compare, entries};
 use limitlab::analysis::{own::Own, spectrum::spectrum, sweep::rounding_floor, sweep::sweep};
 use limitlab::assemble::LimitSystem;
-use limitlab::mesh::{Topology, builtin, noise::add_noise};
+use limitlab::mesh::{Surface, builtin, noise::move_vertices};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Errors, Failure, Iterate, Method, Stop, system::Rows};
 use limitlab_experiments::studies::comparison::{figure, table};
@@ -37,24 +37,24 @@ fn main() -> limitlab::Result<()> {
 }
 
 pub fn run(out: &Path) -> limitlab::Result<Vec<Row>> {
-    let mut mesh = builtin::builtin("torus:16x12")?; // or mesh::io::read(path)?.mesh, validated
-    add_noise(&mut mesh, 0.1, 1);
-    let system = LimitSystem::new(&mesh, &Topology::new(&mesh.faces, mesh.len()), Scheme::CatmullClark)?;
+    let mut surface = Surface::new(builtin::builtin("torus:16x12")?)?; // or mesh::io::read(path)?.mesh
+    move_vertices(&mut surface, 0.1, 1);
+    let (system, points) = (LimitSystem::new(&surface, Scheme::CatmullClark)?, surface.positions());
     let (theirs, columns) = (CsrMatrix::from(&system.a), SparseColMat::<u32, f64>::from(&system.a));
     println!("A has {} entries in nalgebra-sparse and {} in faer", theirs.nnz(), columns.compute_nnz());
 
     let spectrum = spectrum(&system)?;
     println!("λ(A) ∈ [{:.6}, {:.6}]", spectrum.a.min, spectrum.a.max);
-    let stop = Stop { tolerance: 1e-8 * mesh.diagonal(), max_iterations: 1000 };
+    let stop = Stop { tolerance: 1e-8 * surface.diagonal(), max_iterations: 1000 };
     let (name, parameter) = ("steepest-descent".into(), "mine".into());
     let mine = Own { name, parameter, start: &|s, points| Ok(Box::new(SteepestDescent(s, points, points.to_vec()))) };
     let lines = entries(&system, &spectrum, &[Method::WPia, Method::Cg, Method::Lu], None, "file")?;
-    let rows = compare(&system, &spectrum, &mesh.positions, &lines, &[mine], &stop, &mut || ())?;
+    let rows = compare(&system, &spectrum, points, &lines, &[mine], &stop, &mut || ())?;
     println!("{}", table("own".into(), "My method".into(), "A torus.".into(), &rows).to_markdown());
     limitlab::output::create_dir(out)?;
     figure("My method".into(), "mesh units", &rows).render()?.save(&out.join("own_method.png"))?;
     let grid = vec![(Method::Pia, (1..=20).map(|k| f64::from(k) / 10.0).collect())];
-    let found = sweep(&system, &mesh.positions, &grid, None, &stop, rounding_floor(mesh.diagonal()), &|_| ())?;
+    let found = sweep(&system, points, &grid, None, &stop, rounding_floor(surface.diagonal()), &|_| ())?;
     println!("best ω of PIA: {:?}", found.best(Method::Pia).map(|row| (row.omega, row.iterations)));
     Ok(rows)
 }

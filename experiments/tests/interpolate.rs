@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use assert_cmd::Command;
 use glam::DVec3;
-use limitlab::mesh::{Mesh, builtin, io, noise};
+use limitlab::mesh::{Mesh, Surface, builtin, io, noise};
 use limitlab::schemes::{Refinement, catmull_clark, doo_sabin};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::pipelines::{ROUNDING, centroid, distance, noisy, topology};
+use crate::common::pipelines::{ROUNDING, centroid, distance, noisy};
 
 /// Runs in a folder of its own; the output there is `out.ply` unless told.
 struct Bench {
@@ -61,6 +61,10 @@ impl Bench {
     }
 }
 
+fn surface(mesh: &Mesh) -> Surface {
+    Surface::new(mesh.clone()).unwrap()
+}
+
 fn with_noise(name: &str) -> Mesh {
     let mut mesh = builtin::builtin(name).unwrap();
     noise::add_noise(&mut mesh, 0.1, 1);
@@ -83,14 +87,14 @@ fn a_control_mesh_refined_again_and_again_passes_through_the_points() {
         let given = with_noise(mesh);
         assert_eq!(loaded.mesh.faces, given.faces);
         let mut before = distance(&loaded.mesh.positions, &given.positions);
-        let mut fine = loaded.mesh;
+        let mut fine = surface(&loaded.mesh);
         for _ in 0..6 {
-            fine = scheme.refine_n(&fine, 1).unwrap();
-            let now = distance(&fine.positions[..given.len()], &given.positions);
+            fine = scheme.refined(&fine).unwrap();
+            let now = distance(&fine.positions()[..given.len()], &given.positions);
             assert!(now < 0.8 * before, "{mesh} {scheme}: {now} after {before}");
             before = now;
         }
-        let limits = scheme.limit_positions(&fine, &topology(&fine)).unwrap();
+        let limits = scheme.limit_positions(&fine).unwrap();
         assert!(distance(&limits[..given.len()], &given.positions) < 1e-11, "{mesh} {scheme}");
     }
 }
@@ -154,17 +158,17 @@ fn two_phases_give_exact_centroids_with_handles_and_subsets() {
         );
         let (json, loaded) = bench.run(&arguments);
         assert_eq!(json["interpolated"], 11);
-        let first = given.faces.len() + topology(&given).edges();
+        let first = given.faces.len() + surface(&given).topology().edges();
         for v in (0..10).chain([20]) {
             assert!(centroid(&loaded.mesh, first + v).distance(given.positions[v]) < ROUNDING);
         }
     }
     let (_, plain) = bench.run("irregular-poly:40 --noise 0.1 --scheme nasri --tol 1e-13 --subdivide 2");
     let (_, control) = bench.run("irregular-poly:40 --noise 0.1 --scheme nasri --tol 1e-13");
-    let expected = Refinement::DooSabin.refine_n(&control.mesh, 2).unwrap();
+    let control = surface(&control.mesh);
+    let expected = Refinement::DooSabin.refine_n(&control, 2).unwrap();
     assert!(distance(&plain.mesh.positions, &expected.positions) < ROUNDING);
-    let at = topology(&control.mesh);
-    let limits = doo_sabin::limit_positions(doo_sabin::Rule::DooSabin, &control.mesh, &at).unwrap();
+    let limits = doo_sabin::limit_positions(doo_sabin::Rule::DooSabin, &control).unwrap();
     assert!(distance(&limits, &given.positions) < ROUNDING);
 }
 
@@ -176,7 +180,7 @@ fn a_subset_moves_no_other_vertex() {
         bench.run(&format!("icosphere:1 --noise 0.1 --scheme catmull-clark --tol 1e-13 --vertices {marks}"));
     assert_eq!(json["interpolated"], 6);
     let given = with_noise("icosphere:1");
-    let limits = catmull_clark::limit_positions(&loaded.mesh, &topology(&loaded.mesh)).unwrap();
+    let limits = catmull_clark::limit_positions(&surface(&loaded.mesh)).unwrap();
     for (v, limit) in limits.iter().enumerate() {
         let marked = [3, 5, 8, 9, 10, 11].contains(&v);
         let point = if marked { *limit } else { loaded.mesh.positions[v] };
@@ -194,7 +198,7 @@ fn alpha_chooses_what_is_interpolated() {
         assert_eq!(loaded.mesh.positions[v] == given.positions[v], v == 4 || v == 5);
     }
     let (_, kobbelt) = bench.run("icosphere:1 --noise 0.1 --alpha 0 --subdivide 3");
-    let expected = Refinement::Sqrt3.refine_n(&given, 3).unwrap();
+    let expected = Refinement::Sqrt3.refine_n(&surface(&given), 3).unwrap();
     assert!(distance(&kobbelt.mesh.positions, &expected.positions) < ROUNDING);
 }
 
@@ -271,7 +275,7 @@ fn surfaces_without_a_system_pass_through_the_points() {
         let (json, loaded) =
             bench.run(&format!("icosphere:1 --noise 0.1 --method {name} --subdivide 2 --limit --write-normals"));
         assert_eq!((&json["scheme"], &json["method"]), (&name.into(), &name.into()));
-        assert_eq!(loaded.mesh, scheme.refine_n(&given, 2).unwrap());
+        assert_eq!(loaded.mesh, scheme.refine_n(&surface(&given), 2).unwrap());
         let normals = loaded.normals.unwrap();
         assert!(normals.iter().all(|n| (n.length() - 1.0).abs() < ROUNDING));
         assert_eq!(loaded.mesh.positions[..n], given.positions);

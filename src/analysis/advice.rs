@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::singularity::{SingularComponent, Singularity};
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::Surface;
 use crate::schemes::{Scheme, SingularSet};
 use crate::solvers::{Method, Outcome, Report, Stop};
 
@@ -27,21 +27,21 @@ pub struct Failed {
 }
 
 impl Failed {
-    /// A run on the positions of `mesh`; on those marked as `interpolated` alone where there are marks. O(corners).
+    /// A run on the positions of `surface`; on those marked as `interpolated` alone where there are marks. O(corners).
     pub fn new(
-        (mesh, topology, scheme): (&Mesh, &Topology, Scheme),
+        (surface, scheme): (&Surface, Scheme),
         interpolated: Option<&[bool]>,
         method: Option<Method>,
         report: &Report,
         stop: &Stop,
     ) -> Self {
-        let mut verdict = Singularity::detect(mesh, topology, scheme);
+        let mut verdict = Singularity::detect(surface, scheme);
         let mut signs = verdict.colouring.iter().enumerate().filter(|(_, sign)| **sign != 0);
         // A vertex that stays holds the others: only whole components are singular.
         if interpolated.is_some_and(|marks| signs.any(|(v, _)| !marks[v])) {
             verdict.singular.clear();
         }
-        let largest = mesh.positions.iter().fold(DVec3::ZERO, |m, p| m.max(p.abs())).max_element();
+        let largest = surface.positions().iter().fold(DVec3::ZERO, |m, p| m.max(p.abs())).max_element();
         Failed {
             method,
             outcome: report.outcome,

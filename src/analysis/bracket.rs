@@ -36,7 +36,7 @@ use crate::assemble::csr::Pattern;
 use crate::assemble::system::valences;
 use crate::error::Result;
 use crate::mesh::topology::NONE;
-use crate::mesh::{Faces, Topology};
+use crate::mesh::{Faces, Surface, Topology};
 use crate::schemes::{Masks, Scheme};
 
 /// Larger faces have no patch: their elements are dense.
@@ -102,14 +102,16 @@ struct Form<'a> {
 
 impl<'a> Form<'a> {
     /// `None` if the mesh has a boundary or a face that is too large.
-    fn new(faces: &'a Faces, topology: &'a Topology, scheme: Scheme, operator: Operator, end: End) -> Option<Self> {
+    fn new(surface: &'a Surface, scheme: Scheme, operator: Operator, end: End) -> Option<Self> {
+        let faces = surface.faces();
         let mut occurs = [false; LARGEST_FACE + 1];
         for face in faces.iter() {
             *occurs.get_mut(face.len())? = true;
         }
-        if !topology.is_closed() {
+        if !surface.is_closed() {
             return None;
         }
+        let topology = surface.topology();
         let sign = match end {
             End::Lowest => 1.0,
             End::Highest => -1.0,
@@ -122,7 +124,7 @@ impl<'a> Form<'a> {
             let least = eigenvalues(&couplings[size]);
             shifts[size] = -least.into_iter().fold(f64::INFINITY, f64::min);
         }
-        let valences = valences(faces, topology);
+        let valences = valences(surface);
         let incidence = &topology.incidence;
         let (potential, metric) = valences
             .par_iter()
@@ -205,8 +207,8 @@ pub fn alternation_is_all(faces: &Faces, scheme: Scheme) -> bool {
 /// The lower bounds min c_i (upper: max) that elements and potentials alone prove: at least as good as those of
 /// [`SpectralBounds`](crate::assemble::bounds::SpectralBounds), as they know the sizes of the faces at each vertex.
 /// `None` on meshes with a boundary or a face of more than 64 corners. O(corners).
-pub fn element_bound(faces: &Faces, topology: &Topology, scheme: Scheme, operator: Operator, end: End) -> Option<f64> {
-    let form = Form::new(faces, topology, scheme, operator, end)?;
+pub fn element_bound(surface: &Surface, scheme: Scheme, operator: Operator, end: End) -> Option<f64> {
+    let form = Form::new(surface, scheme, operator, end)?;
     let least = form.potential.iter().copied().fold(f64::INFINITY, f64::min);
     Some(match end {
         End::Lowest => least,
@@ -228,11 +230,10 @@ pub fn element_bound(faces: &Faces, topology: &Topology, scheme: Scheme, operato
 /// use limitlab::analysis::bracket::bracket;
 /// use limitlab::analysis::{eigen::End, spectrum::Operator};
 /// use limitlab::schemes::Scheme;
-/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::mesh::{Surface, builtin};
 ///
-/// let mesh = builtin::builtin("quad-sphere:7")?;
-/// let topology = Topology::new(&mesh.faces, mesh.len());
-/// let found = bracket(&mesh.faces, &topology, Scheme::CatmullClark, Operator::A, End::Lowest, 1e-8)?;
+/// let surface = Surface::new(builtin::builtin("quad-sphere:7")?)?;
+/// let found = bracket(&surface, Scheme::CatmullClark, Operator::A, End::Lowest, 1e-8)?;
 /// // One mode around each of the eight vertices of valence 3, below the edge 1/9 of the continuum.
 /// let found = found.expect("eight exceptional vertices");
 /// assert_eq!((found.multiplicity, found.kinds), (8, 1));
@@ -240,14 +241,13 @@ pub fn element_bound(faces: &Faces, topology: &Topology, scheme: Scheme, operato
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn bracket(
-    faces: &Faces,
-    topology: &Topology,
+    surface: &Surface,
     scheme: Scheme,
     operator: Operator,
     end: End,
     tolerance: f64,
 ) -> Result<Option<Bracket>> {
-    let Some(form) = Form::new(faces, topology, scheme, operator, end) else {
+    let Some(form) = Form::new(surface, scheme, operator, end) else {
         return Ok(None);
     };
     let (level, seeds) = form.exceptional();

@@ -127,11 +127,10 @@ impl Eigenpairs {
 /// use limitlab::analysis::spectrum::{Operator, symmetric};
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::schemes::Scheme;
-/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::mesh::{Surface, builtin};
 ///
-/// let mesh = builtin::torus(30, 30);
-/// let topology = Topology::new(&mesh.faces, mesh.len());
-/// let system = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark)?;
+/// let surface = Surface::new(builtin::torus(30, 30))?;
+/// let system = LimitSystem::new(&surface, Scheme::CatmullClark)?;
 /// let request = Request { end: End::Lowest, count: 5, tolerance: 1e-10, spectrum: (0.0, 1.0) };
 /// let pairs = extreme(&symmetric(&system, Operator::A), &request)?;
 /// // ((2 + cos θ)/3)((2 + cos φ)/3): 1/9 once, the next value four times.

@@ -66,13 +66,12 @@ pub struct Interval {
 /// use limitlab::analysis::{interval::interval, spectrum};
 /// use limitlab::assemble::{LimitSystem, Operator};
 /// use limitlab::schemes::Scheme;
-/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::mesh::{Surface, builtin};
 ///
-/// let mesh = builtin::builtin("irregular-quad:3000")?;
-/// let topology = Topology::new(&mesh.faces, mesh.len());
-/// let operator = Operator::new(&mesh.faces, &topology, Scheme::CatmullClark)?;
+/// let surface = Surface::new(builtin::builtin("irregular-quad:3000")?)?;
+/// let operator = Operator::new(&surface, Scheme::CatmullClark)?;
 /// let found = interval(&operator, spectrum::Operator::Jacobi)?;
-/// let exact = spectrum::spectrum(&LimitSystem::new(&mesh, &topology, Scheme::CatmullClark)?)?.jacobi;
+/// let exact = spectrum::spectrum(&LimitSystem::new(&surface, Scheme::CatmullClark)?)?.jacobi;
 /// assert!(exact.max <= found.high && found.high < 1.1 * exact.max);
 /// assert!(exact.min <= found.least && found.low > 0.9 * exact.min);
 /// # Ok::<(), limitlab::Error>(())

@@ -30,7 +30,7 @@ use rayon::prelude::*;
 use super::tridiagonal::Tridiagonal;
 use crate::assemble::{Csr, LimitSystem};
 use crate::error::{Error, Result};
-use crate::mesh::{Faces, Topology};
+use crate::mesh::Surface;
 use crate::solvers::Stop;
 
 /// What of a mesh is regular.
@@ -45,7 +45,8 @@ pub struct Regularity {
 
 impl Regularity {
     /// O(corners).
-    pub fn new(faces: &Faces, topology: &Topology) -> Self {
+    pub fn new(surface: &Surface) -> Self {
+        let (faces, topology) = (surface.faces(), surface.topology());
         let n = topology.incidence.vertices();
         let mut star = Vec::new();
         let regular: Vec<bool> = (0..n)
@@ -57,7 +58,7 @@ impl Regularity {
                     && star.iter().all(quads)
             })
             .collect();
-        let chains = chains(faces, topology, &regular);
+        let chains = chains(surface, &regular);
         Regularity { regular, chains }
     }
 
@@ -75,7 +76,8 @@ impl Regularity {
 }
 
 /// The straight lines of half-edges through regular vertices.
-fn chains(faces: &Faces, topology: &Topology, regular: &[bool]) -> Vec<(Vec<u32>, bool)> {
+fn chains(surface: &Surface, regular: &[bool]) -> Vec<(Vec<u32>, bool)> {
+    let (faces, topology) = (surface.faces(), surface.topology());
     let tail = |c: u32| faces.corners()[c as usize] as usize;
     // Opposite around a regular vertex: two quarters on.
     let quarter = |c: u32| topology.counter_clockwise(faces, c);
@@ -337,39 +339,31 @@ mod tests {
         mesh
     }
 
-    fn parts(mesh: &Mesh) -> (Topology, Regularity, LimitSystem) {
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        let regularity = Regularity::new(&mesh.faces, &topology);
-        let system = LimitSystem::new(mesh, &topology, Scheme::CatmullClark).unwrap();
-        (topology, regularity, system)
+    fn parts(mesh: &Mesh) -> (Surface, Regularity, LimitSystem) {
+        let surface = Surface::new(mesh.clone()).unwrap();
+        let regularity = Regularity::new(&surface);
+        let system = LimitSystem::new(&surface, Scheme::CatmullClark).unwrap();
+        (surface, regularity, system)
     }
 
     #[test]
     fn chains_pass_every_regular_vertex_twice_and_cover_its_edges() {
         let cubes = generate::quad_split(&builtin::builtin("cubes:2").unwrap());
-        let open = Mesh::new(
-            vec![DVec3::ZERO; 20],
-            Faces::from_lists((0..12).map(|f| {
-                let v = f / 4 * 5 + f % 4;
-                [v, v + 1, v + 6, v + 5]
-            })),
-        );
         let meshes = [
             (noisy("torus:8x6"), 48, 14),
             (noisy("quad-sphere:3"), 378, 12 + 21),
             (cubes, 36, 2 * (12 + 3)),
-            (open, 6, 5),
             (noisy("icosphere:2"), 0, 0),
         ];
         for (mesh, regular, chains) in &meshes {
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            let found = Regularity::new(&mesh.faces, &topology);
+            let surface = Surface::new(mesh.clone()).unwrap();
+            let found = Regularity::new(&surface);
             assert_eq!(found.regular.iter().filter(|&&r| r).count(), *regular);
             assert_eq!(found.chains.len(), *chains);
         }
         for name in ["irregular-quad:500", "irregular-poly:500", "quad-sphere:3"] {
             let mesh = noisy(name);
-            let (topology, found, _) = parts(&mesh);
+            let (surface, found, _) = parts(&mesh);
             let mut visits = vec![0; mesh.len()];
             for &v in found.chains.iter().flat_map(|(line, _)| line) {
                 visits[v as usize] += 1;
@@ -377,9 +371,9 @@ mod tests {
             assert!((0..mesh.len()).all(|v| visits[v] == 2 * u32::from(found.regular[v])));
             let edge = |c: u32| {
                 let tail = |c: u32| mesh.faces.corners()[c as usize] as usize;
-                found.regular[tail(c)] || topology.twin(c).is_some_and(|t| found.regular[tail(t)])
+                found.regular[tail(c)] || surface.topology().twin(c).is_some_and(|t| found.regular[tail(t)])
             };
-            let edges = topology.edge_sides().filter(|&c| edge(c)).count();
+            let edges = surface.topology().edge_sides().filter(|&c| edge(c)).count();
             let passed = |(line, closed): &(Vec<u32>, bool)| line.len() + usize::from(!closed);
             assert_eq!(found.chains.iter().map(passed).sum::<usize>(), edges);
         }

@@ -29,8 +29,8 @@ use rayon::prelude::*;
 use super::radius::sweep_radius;
 use crate::assemble::LimitSystem;
 use crate::error::Result;
+use crate::mesh::Surface;
 use crate::mesh::order::Order;
-use crate::mesh::{Mesh, Topology};
 use crate::solvers::gauss_seidel::{Sor, sweep};
 use crate::solvers::{Outcome, Stop, System, solve};
 
@@ -58,13 +58,13 @@ pub const ORDERS: [Order; 7] =
 /// # Errors
 /// If a spectral radius cannot be computed.
 pub fn order_study(
-    mesh: &Mesh,
-    topology: &Topology,
+    surface: &Surface,
     system: &LimitSystem,
     omegas: &[f64],
     random: u64,
     stop: &Stop,
 ) -> Result<Vec<Row>> {
+    let mesh = surface.mesh();
     let orders: Vec<Order> = ORDERS.into_iter().chain((1..=random).map(Order::Random)).collect();
     let jobs: Vec<(f64, Order)> =
         omegas.iter().flat_map(|&omega| orders.iter().map(move |&order| (omega, order))).collect();
@@ -72,7 +72,7 @@ pub fn order_study(
     let rows: Result<Vec<Row>> = jobs
         .into_par_iter()
         .map(|(omega, order)| {
-            let vertices = order.order(mesh, &topology.incidence);
+            let vertices = order.order(mesh, surface.incidence());
             let zero = vec![DVec3::ZERO; system.len()];
             let rho = sweep_radius(system, |x| {
                 sweep(system, &zero, omega, vertices.iter().map(|&i| i as usize), x);

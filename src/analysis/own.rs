@@ -24,7 +24,7 @@ pub type Start<'s> =
 /// use limitlab::analysis::own::Own;
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::schemes::Scheme;
-/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::mesh::{Surface, builtin};
 /// use limitlab::solvers::{Outcome, Stop, pia::Pia};
 ///
 /// // Richardson's iteration, as if it were not here.
@@ -33,10 +33,9 @@ pub type Start<'s> =
 ///     parameter: "ω=1.2".into(),
 ///     start: &|system, points| Ok(Box::new(Pia::new(system, points, 1.2))),
 /// };
-/// let mesh = builtin::builtin("octahedron")?;
-/// let topology = Topology::new(&mesh.faces, mesh.len());
-/// let system = LimitSystem::new(&mesh, &topology, Scheme::Loop)?;
-/// let solution = mine.run(&system, &mesh.positions, &Stop { tolerance: 1e-9, max_iterations: 100 });
+/// let surface = Surface::new(builtin::builtin("octahedron")?)?;
+/// let system = LimitSystem::new(&surface, Scheme::Loop)?;
+/// let solution = mine.run(&system, surface.positions(), &Stop { tolerance: 1e-9, max_iterations: 100 });
 /// assert_eq!(solution.report.outcome, Outcome::Converged);
 /// # Ok::<(), limitlab::Error>(())
 /// ```

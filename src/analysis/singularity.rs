@@ -12,8 +12,8 @@ use super::spectrum::{Operator, scales, symmetric};
 use super::{dense, eigen::Eigenvalue};
 use crate::assemble::LimitSystem;
 use crate::error::Result;
+use crate::mesh::Surface;
 use crate::mesh::incidence::{next_in, prev_in};
-use crate::mesh::{Mesh, Topology};
 use crate::schemes::{Scheme, SingularSet};
 use crate::solvers::Method;
 
@@ -71,7 +71,8 @@ impl Prediction {
 
 impl Singularity {
     /// Decides from the mesh alone. The points are the mesh's positions. O(corners).
-    pub fn detect(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Self {
+    pub fn detect(surface: &Surface, scheme: Scheme) -> Self {
+        let (mesh, topology) = (surface.mesh(), surface.topology());
         let (component, components) = topology.components(&mesh.faces);
         let set = scheme.singular_set();
         let mut verdict =
@@ -79,11 +80,11 @@ impl Singularity {
         let SingularSet::Bipartite { valence } = set else {
             return verdict;
         };
-        let mut colour = colour(mesh, topology);
+        let mut colour = colour(surface);
         let mut regular = vec![false; components];
         for v in 0..mesh.len() {
             let bad = valence.is_some_and(|valence| topology.incidence.face_count(v) != valence)
-                || neighbours(mesh, topology, v).any(|w| colour[w] == colour[v]);
+                || neighbours(surface, v).any(|w| colour[w] == colour[v]);
             if bad {
                 regular[component[v] as usize] = true;
             }
@@ -152,7 +153,8 @@ impl Singularity {
 }
 
 /// ±1 by breadth-first levels along edges.
-pub(super) fn colour(mesh: &Mesh, topology: &Topology) -> Vec<i8> {
+pub(super) fn colour(surface: &Surface) -> Vec<i8> {
+    let mesh = surface.mesh();
     let mut colour = vec![0i8; mesh.len()];
     let mut queue: Vec<usize> = Vec::with_capacity(mesh.len());
     for seed in 0..mesh.len() {
@@ -164,7 +166,7 @@ pub(super) fn colour(mesh: &Mesh, topology: &Topology) -> Vec<i8> {
         queue.push(seed);
         while let Some(&v) = queue.get(next) {
             next += 1;
-            for w in neighbours(mesh, topology, v) {
+            for w in neighbours(surface, v) {
                 if colour[w] == 0 {
                     colour[w] = -colour[v];
                     queue.push(w);
@@ -176,7 +178,8 @@ pub(super) fn colour(mesh: &Mesh, topology: &Topology) -> Vec<i8> {
 }
 
 /// The other ends of the edges at `v`; on closed meshes each comes twice.
-fn neighbours<'a>(mesh: &'a Mesh, topology: &'a Topology, v: usize) -> impl Iterator<Item = usize> + 'a {
+fn neighbours<'a>(surface: &'a Surface, v: usize) -> impl Iterator<Item = usize> + 'a {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let corners = mesh.faces.corners();
     topology.incidence.corners_at(v).iter().flat_map(move |&c| {
         let range = mesh.faces.range(topology.incidence.face_of(c));

@@ -14,8 +14,8 @@ use super::{dense, lanczos};
 use crate::assemble::bounds::SpectralBounds;
 use crate::assemble::{Csr, LimitSystem};
 use crate::error::Result;
+use crate::mesh::Surface;
 use crate::mesh::fronts::in_fronts;
-use crate::mesh::{Mesh, Topology};
 use crate::schemes::Scheme;
 use crate::solvers::System;
 use crate::solvers::system::Rows;
@@ -225,23 +225,23 @@ pub fn ends(system: &LimitSystem) -> Result<Ends> {
 /// ```
 /// use limitlab::analysis::spectrum::{Source, mesh_ends};
 /// use limitlab::schemes::Scheme;
-/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::mesh::{Surface, builtin};
 ///
-/// let mesh = builtin::builtin("quad-sphere:7")?;
-/// let topology = Topology::new(&mesh.faces, mesh.len());
-/// let ends = mesh_ends(&mesh, &topology, Scheme::CatmullClark)?;
+/// let surface = Surface::new(builtin::builtin("quad-sphere:7")?)?;
+/// let ends = mesh_ends(&surface, Scheme::CatmullClark)?;
 /// assert_eq!(ends.lambda_min.multiplicity.map(|m| m.count), Some(8));
 /// assert_eq!(ends.lambda_max.source, Source::Proven);
 /// assert_eq!(ends.lambda_max.multiplicity.map(|m| m.count), Some(1));
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn mesh_ends(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Result<Ends> {
+pub fn mesh_ends(surface: &Surface, scheme: Scheme) -> Result<Ends> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     if mesh.len() <= dense::LARGEST {
-        return ends(&LimitSystem::new(mesh, topology, scheme)?);
+        return ends(&LimitSystem::new(surface, scheme)?);
     }
-    let fronts = in_fronts(&mesh.faces, &topology.incidence);
-    let operator = crate::assemble::Operator::in_order(&mesh.faces, topology, scheme, Some(&fronts))?;
-    let signs: Vec<f64> = colour(mesh, topology).into_iter().map(f64::from).collect();
+    let fronts = in_fronts(surface.faces(), surface.incidence());
+    let operator = crate::assemble::Operator::in_order(surface, scheme, Some(&fronts))?;
+    let signs: Vec<f64> = colour(surface).into_iter().map(f64::from).collect();
     let known = Known {
         bounds: operator.bounds(),
         signs: fronts.there(&signs),
@@ -249,7 +249,7 @@ pub fn mesh_ends(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Result<End
         components: Some(topology.components(&mesh.faces).1),
     };
     let mut ends = known.ends(&operator, |which, end| {
-        let found = bracket(&mesh.faces, topology, scheme, which, end, ACCURACY)?;
+        let found = bracket(surface, scheme, which, end, ACCURACY)?;
         Ok(found.map(|found| Estimate {
             value: found.value,
             residual: found.width,
@@ -264,7 +264,7 @@ pub fn mesh_ends(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Result<End
             if estimate.source == Source::Lanczos && estimate.multiplicity.is_none() {
                 let system = match &system {
                     Some(system) => system,
-                    None => system.insert(LimitSystem::new(mesh, topology, scheme)?),
+                    None => system.insert(LimitSystem::new(surface, scheme)?),
                 };
                 count(&symmetric(system, which), end, estimate);
             }

@@ -13,7 +13,7 @@ use super::spectrum::Operator;
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::generate::quad_split;
-use crate::mesh::{Mesh, Topology, builtin};
+use crate::mesh::{Mesh, Surface, builtin};
 use crate::schemes::Scheme;
 
 /// The spectra of infinite regular meshes: A and D⁻¹A of valence 4 in quads or 6 in triangles.
@@ -78,18 +78,18 @@ pub fn valence_study(scheme: Scheme, valences: impl Iterator<Item = usize>) -> R
 
 fn row(scheme: Scheme, valence: usize) -> Result<Row> {
     let (mesh, poles) = star_mesh(scheme, valence);
-    let topology = Topology::new(&mesh.faces, mesh.len());
-    let system = LimitSystem::new(&mesh, &topology, scheme)?;
+    let surface = Surface::new(mesh)?;
+    let system = LimitSystem::new(&surface, scheme)?;
     let all = dense::full_eigenvalues(&system)?;
     let band = regular_band(scheme);
     let outside = |values: &[f64], (lo, hi): (f64, f64)| {
         let tolerance = 1e-9;
         values.iter().filter(|&&x| x < lo - tolerance || x > hi + tolerance).count()
     };
-    let mut near = vec![false; mesh.len()];
+    let mut near = vec![false; surface.len()];
     for pole in poles {
-        for &c in topology.incidence.corners_at(pole) {
-            for &w in mesh.faces.face(topology.incidence.face_of(c)) {
+        for &c in surface.incidence().corners_at(pole) {
+            for &w in surface.faces().face(surface.incidence().face_of(c)) {
                 near[w as usize] = true;
             }
         }
@@ -99,12 +99,12 @@ fn row(scheme: Scheme, valence: usize) -> Result<Row> {
         let total: f64 = mode.values.iter().map(|x| x * x).sum();
         let inside: f64 = mode.values.iter().zip(&near).filter(|(_, near)| **near).map(|(x, _)| x * x).sum();
         let peak =
-            (0..mesh.len()).fold(0, |best, i| if mode.values[i].abs() > mode.values[best].abs() { i } else { best });
-        Ok(Located { near_star: inside / total, peak, peak_valence: topology.incidence.face_count(peak), mode })
+            (0..surface.len()).fold(0, |best, i| if mode.values[i].abs() > mode.values[best].abs() { i } else { best });
+        Ok(Located { near_star: inside / total, peak, peak_valence: surface.incidence().face_count(peak), mode })
     };
     Ok(Row {
         valence,
-        vertices: mesh.len(),
+        vertices: surface.len(),
         separated_a: outside(&all.a, band.a),
         separated_jacobi: outside(&all.jacobi, band.jacobi),
         slow_pia: locate(Operator::A, End::Lowest)?,

@@ -10,12 +10,11 @@
 //! use faer::sparse::SparseColMat;
 //! use limitlab::assemble::{Csr, LimitSystem};
 //! use limitlab::schemes::Scheme;
-//! use limitlab::mesh::{Topology, builtin};
+//! use limitlab::mesh::{Surface, builtin};
 //! use nalgebra_sparse::CsrMatrix;
 //!
-//! let mesh = builtin::builtin("octahedron")?;
-//! let topology = Topology::new(&mesh.faces, mesh.len());
-//! let system = LimitSystem::new(&mesh, &topology, Scheme::Loop)?;
+//! let surface = Surface::new(builtin::builtin("octahedron")?)?;
+//! let system = LimitSystem::new(&surface, Scheme::Loop)?;
 //! let ours = CsrMatrix::from(&system.a);
 //! let ones = nalgebra::DVector::from_element(6, 1.0);
 //! assert!((&ours * &ones - &ones).amax() < 1e-15); // rows of A sum to 1

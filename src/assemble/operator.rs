@@ -9,10 +9,11 @@ use super::bounds::SpectralBounds;
 use super::codes::Neighbours;
 use super::source::Source;
 use super::stencil::{Point, Stencil, runs};
-use super::system::{check_boundary, check_faces};
+use super::system::check;
 use crate::error::Result;
 use crate::mesh::order::Numbering;
-use crate::mesh::{Faces, Incidence, Topology};
+use crate::mesh::surface::Renumbered;
+use crate::mesh::{Faces, Incidence, Surface, Topology};
 use crate::parallel;
 use crate::schemes::{Masks, Scheme};
 
@@ -37,12 +38,12 @@ pub struct Operator {
 }
 
 impl Operator {
-    /// The operator of `scheme` on a mesh that the validator has passed. O(corners), in parallel.
+    /// The operator of `scheme` on a mesh. O(corners), in parallel.
     ///
     /// # Errors
     /// As [`LimitSystem::new`](super::LimitSystem::new); more than 2³² − 1 neighbours.
-    pub fn new(faces: &Faces, topology: &Topology, scheme: Scheme) -> Result<Self> {
-        Self::in_order(faces, topology, scheme, None)
+    pub fn new(surface: &Surface, scheme: Scheme) -> Result<Self> {
+        Self::in_order(surface, scheme, None)
     }
 
     /// As [`new`](Self::new), with the rows in another order: the k-th is that of the vertex at place k, and its
@@ -53,36 +54,34 @@ impl Operator {
     ///
     /// # Panics
     /// If the numbering is of another number of vertices.
-    pub fn in_order(faces: &Faces, topology: &Topology, scheme: Scheme, numbering: Option<&Numbering>) -> Result<Self> {
-        check_boundary(faces, topology, scheme)?;
-        let open = (topology.boundary_edges() > 0).then_some(topology);
-        Self::build(faces, (&topology.incidence, open), topology.is_closed(), scheme, numbering)
+    pub fn in_order(surface: &Surface, scheme: Scheme, numbering: Option<&Numbering>) -> Result<Self> {
+        check(surface, scheme)?;
+        let open = if surface.is_closed() { None } else { Some(surface.topology()) };
+        Self::build(surface.faces(), (surface.incidence(), open), scheme, numbering)
     }
 
-    /// As [`in_order`](Self::in_order), on a mesh that is [closed](Incidence::is_closed): a topology is not needed.
+    /// As [`in_order`](Self::in_order), on a closed surface that was renumbered inside; the numbering is one of its
+    /// renumbered vertices.
     ///
     /// # Errors
-    /// A face that is no triangle under Loop or √3; more than 2³² − 1 neighbours.
-    ///
-    /// # Panics
-    /// If the numbering is of another number of vertices.
-    pub fn closed_in_order(
-        faces: &Faces,
-        incidence: &Incidence,
+    /// As [`new`](Self::new).
+    pub(crate) fn renumbered(
+        surface: &Surface,
+        renumbered: &Renumbered,
         scheme: Scheme,
         numbering: Option<&Numbering>,
     ) -> Result<Self> {
-        Self::build(faces, (incidence, None), true, scheme, numbering)
+        check(surface, scheme)?;
+        Self::build(&renumbered.faces, (&renumbered.incidence, None), scheme, numbering)
     }
 
     fn build(
         faces: &Faces,
         sides: (&Incidence, Option<&Topology>),
-        closed: bool,
         scheme: Scheme,
         numbering: Option<&Numbering>,
     ) -> Result<Self> {
-        check_faces(faces, scheme, sides.1.is_some())?;
+        let closed = sides.1.is_none();
         let source = Source::new(faces, sides, scheme, numbering);
         let kinds = source.kinds();
         let greatest = source.valences.iter().copied().max().unwrap_or(0);

@@ -8,7 +8,7 @@ use super::system::FaceBlocks;
 use crate::error::{Error, Result};
 use crate::memory::require;
 use crate::mesh::incidence::{next_in, prev_in, split_rows};
-use crate::mesh::{Faces, Topology};
+use crate::mesh::{Faces, Surface, Topology};
 use crate::pages::large;
 use crate::parallel;
 
@@ -160,13 +160,19 @@ fn close_gaps(offsets: &mut [u32], lengths: &[u32], mut shift: impl FnMut(Range<
 
 impl<'a> Rows<'a> {
     pub(super) fn new(
-        faces: &'a Faces,
-        topology: &'a Topology,
+        surface: &'a Surface,
         blocks: &'a FaceBlocks,
         by_valence: &'a [[f64; 2]],
         valence: &'a [u32],
     ) -> Self {
-        Rows { faces, topology, blocks, by_valence, valence, closed: topology.is_closed() }
+        Rows {
+            faces: surface.faces(),
+            topology: surface.topology(),
+            blocks,
+            by_valence,
+            valence,
+            closed: surface.is_closed(),
+        }
     }
 
     /// All rows.
@@ -174,36 +180,7 @@ impl<'a> Rows<'a> {
     /// # Errors
     /// More than 2³² − 1 entries, or than memory has room for.
     pub(super) fn arrays(&self) -> Result<Arrays> {
-        Ok(match self.fill(self.greatest_lengths())? {
-            Ok(arrays) => arrays,
-            // Not a manifold.
-            Err(lengths) => match self.fill(lengths)? {
-                Ok(arrays) => arrays,
-                Err(_) => unreachable!("the lengths found are those of the rows"),
-            },
-        })
-    }
-
-    /// The greatest length of every row on a manifold, attained where faces share an edge or a vertex at most.
-    fn greatest_lengths(&self) -> Vec<u32> {
-        let incidence = &self.topology.incidence;
-        let length = |v: usize| {
-            let edges = self.valence[v];
-            if self.blocks.sides_only {
-                return edges + 1;
-            }
-            let at = incidence.corners_at(v);
-            let others = at.iter().map(|&c| {
-                let size = self.faces.range(incidence.face_of(c)).len() as u32;
-                size.saturating_sub(3)
-            });
-            edges + 1 + others.sum::<u32>()
-        };
-        parallel::collect(self.valence.len(), length)
-    }
-
-    /// All rows, if their lengths are at most these; otherwise their true lengths.
-    fn fill(&self, lengths: Vec<u32>) -> Result<std::result::Result<Arrays, Vec<u32>>> {
+        let mut lengths = self.greatest_lengths();
         let total: u64 = lengths.iter().map(|&l| u64::from(l)).sum();
         if u32::try_from(total).is_err() {
             return Err(Error::Computation(format!(
@@ -230,48 +207,57 @@ impl<'a> Rows<'a> {
         let mut m = large(vec![0.0; end as usize]);
         let mut a = large(vec![0.0; end as usize]);
         let mut diagonal = large(vec![0.0; lengths.len()]);
-        let mut lengths = lengths;
         let parts = split_rows(&offsets, CHUNK, &mut columns)
             .into_par_iter()
             .zip(split_rows(&offsets, CHUNK, &mut m))
             .zip(split_rows(&offsets, CHUNK, &mut a))
             .zip(diagonal.par_chunks_mut(CHUNK))
             .zip(lengths.par_chunks_mut(CHUNK));
-        let misfits = parts.map_init(Row::default, |row, parts| {
+        parts.for_each_init(Row::default, |row, parts| {
             let (((((rows, columns), (_, m)), (_, a)), diagonal), lengths) = parts;
             let first = offsets[rows.start] as usize;
-            let mut fit = true;
             for ((v, diagonal), length) in rows.zip(diagonal).zip(lengths) {
                 self.row(v, row);
                 let h = self.by_valence[self.valence[v] as usize][0];
                 *diagonal = h * row.values[row.own];
                 let start = offsets[v] as usize - first;
                 let range = start..start + row.columns.len();
-                if row.columns.len() <= *length as usize {
-                    columns[range.clone()].copy_from_slice(&row.columns);
-                    m[range.clone()].copy_from_slice(&row.values);
-                    for (a, m) in a[range].iter_mut().zip(&row.values) {
-                        *a = h * m;
-                    }
-                } else {
-                    fit = false;
+                assert!(row.columns.len() <= *length as usize, "the longest rows of a manifold");
+                columns[range.clone()].copy_from_slice(&row.columns);
+                m[range.clone()].copy_from_slice(&row.values);
+                for (a, m) in a[range].iter_mut().zip(&row.values) {
+                    *a = h * m;
                 }
                 *length = row.columns.len() as u32;
             }
-            usize::from(!fit)
         });
-        let fit = misfits.sum::<usize>() == 0;
-        if fit {
-            let filled = close_gaps(&mut offsets, &lengths, |from, to| {
-                columns.copy_within(from.clone(), to);
-                m.copy_within(from.clone(), to);
-                a.copy_within(from, to);
+        let filled = close_gaps(&mut offsets, &lengths, |from, to| {
+            columns.copy_within(from.clone(), to);
+            m.copy_within(from.clone(), to);
+            a.copy_within(from, to);
+        });
+        columns.truncate(filled);
+        m.truncate(filled);
+        a.truncate(filled);
+        Ok(Arrays { offsets, columns, m, a, diagonal })
+    }
+
+    /// The greatest length of every row on a manifold, attained where faces share an edge or a vertex at most.
+    fn greatest_lengths(&self) -> Vec<u32> {
+        let incidence = &self.topology.incidence;
+        let length = |v: usize| {
+            let edges = self.valence[v];
+            if self.blocks.sides_only {
+                return edges + 1;
+            }
+            let at = incidence.corners_at(v);
+            let others = at.iter().map(|&c| {
+                let size = self.faces.range(incidence.face_of(c)).len() as u32;
+                size.saturating_sub(3)
             });
-            columns.truncate(filled);
-            m.truncate(filled);
-            a.truncate(filled);
-        }
-        Ok(if fit { Ok(Arrays { offsets, columns, m, a, diagonal }) } else { Err(lengths) })
+            edges + 1 + others.sum::<u32>()
+        };
+        parallel::collect(self.valence.len(), length)
     }
 
     /// Row `v` of M on a closed mesh, if it is short and no vertex occurs twice in the faces at `v` but by their common
@@ -363,13 +349,13 @@ mod tests {
 
     /// How many rows of M are made the usual way, after comparing them with those made the general way.
     fn usual_rows(mesh: &Mesh, scheme: Scheme) -> usize {
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        assert!(topology.is_closed());
-        let valence = valences(&mesh.faces, &topology);
+        let surface = Surface::new(mesh.clone()).unwrap();
+        assert!(surface.is_closed());
+        let valence = valences(&surface);
         let most = valence.iter().max().map_or(0, |&n| n as usize);
         let by_valence: Vec<[f64; 2]> = (0..=most).map(|n| [scheme.h(n), scheme.vertex_weight(n)]).collect();
         let blocks = FaceBlocks::new(&mesh.faces, &scheme);
-        let mut rows = Rows::new(&mesh.faces, &topology, &blocks, &by_valence, &valence);
+        let mut rows = Rows::new(&surface, &blocks, &by_valence, &valence);
         rows.closed = false;
         let (mut usual, mut general) = (Row::default(), Row::default());
         let same = |v: &usize| {
@@ -410,14 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_with_a_vertex_in_two_places_are_left_to_the_general_way() {
-        // A square and its back: all vertices have valence 2 and meet the opposite one in both faces.
-        let faces = Faces::from_lists([[0, 1, 2, 3], [3, 2, 1, 0]]);
-        let mesh = Mesh::new(vec![glam::DVec3::ZERO; 4], faces);
-        assert_eq!(usual_rows(&mesh, Scheme::CatmullClark), 0);
-        // A face of two corners, which the validator refuses.
-        let digon = Mesh::new(mesh.positions[..2].to_vec(), Faces::from_lists([[0, 1]]));
-        assert_eq!(usual_rows(&digon, Scheme::CatmullClark), 0);
+    fn long_rows_are_left_to_the_general_way() {
         // The two apexes have too long rows, the others meet both apexes and their neighbours on the rim.
         let bipyramid = builtin("bipyramid:40").unwrap();
         assert_eq!(usual_rows(&bipyramid, Scheme::Loop), 40);

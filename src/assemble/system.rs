@@ -8,7 +8,7 @@ use super::bounds::SpectralBounds;
 use super::csr::{Csr, Pattern};
 use super::rows::Rows;
 use crate::error::{Error, Result};
-use crate::mesh::{Faces, Mesh, Topology};
+use crate::mesh::{Faces, Surface};
 use crate::parallel;
 use crate::schemes::{Masks, Scheme, SingularSet};
 
@@ -31,7 +31,7 @@ pub struct LimitSystem {
 }
 
 impl LimitSystem {
-    /// Assembles the system of `scheme` on a mesh that the validator has passed.
+    /// Assembles the system of `scheme` on a mesh.
     ///
     /// Linear in the corners (and in Σ|F|² where faces couple all their corners); no hashing; deterministic
     /// for any number of threads.
@@ -43,27 +43,21 @@ impl LimitSystem {
     /// ```
     /// use limitlab::assemble::LimitSystem;
     /// use limitlab::schemes::Scheme;
-    /// use limitlab::mesh::{builtin, Topology};
+    /// use limitlab::mesh::{Surface, builtin};
     ///
-    /// let mesh = builtin::builtin("tetrahedron")?;
-    /// let topology = Topology::new(&mesh.faces, mesh.len());
-    /// let system = LimitSystem::new(&mesh, &topology, Scheme::Loop)?;
+    /// let surface = Surface::new(builtin::builtin("tetrahedron")?)?;
+    /// let system = LimitSystem::new(&surface, Scheme::Loop)?;
     /// // β₃ = 2/5, and the three neighbours share the rest.
     /// assert!((system.a.get(0, 0) - 0.4).abs() < 1e-15);
     /// assert!((system.a.get(0, 1) - 0.2).abs() < 1e-15);
     /// # Ok::<(), limitlab::Error>(())
     /// ```
-    pub fn new(mesh: &Mesh, topology: &Topology, scheme: Scheme) -> Result<Self> {
-        check_faces(&mesh.faces, scheme, topology.boundary_edges() > 0)?;
-        check_boundary(&mesh.faces, topology, scheme)?;
-        let mut system = Self::with_masks(mesh, topology, &scheme)?;
-        if topology.is_closed() {
-            system.bounds = SpectralBounds::closed(
-                scheme,
-                &valences(&mesh.faces, topology),
-                mesh.faces.uniform_size() == Some(3),
-                &system.diagonal,
-            );
+    pub fn new(surface: &Surface, scheme: Scheme) -> Result<Self> {
+        check(surface, scheme)?;
+        let mut system = Self::with_masks(surface, &scheme)?;
+        if surface.is_closed() {
+            let triangles = surface.faces().uniform_size() == Some(3);
+            system.bounds = SpectralBounds::closed(scheme, &valences(surface), triangles, &system.diagonal);
         }
         Ok(system)
     }
@@ -73,12 +67,12 @@ impl LimitSystem {
     ///
     /// # Errors
     /// More than 2³² − 1 entries.
-    pub fn with_masks(mesh: &Mesh, topology: &Topology, masks: &impl Masks) -> Result<Self> {
-        let valence = valences(&mesh.faces, topology);
+    pub fn with_masks(surface: &Surface, masks: &impl Masks) -> Result<Self> {
+        let valence = valences(surface);
         let largest = valence.iter().copied().max().unwrap_or(0) as usize;
         let by_valence: Vec<[f64; 2]> = (0..=largest).map(|n| [masks.h(n), masks.vertex_weight(n)]).collect();
-        let blocks = FaceBlocks::new(&mesh.faces, masks);
-        let rows = Rows::new(&mesh.faces, topology, &blocks, &by_valence, &valence);
+        let blocks = FaceBlocks::new(surface.faces(), masks);
+        let rows = Rows::new(surface, &blocks, &by_valence, &valence);
         let arrays = rows.arrays()?;
         let h = parallel::collect(valence.len(), |v| by_valence[valence[v] as usize][0]);
         let bounds = SpectralBounds::gershgorin(&arrays.diagonal);
@@ -111,25 +105,22 @@ impl LimitSystem {
     }
 }
 
-/// Refuses faces that `scheme` is not defined on. On an `open` mesh no other scheme would do.
-pub(super) fn check_faces(faces: &Faces, scheme: Scheme, open: bool) -> Result<()> {
+/// Refuses faces and boundaries that `scheme` is not defined on.
+pub(super) fn check(surface: &Surface, scheme: Scheme) -> Result<()> {
+    let (faces, open) = (surface.faces(), !surface.is_closed());
     if let Some(f) = scheme.first_unsuitable_face(faces) {
+        // On an open mesh no other scheme would do.
         return Err(Error::Computation(format!(
             "face {f} has {} corners, and the scheme {scheme} is defined on triangles only; triangulate the mesh{}",
             faces.face(f).len(),
             if open { String::new() } else { format!(" or use --scheme {}", names(|s| !s.needs_triangles())) }
         )));
     }
-    Ok(())
-}
-
-/// Refuses boundaries that `scheme` is not defined on.
-pub(super) fn check_boundary(faces: &Faces, topology: &Topology, scheme: Scheme) -> Result<()> {
-    if topology.boundary_edges() > 0 && !scheme.edges_only() {
+    if open && !scheme.edges_only() {
         let triangles = faces.uniform_size() == Some(3);
         return Err(Error::Computation(format!(
             "{} boundary edges, and the masks of {scheme} need whole faces around every vertex; close the holes{}",
-            topology.boundary_edges(),
+            surface.boundary_edges(),
             match names(|s| triangles && s.edges_only() && s.singular_set() == SingularSet::Never) {
                 none if none.is_empty() => none,
                 names => format!(", or use --boundary as-interior with --scheme {names}"),
@@ -149,12 +140,12 @@ fn names(which: impl Fn(Scheme) -> bool) -> String {
 }
 
 /// The number of edges at every vertex: the valence n of the masks, on a boundary too.
-pub fn valences(faces: &Faces, topology: &Topology) -> Vec<u32> {
-    parallel::collect(topology.incidence.vertices(), |v| {
-        if topology.boundary_edges() == 0 {
-            topology.incidence.face_count(v) as u32
+pub fn valences(surface: &Surface) -> Vec<u32> {
+    parallel::collect(surface.len(), |v| {
+        if surface.is_closed() {
+            surface.incidence().face_count(v) as u32
         } else {
-            topology.edge_valence(faces, v) as u32
+            surface.topology().edge_valence(surface.faces(), v) as u32
         }
     })
 }

@@ -4,8 +4,8 @@
 //! corrections](crate::solvers::mixed) on the [matrix-free operator](Operator). It needs no inner products, its
 //! iterations share passes over memory, and it moves half the bytes. What varies:
 //!
-//! - *Order.* A file whose vertices lie [scattered](is_scattered) is renumbered along a space-filling curve before
-//!   anything else touches its faces, from [`SCATTERED`] vertices on. From [`ORDERED`] vertices on, the rows of the
+//! - *Order.* A large mesh whose vertices lie [scattered](crate::mesh::curve::is_scattered) in memory has been renumbered
+//!   along a space-filling curve by [`Surface`]. From [`ORDERED`] vertices on, the rows of the
 //!   operator are [breadth first](in_fronts), which gives it the narrow band that groups of iterations need. Below, all
 //!   arrays stay in cache in any order, and rows are [grouped by kind](in_kinds) only; so they are for mixed faces under
 //!   Nasri and Zheng-Cai, where iterations are too few to pay for the search. Results come back in file order.
@@ -24,16 +24,13 @@ use glam::DVec3;
 use crate::assemble::Operator;
 use crate::error::Result;
 use crate::memory::require;
-use crate::mesh::curve::{along_curve, is_scattered};
 use crate::mesh::fronts::{in_fronts, in_kinds};
 use crate::mesh::order::Numbering;
-use crate::mesh::{Incidence, Mesh, Topology};
+use crate::mesh::{Mesh, Surface};
 use crate::schemes::Scheme;
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::{Iterate, Method, Outcome, Report, Stop, mixed, solve};
 
-/// From this many vertices on, a scattered file is renumbered. Tuned.
-pub const SCATTERED: usize = 50_000;
 /// From this many vertices on, the rows of the operator are breadth first. Tuned.
 pub const ORDERED: usize = 200_000;
 /// From this usual λ_min on (Nasri's), a score of iterations suffice, and on mixed faces that order does not pay. Tuned.
@@ -47,16 +44,13 @@ pub struct Automatic {
     /// [`Method::Chebyshev`] or [`Method::Cg`].
     pub method: Method,
     pub report: Report,
-    /// Renumbering along the curve; 0 where the order was good.
-    pub curve_seconds: f64,
-    /// Who meets whom, the order of the rows, the operator.
+    /// The order of the rows, the operator.
     pub setup_seconds: f64,
     /// Iterations, and the way back to the order of the mesh.
     pub solve_seconds: f64,
 }
 
-/// Solves `A V = P` for the points P of a mesh that the validator has passed. `topology` spares a look
-/// for boundaries where it is given.
+/// Solves `A V = P` for the points P of a mesh.
 ///
 /// # Errors
 /// As [`require_memory`] and [`Operator::new`].
@@ -64,25 +58,34 @@ pub struct Automatic {
 /// ```
 /// use limitlab::schemes::Scheme;
 /// use limitlab::interpolate::automatic::control_points;
-/// use limitlab::mesh::builtin;
+/// use limitlab::mesh::{Surface, builtin};
 /// use limitlab::solvers::{Outcome, Stop};
 ///
-/// let mesh = builtin::builtin("quad-sphere:3")?;
+/// let surface = Surface::new(builtin::builtin("quad-sphere:3")?)?;
 /// let stop = Stop { tolerance: 1e-12, max_iterations: 1000 };
-/// let found = control_points(&mesh, None, Scheme::CatmullClark, &stop)?;
+/// let found = control_points(&surface, Scheme::CatmullClark, &stop)?;
 /// assert_eq!(found.report.outcome, Outcome::Converged);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn control_points(mesh: &Mesh, topology: Option<&Topology>, scheme: Scheme, stop: &Stop) -> Result<Automatic> {
-    require_memory(mesh)?;
+pub fn control_points(surface: &Surface, scheme: Scheme, stop: &Stop) -> Result<Automatic> {
+    require_memory(surface.mesh())?;
     let start = Instant::now();
-    let Some(moved) = renumbered(mesh) else {
-        return in_order(mesh, topology, scheme, stop);
-    };
-    let seconds = start.elapsed().as_secs_f64();
-    let mut found = moved.control_points(None, scheme, stop)?;
-    found.curve_seconds = seconds;
-    Ok(found)
+    let (operator, numbering) = operator(surface, scheme)?;
+    let setup_seconds = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    // To the order of the rows, by way of that inside of the surface.
+    let numberings = [surface.renumbered().map(|r| &r.numbering), numbering.as_ref()];
+    let mut moved: Option<Vec<DVec3>> = None;
+    for numbering in numberings.into_iter().flatten() {
+        moved = Some(numbering.there(moved.as_deref().unwrap_or(surface.positions())));
+    }
+    let (method, mut points, report) = iterate(&operator, moved.as_deref().unwrap_or(surface.positions()), stop);
+    for numbering in numberings.into_iter().rev().flatten() {
+        let mut back = moved.take().unwrap_or_else(|| vec![DVec3::ZERO; points.len()]);
+        numbering.back_into(&points, &mut back);
+        moved = Some(std::mem::replace(&mut points, back));
+    }
+    Ok(Automatic { points, method, report, setup_seconds, solve_seconds: start.elapsed().as_secs_f64() })
 }
 
 /// Refuses a mesh whose topology, operator and iterates memory has no room for. The numbers are measured.
@@ -97,91 +100,20 @@ pub fn require_memory(mesh: &Mesh) -> Result<()> {
     require(bytes, || format!("the work on {} vertices and {corners} corners", mesh.len()), "use a smaller mesh")
 }
 
-/// A mesh along a space-filling curve.
-#[derive(Clone, Debug)]
-pub struct Renumbered {
-    pub mesh: Mesh,
-    pub numbering: Numbering,
-}
-
-/// `mesh` [along a curve](along_curve), if its vertices are [`SCATTERED`] or more and lie [scattered](is_scattered) in
-/// memory: every pass over it is several times faster then.
-pub fn renumbered(mesh: &Mesh) -> Option<Renumbered> {
-    if mesh.len() < SCATTERED || !is_scattered(&mesh.faces) {
-        return None;
-    }
-    let (mesh, numbering) = along_curve(mesh)?;
-    Some(Renumbered { mesh, numbering })
-}
-
-impl Renumbered {
-    /// As [`control_points`] of the mesh that was renumbered, in its order. `topology` is that of the renumbered mesh.
-    ///
-    /// # Errors
-    /// As [`Operator::new`].
-    pub fn control_points(&self, topology: Option<&Topology>, scheme: Scheme, stop: &Stop) -> Result<Automatic> {
-        let mut found = in_order(&self.mesh, topology, scheme, stop)?;
-        let start = Instant::now();
-        found.points = self.numbering.back(&found.points);
-        found.solve_seconds += start.elapsed().as_secs_f64();
-        Ok(found)
-    }
-}
-
-fn in_order(mesh: &Mesh, topology: Option<&Topology>, scheme: Scheme, stop: &Stop) -> Result<Automatic> {
-    let start = Instant::now();
-    let (operator, numbering) = operator(mesh, topology, scheme)?;
-    let setup_seconds = start.elapsed().as_secs_f64();
-    let start = Instant::now();
-    let moved = numbering.as_ref().map(|n| n.there(&mesh.positions));
-    let points = moved.as_ref().unwrap_or(&mesh.positions);
-    let (method, control, report) = iterate(&operator, points, stop);
-    let points = match (numbering, moved) {
-        (Some(numbering), Some(mut points)) => {
-            numbering.back_into(&control, &mut points);
-            points
-        }
-        _ => control,
-    };
-    Ok(Automatic {
-        points,
-        method,
-        report,
-        curve_seconds: 0.0,
-        setup_seconds,
-        solve_seconds: start.elapsed().as_secs_f64(),
-    })
-}
-
-/// The operator, and the order of its rows where that is not the mesh's.
-fn operator(mesh: &Mesh, topology: Option<&Topology>, scheme: Scheme) -> Result<(Operator, Option<Numbering>)> {
-    let own;
-    let incidence = match topology {
-        Some(topology) => &topology.incidence,
-        None => {
-            own = Incidence::new(&mesh.faces, mesh.len());
-            &own
-        }
+/// The operator, and the order of its rows where that is not the surface's, or not the one inside it.
+fn operator(surface: &Surface, scheme: Scheme) -> Result<(Operator, Option<Numbering>)> {
+    let (faces, incidence) = match surface.renumbered() {
+        Some(renumbered) => (&renumbered.faces, &renumbered.incidence),
+        None => (surface.faces(), surface.incidence()),
     };
     // Among mixed faces the search costs twice as much.
-    let few = scheme.usual_lambda_min() >= FEW && mesh.faces.uniform_size().is_none();
-    let number = || {
-        if mesh.len() >= ORDERED && !few {
-            Some(in_fronts(&mesh.faces, incidence))
-        } else {
-            in_kinds(&mesh.faces, incidence)
-        }
-    };
-    // The search occupies one thread.
-    let (numbering, closed) = rayon::join(number, || topology.is_some() || incidence.is_closed(&mesh.faces));
+    let few = scheme.usual_lambda_min() >= FEW && faces.uniform_size().is_none();
+    let numbering =
+        if surface.len() >= ORDERED && !few { Some(in_fronts(faces, incidence)) } else { in_kinds(faces, incidence) };
     let rows = numbering.as_ref();
-    let operator = match topology {
-        Some(topology) => Operator::in_order(&mesh.faces, topology, scheme, rows)?,
-        None if closed => Operator::closed_in_order(&mesh.faces, incidence, scheme, rows)?,
-        None => {
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            Operator::in_order(&mesh.faces, &topology, scheme, rows)?
-        }
+    let operator = match surface.renumbered() {
+        Some(renumbered) => Operator::renumbered(surface, renumbered, scheme, rows)?,
+        None => Operator::in_order(surface, scheme, rows)?,
     };
     Ok((operator, numbering))
 }

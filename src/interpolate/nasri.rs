@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use super::subset::Restriction;
 use crate::Result;
 use crate::assemble::LimitSystem;
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::Surface;
 use crate::schemes::Scheme;
 use crate::solvers::{Setup, Solution, Stop, run};
 
@@ -19,15 +19,10 @@ use crate::solvers::{Setup, Solution, Stop, run};
 /// A mesh that is not closed; no vertex marked.
 ///
 /// # Panics
-/// If `interpolated` has not one entry a vertex, or `topology` is not that of `mesh`.
-pub fn control_points(
-    mesh: &Mesh,
-    topology: &Topology,
-    interpolated: Option<&[bool]>,
-    setup: Setup,
-    stop: &Stop,
-) -> Result<Solution> {
-    let system = LimitSystem::new(mesh, topology, Scheme::Nasri)?;
+/// If `interpolated` has not one entry a vertex.
+pub fn control_points(surface: &Surface, interpolated: Option<&[bool]>, setup: Setup, stop: &Stop) -> Result<Solution> {
+    let mesh = surface.mesh();
+    let system = LimitSystem::new(surface, Scheme::Nasri)?;
     let points = &mesh.positions;
     Ok(match interpolated {
         None => run(&system, points, setup, stop),

@@ -11,8 +11,8 @@ use glam::{DQuat, DVec3};
 
 use super::thall::angle;
 use crate::error::short;
+use crate::mesh::Surface;
 use crate::mesh::frame::direction;
-use crate::mesh::{Mesh, Topology};
 use crate::schemes::{Class, Refinement};
 use crate::{Error, Result};
 
@@ -38,7 +38,7 @@ impl Default for Rotation {
 #[derive(Clone, Debug)]
 pub struct Rotated {
     /// The original vertices come first, as in every refinement by a primal scheme.
-    pub mesh: Mesh,
+    pub surface: Surface,
     /// How many refinements lie between the control mesh and this one: `levels` + 1.
     pub refinements: usize,
     /// The vertices whose rings were turned, with the whole angle of each.
@@ -76,7 +76,7 @@ pub fn unit_normals(normals: &[Option<DVec3>]) -> Result<Vec<Option<DVec3>>> {
 /// If the scheme is not [primal](Class::Primal), `normals` has not one entry a vertex, or
 /// `rotation.levels` is 0.
 pub fn rotate_rings(
-    control: &Mesh,
+    control: &Surface,
     scheme: Refinement,
     normals: &[Option<DVec3>],
     rotation: Rotation,
@@ -85,13 +85,13 @@ pub fn rotate_rings(
     assert_eq!(normals.len(), control.len(), "one entry a vertex");
     assert!(rotation.levels > 0, "at least one level");
     let wanted = unit_normals(normals)?;
-    let mut mesh = scheme.refine_n(control, 1)?;
+    scheme.check_size(control.mesh(), rotation.levels + 1)?;
+    let mut surface = scheme.refined(control)?;
     let mut turned: Vec<(u32, f64)> = Vec::new();
     for level in 0..rotation.levels {
-        mesh = scheme.refine_n(&mesh, 1)?;
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        let limits = scheme.limit_positions(&mesh, &topology)?;
-        let found = scheme.limit_normals(&mesh, &topology)?;
+        surface = scheme.refined(&surface)?;
+        let limits = scheme.limit_positions(&surface)?;
+        let found = scheme.limit_normals(&surface)?;
         if level == 0 {
             turned = deviating(&wanted, &found, &rotation)?;
         }
@@ -105,10 +105,10 @@ pub fn rotate_rings(
                 continue;
             };
             let turn = part * (angle(from, target) - rotation.tolerance);
-            rotate_ring(&mut mesh, &topology, v, limits[v], DQuat::from_axis_angle(axis, turn));
+            rotate_ring(&mut surface, v, limits[v], DQuat::from_axis_angle(axis, turn));
         }
     }
-    Ok(Rotated { mesh, refinements: rotation.levels + 1, turned })
+    Ok(Rotated { surface, refinements: rotation.levels + 1, turned })
 }
 
 /// The vertices whose normal is off by more than allowed, with the angle to turn.
@@ -139,16 +139,18 @@ fn deviating(wanted: &[Option<DVec3>], found: &[DVec3], rotation: &Rotation) -> 
 }
 
 /// Turns `v` and all vertices of its faces about `center`.
-fn rotate_ring(mesh: &mut Mesh, topology: &Topology, v: usize, center: DVec3, by: DQuat) {
-    let turn = |point: &mut DVec3| *point = center + by * (*point - center);
-    turn(&mut mesh.positions[v]);
-    for &c in topology.incidence.corners_at(v) {
-        let face = mesh.faces.face(topology.incidence.face_of(c));
+fn rotate_ring(surface: &mut Surface, v: usize, center: DVec3, by: DQuat) {
+    let (faces, incidence) = (surface.faces(), surface.incidence());
+    let mut ring = vec![v as u32];
+    for &c in incidence.corners_at(v) {
+        let face = faces.face(incidence.face_of(c));
         let place = face.iter().position(|&w| w as usize == v);
         // All but the corner itself and the one before it, which the neighbouring face brings.
-        for step in 1..face.len() - 1 {
-            let w = face[(place.unwrap_or(0) + step) % face.len()];
-            turn(&mut mesh.positions[w as usize]);
-        }
+        ring.extend((1..face.len() - 1).map(|step| face[(place.unwrap_or(0) + step) % face.len()]));
+    }
+    let points = surface.positions_mut();
+    for w in ring {
+        let point = &mut points[w as usize];
+        *point = center + by * (*point - center);
     }
 }

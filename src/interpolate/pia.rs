@@ -58,15 +58,15 @@ impl Masks for TwoStepsBack {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Topology, builtin};
+    use crate::mesh::{Surface, builtin};
 
     #[test]
     fn two_steps_back_is_right_on_quads_and_wrong_on_triangles() {
         for (name, equal) in [("quad-sphere:2", true), ("prism:3", false)] {
             let mesh = builtin::builtin(name).expect("a built-in mesh");
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            let right = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark).expect("closed");
-            let printed = LimitSystem::with_masks(&mesh, &topology, &TwoStepsBack).expect("small");
+            let surface = Surface::new(mesh.clone()).unwrap();
+            let right = LimitSystem::new(&surface, Scheme::CatmullClark).expect("closed");
+            let printed = LimitSystem::with_masks(&surface, &TwoStepsBack).expect("small");
             let difference = (0..mesh.len())
                 .flat_map(|i| (0..mesh.len()).map(move |j| (i, j)))
                 .map(|(i, j)| (right.a.get(i, j) - printed.a.get(i, j)).abs())
@@ -82,8 +82,8 @@ mod tests {
     #[test]
     fn a_pass_more_than_updates() {
         let mesh = builtin::builtin("icosphere:1").expect("a built-in mesh");
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        let system = LimitSystem::new(&mesh, &topology, Scheme::Loop).expect("triangles");
+        let surface = Surface::new(mesh.clone()).unwrap();
+        let system = LimitSystem::new(&surface, Scheme::Loop).expect("triangles");
         let run = passes(&system, &mesh.positions, 1e-3, 100);
         // The algorithm of the paper, by hand.
         let mut v = mesh.positions.clone();

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::normals::{Rotation, rotate_rings};
 use super::zheng_cai::{Constraints, FirstRefinement};
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::Surface;
 use crate::schemes::doo_sabin::{self, Rule};
 use crate::schemes::{Class, Refinement, Scheme};
 use crate::{Error, Result};
@@ -27,8 +27,8 @@ pub struct Request<'a> {
 
 /// The refined mesh.
 #[derive(Clone, Debug)]
-pub struct Surface {
-    pub mesh: Mesh,
+pub struct SurfaceMesh {
+    pub surface: Surface,
     /// One a vertex if they were wanted; zero where the surface has none.
     pub normals: Option<Vec<DVec3>>,
     /// How many given normals were not met already: rings turned, or faces given another plane.
@@ -37,8 +37,7 @@ pub struct Surface {
     pub not_flattened: Vec<u32>,
 }
 
-/// Makes the surface of a control mesh found for `scheme`. `points` are the given points; `topology` gives that of
-/// `control`, where it is needed.
+/// Makes the surface of a control mesh found for `scheme`. `points` are the given points.
 ///
 /// Catmull-Clark, Loop and √3: original vertices keep their numbers; given normals are met by turned rings
 /// ([`rotate_rings`]), which need two levels or more. Nasri and Zheng-Cai: the first level is the scheme's own first
@@ -50,48 +49,35 @@ pub struct Surface {
 /// [`rotate_rings`], [`FirstRefinement::new`] and the refinement.
 ///
 /// # Panics
-/// If a list has not one entry a vertex, or `topology` gives another than that of `control`.
-pub fn surface<'a>(
-    control: Mesh,
-    topology: impl Fn() -> &'a Topology,
-    scheme: Scheme,
-    points: &[DVec3],
-    request: &Request,
-) -> Result<Surface> {
+/// If a list has not one entry a vertex.
+pub fn surface(control: Surface, scheme: Scheme, points: &[DVec3], request: &Request) -> Result<SurfaceMesh> {
     let given = &request.constraints;
+    let wants_limits = request.limit || request.normals;
     let rule = scheme.first_rule();
-    let mut surface = match rule {
+    let mut made = match rule {
         None => primal(control, scheme.refinement(), request)?,
         Some(_) if request.levels == 0 => {
             if given.normals.is_some() || given.handles.is_some() {
                 return Err(too_few("normals and shape handles act on", 1));
             }
-            Surface::plain(control)
+            SurfaceMesh::plain(control)
         }
         Some(rule) => {
             let corrected = rule == Rule::ZhengCai || given.normals.is_some() || given.handles.is_some();
             if corrected {
-                let first = FirstRefinement::new(&control, topology(), rule, points, given)?;
-                Surface {
-                    mesh: first.surface(request.levels)?,
+                let first = FirstRefinement::new(&control, rule, points, given)?;
+                SurfaceMesh {
+                    surface: refine(Refinement::DooSabin, first.surface, request.levels - 1, wants_limits)?,
                     normals: None,
                     normals_set: given.normals.map_or(0, |n| n.iter().flatten().count()),
                     not_flattened: first.not_flattened,
                 }
             } else {
-                Surface::plain(Refinement::DooSabin.refine_n(&control, request.levels)?)
+                SurfaceMesh::plain(refine(Refinement::DooSabin, control, request.levels, wants_limits)?)
             }
         }
     };
-    if request.limit || request.normals {
-        let own;
-        let at = if request.levels == 0 {
-            topology()
-        } else {
-            own = Topology::new(&surface.mesh.faces, surface.mesh.len());
-            &own
-        };
-        let mesh = &surface.mesh;
+    if wants_limits {
         // The first step of a control mesh is by its own rule.
         let rule = match rule {
             Some(rule) if request.levels == 0 => Some(rule),
@@ -99,31 +85,44 @@ pub fn surface<'a>(
             None => None,
         };
         let scheme = scheme.refinement();
+        let fine = &made.surface;
         if request.normals {
-            surface.normals = Some(match rule {
-                Some(rule) => doo_sabin::limit_normals(rule, mesh, at)?,
-                None => scheme.limit_normals(mesh, at)?,
+            made.normals = Some(match rule {
+                Some(rule) => doo_sabin::limit_normals(rule, fine)?,
+                None => scheme.limit_normals(fine)?,
             });
         }
         if request.limit {
-            surface.mesh.positions = match rule {
-                Some(rule) => doo_sabin::limit_positions(rule, mesh, at)?,
-                None => scheme.limit_positions(mesh, at)?,
+            let limits = match rule {
+                Some(rule) => doo_sabin::limit_positions(rule, fine)?,
+                None => scheme.limit_positions(fine)?,
             };
+            made.surface.positions_mut().copy_from_slice(&limits);
         }
     }
-    Ok(surface)
+    Ok(made)
 }
 
-impl Surface {
-    /// A mesh with nothing else to tell.
-    pub fn plain(mesh: Mesh) -> Self {
-        Surface { mesh, normals: None, normals_set: 0, not_flattened: Vec::new() }
+impl SurfaceMesh {
+    /// A surface with nothing else to tell.
+    pub fn plain(surface: Surface) -> Self {
+        SurfaceMesh { surface, normals: None, normals_set: 0, not_flattened: Vec::new() }
     }
 }
 
-fn primal(control: Mesh, scheme: Refinement, request: &Request) -> Result<Surface> {
+/// The last topology by index arithmetic if it is needed.
+fn refine(scheme: Refinement, control: Surface, levels: usize, topology: bool) -> Result<Surface> {
+    // A control mesh that stays is not copied: it may be as large as memory allows.
+    match levels {
+        0 => Ok(control),
+        _ if topology => scheme.refined_n(&control, levels),
+        _ => Ok(Surface::of_valid(scheme.refine_n(&control, levels)?)),
+    }
+}
+
+fn primal(control: Surface, scheme: Refinement, request: &Request) -> Result<SurfaceMesh> {
     let given = &request.constraints;
+    let wants_limits = request.limit || request.normals;
     if given.handles.is_some() {
         return Err(Error::Computation(format!(
             "shape handles scale the type-V faces of Doo-Sabin surfaces, and {scheme} has none: use --scheme zheng-cai \
@@ -131,9 +130,7 @@ fn primal(control: Mesh, scheme: Refinement, request: &Request) -> Result<Surfac
         )));
     }
     let Some(normals) = given.normals else {
-        // A control mesh that stays is not copied: it may be as large as memory allows.
-        let stays = request.levels == 0;
-        return Ok(Surface::plain(if stays { control } else { scheme.refine_n(&control, request.levels)? }));
+        return Ok(SurfaceMesh::plain(refine(scheme, control, request.levels, wants_limits)?));
     };
     if scheme.class() != Class::Primal {
         return Err(Error::Computation(format!(
@@ -147,8 +144,8 @@ fn primal(control: Mesh, scheme: Refinement, request: &Request) -> Result<Surfac
     }
     let rotated = rotate_rings(&control, scheme, normals, request.rotation)?;
     let further = request.levels - rotated.refinements;
-    let mesh = if further == 0 { rotated.mesh } else { scheme.refine_n(&rotated.mesh, further)? };
-    Ok(Surface { normals_set: rotated.turned.len(), ..Surface::plain(mesh) })
+    let surface = refine(scheme, rotated.surface, further, wants_limits)?;
+    Ok(SurfaceMesh { normals_set: rotated.turned.len(), ..SurfaceMesh::plain(surface) })
 }
 
 fn too_few(what: &str, levels: usize) -> Error {

@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::Result;
 use crate::mesh::frame::of_order_one;
 use crate::mesh::incidence::{next_in, prev_in};
-use crate::mesh::{Mesh, Topology, generate};
+use crate::mesh::{Surface, generate};
 use crate::parallel;
 use crate::schemes::catmull_clark;
 use crate::solvers::iteration::{Errors, Failure, Iterate};
@@ -32,21 +32,19 @@ pub enum Inverse {
 ///
 /// ```
 /// use limitlab::interpolate::thall::{Inverse, LocalIteration};
-/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::mesh::{Surface, builtin};
 /// use limitlab::solvers::{Outcome, Stop, solve};
 /// use std::ops::ControlFlow;
 ///
-/// let mesh = builtin::builtin("torus:8x6")?;
-/// let topology = Topology::new(&mesh.faces, mesh.len());
-/// let mut iteration = LocalIteration::new(&mesh, &topology, Inverse::Exact);
+/// let surface = Surface::new(builtin::builtin("torus:8x6")?)?;
+/// let mut iteration = LocalIteration::new(&surface, Inverse::Exact);
 /// let stop = Stop { tolerance: 1e-9, max_iterations: 1000 };
 /// let report = solve(&mut iteration, &stop, &mut |_| ControlFlow::Continue(()));
 /// assert_eq!(report.outcome, Outcome::Converged);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub struct LocalIteration<'a> {
-    mesh: &'a Mesh,
-    topology: &'a Topology,
+    surface: &'a Surface,
     /// ½ of the inverse of v's weight in its own limit.
     inverse: Vec<f64>,
     /// 4 c_F of the current iterate.
@@ -58,19 +56,16 @@ pub struct LocalIteration<'a> {
 
 impl<'a> LocalIteration<'a> {
     /// Starts from V = P, the positions of a closed mesh.
-    ///
-    /// # Panics
-    /// If `topology` is not that of `mesh`.
-    pub fn new(mesh: &'a Mesh, topology: &'a Topology, inverse: Inverse) -> Self {
-        assert!(topology.incidence.vertices() == mesh.len(), "the topology is that of the mesh");
+    pub fn new(surface: &'a Surface, inverse: Inverse) -> Self {
+        let (mesh, incidence) = (surface.mesh(), surface.incidence());
         let weight = |v: usize| {
-            let star = topology.incidence.corners_at(v);
+            let star = incidence.corners_at(v);
             let n = star.len() as f64;
             // R = 4c_F − v − e_j − e_{j+1} holds v with weight 4/|F| − 1.
             let through_faces: f64 = match inverse {
                 Inverse::Regular => 0.0,
                 Inverse::Exact => (star.iter())
-                    .map(|&c| mesh.faces.range(topology.incidence.face_of(c)).len())
+                    .map(|&c| mesh.faces.range(incidence.face_of(c)).len())
                     .map(|size| 4.0 / size as f64 - 1.0)
                     .sum(),
             };
@@ -80,8 +75,7 @@ impl<'a> LocalIteration<'a> {
         };
         let inverse = parallel::collect(mesh.len(), |v| THALL_OMEGA / weight(v));
         LocalIteration {
-            mesh,
-            topology,
+            surface,
             inverse,
             centers: vec![DVec3::ZERO; mesh.faces.len()],
             current: mesh.positions.clone(),
@@ -100,14 +94,15 @@ fn regularised_corner(four_centers: DVec3, v: DVec3, leaving: DVec3, entering: D
 
 /// The limit point of `v` by the mask of its regularised 1-ring.
 #[inline]
-fn limit(mesh: &Mesh, topology: &Topology, points: &[DVec3], centers: &[DVec3], v: usize) -> DVec3 {
-    let corners = mesh.faces.corners();
-    let star = topology.incidence.corners_at(v);
+fn limit(surface: &Surface, points: &[DVec3], centers: &[DVec3], v: usize) -> DVec3 {
+    let (faces, incidence) = (surface.faces(), surface.incidence());
+    let corners = faces.corners();
+    let star = incidence.corners_at(v);
     let here = points[v];
     let (mut edges, mut opposite) = (DVec3::ZERO, DVec3::ZERO);
     for &c in star {
-        let f = topology.incidence.face_of(c);
-        let range = mesh.faces.range(f);
+        let f = incidence.face_of(c);
+        let range = faces.range(f);
         let leaving = points[corners[next_in(&range, c) as usize] as usize];
         let entering = points[corners[prev_in(&range, c) as usize] as usize];
         edges += leaving;
@@ -119,16 +114,16 @@ fn limit(mesh: &Mesh, topology: &Topology, points: &[DVec3], centers: &[DVec3], 
 
 impl Iterate for LocalIteration<'_> {
     fn errors(&mut self) -> Errors {
-        let (mesh, topology, current) = (self.mesh, self.topology, &self.current);
+        let (surface, current) = (self.surface, &self.current);
         parallel::change(&mut self.centers, |f, c| {
-            let face = mesh.faces.face(f);
+            let face = surface.faces().face(f);
             let sum: DVec3 = face.iter().map(|&v| current[v as usize]).sum();
             *c = 4.0 / face.len() as f64 * sum;
         });
         let (centers, inverse) = (&self.centers, &self.inverse);
         self.rows
             .pass_one(&mut self.next, |v, next, tally| {
-                let error = mesh.positions[v] - limit(mesh, topology, current, centers, v);
+                let error = surface.positions()[v] - limit(surface, current, centers, v);
                 tally.error(error);
                 *next = current[v] + inverse[v] * error;
             })
@@ -258,18 +253,13 @@ pub enum AttributeRule {
 /// As [`catmull_clark::refine`].
 ///
 /// # Panics
-/// If there is not one value a vertex, or `topology` is not that of `mesh`.
-pub fn refine_attributes(
-    mesh: &Mesh,
-    topology: &Topology,
-    values: Vec<DVec3>,
-    rule: AttributeRule,
-) -> Result<Vec<DVec3>> {
-    assert_eq!(values.len(), mesh.len(), "one value a vertex");
-    let values = Mesh::new(values, mesh.faces.clone());
+/// If there is not one value a vertex.
+pub fn refine_attributes(surface: &Surface, values: Vec<DVec3>, rule: AttributeRule) -> Result<Vec<DVec3>> {
+    assert_eq!(values.len(), surface.len(), "one value a vertex");
+    let values = surface.with_positions(values);
     let refined = match rule {
-        AttributeRule::Midpoint => generate::quad_split(&values),
-        AttributeRule::Scheme => catmull_clark::refine(&values, topology)?,
+        AttributeRule::Midpoint => generate::quad_split(values.mesh()),
+        AttributeRule::Scheme => catmull_clark::refine(&values)?,
     };
     Ok(refined.positions)
 }

@@ -10,7 +10,7 @@ use glam::DVec3;
 use super::normals::unit_normals;
 use super::subset::nothing;
 use crate::error::short;
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::{Mesh, Surface};
 use crate::parallel;
 use crate::schemes::Refinement;
 use crate::schemes::doo_sabin::{Rule, refine_by};
@@ -100,7 +100,7 @@ impl Constraints<'_> {
 /// The auxiliary mesh of phase one.
 #[derive(Clone, Debug)]
 pub struct Auxiliary {
-    pub mesh: Mesh,
+    pub surface: Surface,
     /// The largest update of each sweep, in the units of the mesh.
     pub updates: Vec<f64>,
     /// Whether the last of them was within the tolerance.
@@ -117,18 +117,13 @@ pub struct Auxiliary {
 /// No vertex is interpolated.
 ///
 /// # Panics
-/// If `topology` is not that of `mesh`, `interpolated` has not one entry a vertex, or an order names a vertex that
-/// the mesh lacks.
-pub fn auxiliary(
-    mesh: &Mesh,
-    topology: &Topology,
-    interpolated: Option<&[bool]>,
-    phase: &PhaseOne,
-) -> Result<Auxiliary> {
+/// If `interpolated` has not one entry a vertex, or an order names a vertex that the mesh lacks.
+pub fn auxiliary(surface: &Surface, interpolated: Option<&[bool]>, phase: &PhaseOne) -> Result<Auxiliary> {
+    let mesh = surface.mesh();
     let constraints = Constraints { interpolated, ..Constraints::default() };
     constraints.check(mesh.len())?;
     let tolerance = phase.eps * mesh.diagonal();
-    let mut system = LocalSystem::new(mesh, topology);
+    let mut system = LocalSystem::new(surface);
     let mut next = match phase.sweep {
         Sweep::Jacobi => mesh.positions.clone(),
         Sweep::GaussSeidel(_) => Vec::new(),
@@ -158,42 +153,42 @@ pub fn auxiliary(
         updates.push(largest);
         passed = largest <= tolerance;
     }
-    Ok(Auxiliary { mesh: Mesh::new(system.points, mesh.faces.clone()), updates, passed })
+    Ok(Auxiliary { surface: surface.with_positions(system.points), updates, passed })
 }
 
 /// Eq. 6 as sums over faces.
 struct LocalSystem<'a> {
-    mesh: &'a Mesh,
-    topology: &'a Topology,
+    surface: &'a Surface,
     points: Vec<DVec3>,
     /// S_F: the sum of the corners of each face.
     sums: Vec<DVec3>,
 }
 
 impl<'a> LocalSystem<'a> {
-    fn new(mesh: &'a Mesh, topology: &'a Topology) -> Self {
-        LocalSystem { mesh, topology, points: mesh.positions.clone(), sums: vec![DVec3::ZERO; mesh.faces.len()] }
+    fn new(surface: &'a Surface) -> Self {
+        let sums = vec![DVec3::ZERO; surface.faces().len()];
+        LocalSystem { surface, points: surface.positions().to_vec(), sums }
     }
 
     /// Anew in every sweep, so that rounding does not add up.
     fn sum_faces(&mut self) {
-        let (faces, points) = (&self.mesh.faces, &self.points);
+        let (faces, points) = (self.surface.faces(), &self.points);
         parallel::fill(&mut self.sums, |f| faces.face(f).iter().map(|&v| points[v as usize]).sum());
     }
 
     /// How far Eq. 7 moves `v`.
     #[inline]
     fn update(&self, v: usize) -> DVec3 {
-        let star = self.topology.incidence.corners_at(v);
+        let star = self.surface.incidence().corners_at(v);
         let m = star.len() as f64;
         let (mut means, mut weight) = (DVec3::ZERO, m);
         for &c in star {
-            let f = self.topology.incidence.face_of(c);
-            let share = 1.0 / self.mesh.faces.range(f).len() as f64;
+            let f = self.surface.incidence().face_of(c);
+            let share = 1.0 / self.surface.faces().range(f).len() as f64;
             means += share * self.sums[f];
             weight += share;
         }
-        (2.0 * m * self.mesh.positions[v] - m * self.points[v] - means) / weight
+        (2.0 * m * self.surface.positions()[v] - m * self.points[v] - means) / weight
     }
 
     /// Moves the vertices in turn; the length of the largest update.
@@ -202,8 +197,8 @@ impl<'a> LocalSystem<'a> {
         for v in order {
             let update = self.update(v);
             self.points[v] += update;
-            for &c in self.topology.incidence.corners_at(v) {
-                self.sums[self.topology.incidence.face_of(c)] += update;
+            for &c in self.surface.incidence().corners_at(v) {
+                self.sums[self.surface.incidence().face_of(c)] += update;
             }
             largest = largest.max(update.length_squared());
         }
@@ -215,7 +210,7 @@ impl<'a> LocalSystem<'a> {
 /// interpolated points.
 #[derive(Clone, Debug)]
 pub struct FirstRefinement {
-    pub mesh: Mesh,
+    pub surface: Surface,
     /// The type-V face of vertex v is face `first_vertex_face + v`.
     pub first_vertex_face: usize,
     /// Interpolated vertices whose type-V face has no average normal (its corners lie in a line or a point, or its
@@ -237,19 +232,13 @@ impl FirstRefinement {
     /// the face would have no area. All with the vertex.
     ///
     /// # Panics
-    /// If `points` or a list of constraints has not one entry a vertex, or `topology` is not that of `auxiliary`.
-    pub fn new(
-        auxiliary: &Mesh,
-        topology: &Topology,
-        rule: Rule,
-        points: &[DVec3],
-        constraints: &Constraints,
-    ) -> Result<Self> {
+    /// If `points` or a list of constraints has not one entry a vertex.
+    pub fn new(auxiliary: &Surface, rule: Rule, points: &[DVec3], constraints: &Constraints) -> Result<Self> {
         assert_eq!(points.len(), auxiliary.len(), "one point a vertex");
         constraints.check(points.len())?;
         let normals = constraints.normals.map(unit_normals).transpose()?;
-        let mut mesh = refine_by(rule, auxiliary, topology)?;
-        let first_vertex_face = auxiliary.faces.len() + topology.edges();
+        let mut mesh = refine_by(rule, auxiliary)?;
+        let first_vertex_face = auxiliary.faces().len() + auxiliary.topology().edges();
         let mut not_flattened = Vec::new();
         let mut ring = Vec::new();
         for (v, &point) in points.iter().enumerate() {
@@ -277,7 +266,7 @@ impl FirstRefinement {
                 mesh.positions[c as usize] = point + scale * flat;
             }
         }
-        Ok(FirstRefinement { mesh, first_vertex_face, not_flattened })
+        Ok(FirstRefinement { surface: Surface::of_valid(mesh), first_vertex_face, not_flattened })
     }
 
     /// The mesh at `level`: 1 is the first refinement itself, each further one a Doo-Sabin step. The type-V face of
@@ -288,10 +277,10 @@ impl FirstRefinement {
     ///
     /// # Panics
     /// If `level` is 0.
-    pub fn surface(&self, level: usize) -> Result<Mesh> {
+    pub fn at_level(&self, level: usize) -> Result<Mesh> {
         assert!(level > 0, "level 1 is the first refinement");
         // A step puts type-F faces first, in the order of the old faces: face numbers stay.
-        Refinement::DooSabin.refine_n(&self.mesh, level - 1)
+        Refinement::DooSabin.refine_n(&self.surface, level - 1)
     }
 }
 
@@ -312,22 +301,21 @@ pub struct TwoPhase {
 ///
 /// ```
 /// use limitlab::interpolate::zheng_cai::{Constraints, PhaseOne, interpolate};
-/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::mesh::{Surface, builtin};
 ///
-/// let mesh = builtin::builtin("icosahedron")?;
-/// let topology = Topology::new(&mesh.faces, mesh.len());
-/// let result = interpolate(&mesh, &topology, &Constraints::default(), &PhaseOne::default())?;
+/// let surface = Surface::new(builtin::builtin("icosahedron")?)?;
+/// let result = interpolate(&surface, &Constraints::default(), &PhaseOne::default())?;
 /// // Three sweeps or thirty: the centroids of the type-V faces are the given points.
-/// let fine = result.first.surface(3)?;
+/// let fine = result.first.at_level(3)?;
 /// let face = fine.faces.face(result.first.first_vertex_face + 7);
 /// let centroid = face.iter().map(|&c| fine.positions[c as usize]).sum::<glam::DVec3>() / face.len() as f64;
-/// assert!(centroid.distance(mesh.positions[7]) < 1e-14);
+/// assert!(centroid.distance(surface.positions()[7]) < 1e-14);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn interpolate(mesh: &Mesh, topology: &Topology, constraints: &Constraints, phase: &PhaseOne) -> Result<TwoPhase> {
-    constraints.check(mesh.len())?;
-    let auxiliary = auxiliary(mesh, topology, constraints.interpolated, phase)?;
-    let first = FirstRefinement::new(&auxiliary.mesh, topology, Rule::ZhengCai, &mesh.positions, constraints)?;
+pub fn interpolate(surface: &Surface, constraints: &Constraints, phase: &PhaseOne) -> Result<TwoPhase> {
+    constraints.check(surface.len())?;
+    let auxiliary = auxiliary(surface, constraints.interpolated, phase)?;
+    let first = FirstRefinement::new(&auxiliary.surface, Rule::ZhengCai, surface.positions(), constraints)?;
     Ok(TwoPhase { auxiliary, first })
 }
 

@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::DVec3;
 use rayon::slice::ParallelSliceMut;
 
+use super::Faces;
 use super::frame::magnitude;
 use super::validate::counted;
-use super::{Faces, Mesh};
 use crate::pages::large;
 use crate::parallel;
 use crate::prefetch::prefetch;
@@ -16,23 +16,23 @@ use crate::prefetch::prefetch;
 ///
 /// # Panics
 /// If a face names a vertex that does not exist.
-pub(super) fn remarks(mesh: &Mesh) -> Vec<String> {
+pub(super) fn remarks(positions: &[DVec3], faces: &Faces) -> Vec<String> {
     let mut remarks = Vec::new();
-    let copies = duplicate_positions(&mesh.positions);
+    let copies = duplicate_positions(positions);
     if let Some(&(v, original)) = copies.first() {
         remarks.push(format!(
             "{} (first: vertex {v} lies on vertex {original})",
             counted(copies.len(), "duplicate position")
         ));
     }
-    let copies = duplicate_faces(&mesh.faces, mesh.len(), &copies);
+    let copies = duplicate_faces(faces, positions.len(), &copies);
     if let Some(&(f, original)) = copies.first() {
         remarks.push(format!(
             "{} on the same positions as another (first: face {f} lies on face {original})",
             counted(copies.len(), "face")
         ));
     }
-    let flat = zero_area_faces(mesh);
+    let flat = zero_area_faces(positions, faces);
     if let Some(&f) = flat.first() {
         let faces = counted(flat.len(), "zero-area face");
         remarks.push(format!("{faces} (first: face {f})"));
@@ -143,7 +143,7 @@ fn mix(word: u64) -> u64 {
 }
 
 /// The faces whose vector area ½ Σ (pᵢ − p₀) × (pᵢ₊₁ − p₀) vanishes to the rounding of its terms.
-fn zero_area_faces(mesh: &Mesh) -> Vec<u32> {
+fn zero_area_faces(positions: &[DVec3], faces: &Faces) -> Vec<u32> {
     // Each product of differences carries a relative error of at most 4 units in the last place.
     const ROUNDING: f64 = 8.0 * f64::EPSILON;
     // Of a face whose corner k lies at `at(k)` from the first.
@@ -158,8 +158,8 @@ fn zero_area_faces(mesh: &Mesh) -> Vec<u32> {
         area.length().partial_cmp(&(ROUNDING * scale)) != Some(std::cmp::Ordering::Greater)
     };
     let is_flat = |f: usize| {
-        let face = mesh.faces.face(f);
-        let corner = |k: usize| mesh.positions[face[k] as usize];
+        let face = faces.face(f);
+        let corner = |k: usize| positions[face[k] as usize];
         if !vanishes(face.len(), &|k| corner(k) - corner(0)) {
             return false;
         }
@@ -173,12 +173,13 @@ fn zero_area_faces(mesh: &Mesh) -> Vec<u32> {
         sides.iter_mut().for_each(|side| *side /= unit);
         vanishes(face.len(), &|k| sides[k])
     };
-    parallel::flat_map(mesh.faces.len(), 4096, |range| range.filter(|&f| is_flat(f)).map(|f| f as u32).collect())
+    parallel::flat_map(faces.len(), 4096, |range| range.filter(|&f| is_flat(f)).map(|f| f as u32).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::Mesh;
 
     #[test]
     fn duplicates_are_found_in_order_and_zeros_of_either_sign_are_one() {
@@ -209,10 +210,10 @@ mod tests {
         let faces =
             Faces::from_lists(vec![vec![0, 1, 2], vec![0, 1, 3], vec![3, 3, 1], vec![0, 1, 3, 2], vec![0, 1, 4]]);
         let mesh = Mesh::new(positions, faces);
-        assert_eq!(zero_area_faces(&mesh), [0, 2]);
+        assert_eq!(zero_area_faces(&mesh.positions, &mesh.faces), [0, 2]);
         for size in [2f64.powi(-900), 2f64.powi(-560), 2f64.powi(560), 2f64.powi(1020)] {
-            let positions = mesh.positions.iter().map(|p| size * *p).collect();
-            assert_eq!(zero_area_faces(&Mesh::new(positions, mesh.faces.clone())), [0, 2], "{size:e}");
+            let positions: Vec<DVec3> = mesh.positions.iter().map(|p| size * *p).collect();
+            assert_eq!(zero_area_faces(&positions, &mesh.faces), [0, 2], "{size:e}");
         }
     }
 
@@ -223,7 +224,7 @@ mod tests {
         let mut positions = vec![DVec3::ZERO, DVec3::X];
         positions.extend(heights.map(|h| DVec3::new(1.0, h, 0.0)));
         let slivers: Vec<[u32; 3]> = (0..heights.len() as u32).map(|k| [0, 1, k + 2]).collect();
-        let flat = zero_area_faces(&Mesh::new(positions, Faces::from_lists(slivers)));
+        let flat = zero_area_faces(&positions, &Faces::from_lists(slivers));
         assert_eq!(flat, [5, 6]);
     }
 }

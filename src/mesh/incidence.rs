@@ -173,17 +173,18 @@ impl Incidence {
         }
     }
 
-    /// Whether every side of a face has exactly one opposite: one other side between its vertices, in the other
-    /// direction. In parallel, O(Σ n²) over the valences n up to 16, with sorts beyond.
+    /// Whether every side of a face has exactly one opposite (one other side between its vertices, in the other
+    /// direction), and the faces at every vertex form one umbrella. In parallel, O(Σ n²) over the valences n up to 16,
+    /// with sorts beyond.
     ///
     /// ```
     /// use limitlab::mesh::{Faces, Incidence};
-    /// let closed = |faces: &Faces| Incidence::new(faces, 4).is_closed(faces);
+    /// let closed = |faces: &Faces| Incidence::new(faces, 4).is_closed_manifold(faces);
     /// let tetrahedron = [[0u32, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]];
     /// assert!(closed(&Faces::from_lists(tetrahedron)));
     /// assert!(!closed(&Faces::from_lists(&tetrahedron[1..])));
     /// ```
-    pub fn is_closed(&self, faces: &Faces) -> bool {
+    pub fn is_closed_manifold(&self, faces: &Faces) -> bool {
         let corners = faces.corners();
         parallel::all(self.vertices(), |v| {
             let at = self.corners_at(v);
@@ -192,10 +193,7 @@ impl Incidence {
                 (corners[after as usize], corners[before as usize])
             };
             if at.len() > FEW {
-                let (mut out, mut into): (Vec<u32>, Vec<u32>) = at.iter().map(|&c| sides(c)).unzip();
-                out.sort_unstable();
-                into.sort_unstable();
-                return out == into && out.windows(2).all(|w| w[0] != w[1]) && out.binary_search(&(v as u32)).is_err();
+                return one_umbrella(v, at.iter().map(|&c| sides(c)));
             }
             // Eight at a time, by one comparison of all: a vertex of more faces is rare.
             if at.len() <= FEW / 2 {
@@ -207,8 +205,8 @@ impl Incidence {
     }
 }
 
-/// Whether the vertices where sides leave `v` for are the ones that sides enter it from, no two the same and none `v`;
-/// at most `MOST`.
+/// Whether the vertices where sides leave `v` for are the ones that sides enter it from, no two the same and none `v`,
+/// and the faces form one umbrella; at most `MOST`.
 #[inline(always)]
 fn each_once<const MOST: usize>(v: usize, sides: impl Iterator<Item = (u32, u32)>) -> bool {
     // What no place of a list holds is no vertex.
@@ -223,7 +221,39 @@ fn each_once<const MOST: usize>(v: usize, sides: impl Iterator<Item = (u32, u32)
     for &w in &out[..count] {
         wrong |= (times(&out, w) ^ 1) | (times(&into, w) ^ 1) | u32::from(w as usize == v);
     }
-    wrong == 0
+    if wrong != 0 || count == 0 {
+        return false;
+    }
+    // Across the side that enters, the next face counter-clockwise.
+    let mut next = [0u32; MOST];
+    for (next, &w) in next.iter_mut().zip(&into[..count]) {
+        *next = (0..MOST as u32).zip(out).map(|(k, x)| if x == w { k } else { 0 }).sum();
+    }
+    let mut place = 0;
+    for turns in 1..=count {
+        place = next[place as usize];
+        if place == 0 {
+            return turns == count;
+        }
+    }
+    false
+}
+
+/// As [`each_once`], for any number of faces.
+fn one_umbrella(v: usize, sides: impl Iterator<Item = (u32, u32)>) -> bool {
+    let (mut out, into): (Vec<(u32, u32)>, Vec<u32>) = (0..).zip(sides).map(|(k, (to, from))| ((to, k), from)).unzip();
+    out.sort_unstable();
+    let leaves_once = out.windows(2).all(|w| w[0].0 != w[1].0) && out.iter().all(|&(w, _)| w as usize != v);
+    let find = |w: u32| out.binary_search_by_key(&w, |&(to, _)| to).ok().map(|at| out[at].1);
+    let mut place = 0;
+    for turns in 1..=into.len() {
+        match find(into[place as usize]) {
+            Some(0) => return leaves_once && turns == into.len(),
+            Some(next) => place = next,
+            None => return false,
+        }
+    }
+    false
 }
 
 /// Cuts `values`, of which row i is `offsets[i]..offsets[i + 1]`, after every `chunk` rows.

@@ -20,6 +20,7 @@ mod obj_normals;
 pub mod off;
 pub mod order;
 pub mod ply;
+pub mod surface;
 pub mod topology;
 pub mod validate;
 pub mod vertex_data;
@@ -30,6 +31,7 @@ use crate::parallel;
 use glam::DVec3;
 
 pub use incidence::Incidence;
+pub use surface::Surface;
 pub use topology::Topology;
 
 /// Faces or points of one task.

@@ -8,10 +8,9 @@ use glam::DVec3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::Mesh;
 use super::frame::distance;
 use super::incidence::next_in;
-use super::topology::Topology;
+use super::{Faces, Mesh, Surface, Topology};
 use crate::error::short;
 use crate::{Error, Result};
 
@@ -47,12 +46,14 @@ impl fmt::Display for Noise {
 /// # Panics
 /// If a face names a vertex that does not exist.
 pub fn mean_edge_length(mesh: &Mesh) -> f64 {
-    let faces = &mesh.faces;
-    let topology = Topology::new(faces, mesh.len());
+    mean_length(&mesh.positions, &mesh.faces, &Topology::new(&mesh.faces, mesh.len()))
+}
+
+fn mean_length(positions: &[DVec3], faces: &Faces, topology: &Topology) -> f64 {
     let (mut sum, mut count) = (0.0, 0u32);
     for c in topology.edge_sides() {
         let range = faces.range(topology.incidence.face_of(c));
-        let [a, b] = [c, next_in(&range, c)].map(|c| mesh.positions[faces.corners()[c as usize] as usize]);
+        let [a, b] = [c, next_in(&range, c)].map(|c| positions[faces.corners()[c as usize] as usize]);
         sum += distance(a, b);
         count += 1;
     }
@@ -66,10 +67,20 @@ pub fn mean_edge_length(mesh: &Mesh) -> f64 {
 /// If a face names a vertex that does not exist.
 pub fn add_noise(mesh: &mut Mesh, amplitude: f64, seed: u64) {
     let deviation = amplitude * mean_edge_length(mesh);
+    displace(&mut mesh.positions, deviation, seed);
+}
+
+/// As [`add_noise`], on a valid mesh. Points may come to lie beyond the largest double.
+pub fn move_vertices(surface: &mut Surface, amplitude: f64, seed: u64) {
+    let deviation = amplitude * mean_length(surface.positions(), surface.faces(), surface.topology());
+    displace(surface.positions_mut(), deviation, seed);
+}
+
+fn displace(points: &mut [DVec3], deviation: f64, seed: u64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Strictly between 0 and 1.
     let mut uniform = || ((rng.next_u64() >> 12) as f64 + 0.5) / (1u64 << 52) as f64;
-    for p in &mut mesh.positions {
+    for p in points {
         let mut pair = || {
             let (radius, angle) = ((-2.0 * uniform().ln()).sqrt(), TAU * uniform());
             (radius * angle.cos(), radius * angle.sin())
@@ -82,7 +93,7 @@ pub fn add_noise(mesh: &mut Mesh, amplitude: f64, seed: u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Faces, builtin};
+    use crate::mesh::builtin;
 
     #[test]
     fn the_mean_counts_every_edge_once_on_an_open_mesh_too() {

@@ -1,7 +1,7 @@
 //! Who meets whom: corners at each vertex, opposite half-edges, edges, ordered stars, components, boundary
 //! loops, Euler characteristic. Built in linear time by a counting sort, in parallel; no hashing.
 
-use std::sync::OnceLock;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::slice::ParallelSliceMut;
@@ -38,28 +38,14 @@ impl Scatter {
     }
 }
 
-/// What was found out about a topology: no part of it, so all are equal.
-#[derive(Clone, Debug, Default)]
-struct Known(OnceLock<bool>);
-
-impl PartialEq for Known {
-    fn eq(&self, _: &Self) -> bool {
-        true
-    }
-}
-
-impl Eq for Known {}
-
 /// How the faces hang together. Half-edge `c` leaves corner `c` for the next corner of its face.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topology {
-    pub incidence: Incidence,
+    pub incidence: Arc<Incidence>,
     twin: Vec<u32>,
     edges: usize,
     boundary: Vec<u32>,
     irregular_edges: Vec<IrregularEdge>,
-    /// Whether the faces at every vertex form one umbrella.
-    umbrellas: Known,
 }
 
 /// An edge that is not the meeting of at most two, oppositely directed faces.
@@ -97,21 +83,20 @@ impl Topology {
     /// # Panics
     /// If a corner names a vertex ≥ `vertices`.
     pub fn new(faces: &Faces, vertices: usize) -> Self {
-        let incidence = Incidence::new(faces, vertices);
+        Self::of(Arc::new(Incidence::new(faces, vertices)), faces)
+    }
+
+    /// As [`new`](Self::new), where the incidence is known.
+    pub(crate) fn of(incidence: Arc<Incidence>, faces: &Faces) -> Self {
+        let vertices = incidence.vertices();
         let twin = Scatter::new(faces.corners().len());
         let chunks = parallel::map(vertices, CHUNK, |range| {
             let mut pairs = Pairs::default();
             range.for_each(|v| pairs.at(v, faces, &incidence, &twin));
             pairs
         });
-        let mut topology = Topology {
-            incidence,
-            twin: twin.into_vec(),
-            edges: 0,
-            boundary: Vec::new(),
-            irregular_edges: Vec::new(),
-            umbrellas: Known::default(),
-        };
+        let mut topology =
+            Topology { incidence, twin: twin.into_vec(), edges: 0, boundary: Vec::new(), irregular_edges: Vec::new() };
         for chunk in chunks {
             topology.edges += chunk.edges;
             topology.boundary.extend(chunk.boundary);
@@ -124,12 +109,11 @@ impl Topology {
     /// The topology of a closed manifold from its arrays: every half-edge has its twin, every vertex one umbrella.
     pub(crate) fn closed(incidence: Incidence, twin: Vec<u32>) -> Self {
         Topology {
-            incidence,
+            incidence: Arc::new(incidence),
             edges: twin.len() / 2,
             twin,
             boundary: Vec::new(),
             irregular_edges: Vec::new(),
-            umbrellas: Known(OnceLock::from(true)),
         }
     }
 
@@ -141,21 +125,6 @@ impl Topology {
     /// The numbers of the edges of a closed mesh.
     pub(crate) fn edge_numbers(&self) -> EdgeNumbers<'_> {
         EdgeNumbers::new(&self.twin)
-    }
-
-    /// Whether every vertex of a closed mesh has faces, and these form one umbrella. Examined the first time only.
-    pub(crate) fn has_one_umbrella_each(&self, faces: &Faces) -> bool {
-        if let Some(&known) = self.umbrellas.0.get() {
-            return known;
-        }
-        let holds = |v| self.incidence.face_count(v) > 0 && self.is_one_umbrella(faces, v);
-        let one_each = parallel::all(self.incidence.vertices(), holds);
-        *self.umbrellas.0.get_or_init(|| one_each)
-    }
-
-    /// Keeps for later that [`has_one_umbrella_each`](Self::has_one_umbrella_each).
-    pub(crate) fn know_one_umbrella_each(&self) {
-        self.umbrellas.0.get_or_init(|| true);
     }
 
     /// Whether the faces at vertex `v` of a closed mesh form one umbrella, which turns through all of them.

@@ -9,7 +9,7 @@ use serde::{Serialize, Serializer, ser::SerializeStruct};
 pub use super::defect::{Defect, DefectKind};
 use super::incidence::{Incidence, next_in, prev_in};
 use super::topology::{NONE, Topology, join};
-use super::{Faces, Mesh, degenerate};
+use super::{Faces, Mesh, Surface, degenerate};
 use crate::parallel;
 use crate::{Error, Result};
 
@@ -92,7 +92,7 @@ pub struct Validation {
     /// Present if an edge has its two faces in the same direction.
     pub orientation: Option<Orientation>,
     /// Absent if a face names a vertex that does not exist.
-    pub topology: Option<Topology>,
+    pub(super) topology: Option<Topology>,
 }
 
 impl Serialize for Validation {
@@ -182,17 +182,6 @@ impl Validation {
             }
         }
     }
-
-    /// The topology of a valid mesh.
-    ///
-    /// # Errors
-    /// [`Error::Mesh`] about `name` with [`summary_line`](Self::summary_line) if there are defects.
-    pub fn into_topology(self, name: &str) -> Result<Topology> {
-        match self.topology {
-            Some(topology) if self.defects.is_empty() => Ok(topology),
-            _ => Err(Error::mesh(name, self.summary_line())),
-        }
-    }
 }
 
 /// `1 face`, `2 faces`.
@@ -231,7 +220,7 @@ pub fn validate(mesh: &Mesh, lines: Option<(&[u32], &[u32])>, boundary: Boundary
                 return Vec::new();
             }
             let topology = || examine_topology(mesh, boundary, &mut report);
-            rayon::join(topology, || degenerate::remarks(mesh)).1
+            rayon::join(topology, || degenerate::remarks(&mesh.positions, &mesh.faces)).1
         },
     );
     report.remarks.extend(remarks);
@@ -338,11 +327,7 @@ fn examine_topology(mesh: &Mesh, boundary: Boundary, report: &mut Validation) {
             }
         }
         Boundary::AsInterior if boundary_edges > 0 => {
-            let edges = counted(boundary_edges, "boundary edge");
-            let loops = boundary_loops.map(|l| format!(" in {}", counted(l, "loop")));
-            report
-                .remarks
-                .push(format!("{edges}{}: boundary vertices are treated as interior", loops.unwrap_or_default()));
+            report.remarks.push(boundary_remark(boundary_edges, boundary_loops));
         }
         Boundary::AsInterior => {}
     }
@@ -361,6 +346,32 @@ fn examine_topology(mesh: &Mesh, boundary: Boundary, report: &mut Validation) {
     report.topology = Some(topology);
 }
 
+/// What to know of a boundary that is allowed.
+fn boundary_remark(edges: usize, loops: Option<usize>) -> String {
+    let edges = counted(edges, "boundary edge");
+    let loops = loops.map_or_else(String::new, |l| format!(" in {}", counted(l, "loop")));
+    format!("{edges}{loops}: boundary vertices are treated as interior")
+}
+
+/// The remarks of [`validate`] on a mesh that has no defects.
+pub(super) fn remarks(surface: &Surface) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if !surface.is_closed() {
+        let topology = surface.topology();
+        let loops = topology.boundary_loops(surface.faces()).len();
+        remarks.push(boundary_remark(topology.boundary_edges(), Some(loops)));
+    }
+    if let Some(renumbered) = surface.renumbered() {
+        // Looking for what is not there is many times faster so. What is there needs the file's own numbers.
+        let positions = renumbered.numbering.there(surface.positions());
+        if degenerate::remarks(&positions, &renumbered.faces).is_empty() {
+            return remarks;
+        }
+    }
+    remarks.extend(degenerate::remarks(surface.positions(), surface.faces()));
+    remarks
+}
+
 /// Umbrellas and valences of all vertices, in parallel. Returns the least and the greatest valence.
 fn examine_vertices(faces: &Faces, topology: &Topology, defects: &mut Vec<Defect>) -> (usize, usize) {
     let incidence = &topology.incidence;
@@ -370,17 +381,14 @@ fn examine_vertices(faces: &Faces, topology: &Topology, defects: &mut Vec<Defect
         let mut link = Link::default();
         let mut found = Vec::new();
         let (mut min, mut max) = (usize::MAX, 0);
-        let mut one_each = true;
         for v in range {
             if incidence.face_count(v) == 0 {
-                one_each = false;
                 continue;
             }
             // One umbrella of edges with two sides each: the valence is the number of faces.
             let (valence, umbrellas) = if is_closed && topology.is_one_umbrella(faces, v) {
                 (incidence.face_count(v), 1)
             } else {
-                one_each = false;
                 link.examine(faces, incidence, v)
             };
             min = min.min(valence);
@@ -395,13 +403,10 @@ fn examine_vertices(faces: &Faces, topology: &Topology, defects: &mut Vec<Defect
                 report(DefectKind::LowValence, valence);
             }
         }
-        (found, min, max, one_each)
+        (found, min, max)
     });
-    if chunks.iter().all(|&(.., one_each)| one_each) {
-        topology.know_one_umbrella_each();
-    }
     let (mut min, mut max) = (usize::MAX, 0);
-    for (found, lo, hi, _) in chunks {
+    for (found, lo, hi) in chunks {
         defects.extend(found);
         min = min.min(lo);
         max = max.max(hi);

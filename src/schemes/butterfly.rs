@@ -8,11 +8,11 @@ use glam::DVec3;
 
 use super::interpolatory::{RegularMask, SQRT_3, tangents, vertices};
 use super::loop_scheme::{refined_topology, split_in_four};
-use super::refinement::{Class, RefinementRules, Size};
+use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::ring::{Place, Rings, Rule};
 use super::star::{Tangents, next_in_triangle, prev_in_triangle, require_room, require_triangles, twin};
 use crate::Result;
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::{Mesh, Surface};
 use crate::pages::large;
 use crate::parallel;
 
@@ -68,9 +68,9 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     class: Class::Interpolatory,
     needs_triangles: true,
     refine,
-    refined_topology: |_, topology, refined| refined_topology(topology, refined),
+    refined_topology,
     size: Size::in_four,
-    limit_positions: |mesh, topology| vertices(NAME, mesh, topology),
+    limit_positions: |surface| vertices(NAME, surface),
     limit_normals,
 };
 
@@ -81,23 +81,21 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// [`loop_scheme::refine`](super::loop_scheme::refine).
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold, a face is
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary, a face is
 /// no triangle (the first is named), a vertex has valence < 3, or the result is too large for 32-bit indices.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-    require_triangles(mesh, topology, NAME)?;
+pub fn refine(surface: &Surface) -> Result<Mesh> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
+    require_triangles(surface, NAME)?;
     require_room(mesh, 4)?;
-    let rule = Rule { name: NAME, place: Place::Edge, mask: |n| (CENTER, extraordinary_mask(n)), amplitudes };
-    let rings = Rings::new(mesh, topology, rule)?;
+    let rule = Rule { place: Place::Edge, mask: |n| (CENTER, extraordinary_mask(n)), amplitudes };
+    let rings = Rings::new(surface, rule);
     let edges = topology.edge_numbers();
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
     parallel::append(&mut positions, &mesh.positions);
     edges.extend(&mut positions, |c| {
         let t = twin(topology, c);
         match [c, t].map(|c| rings.is_extraordinary(c)) {
-            [false, false] => regular(mesh, topology, c) + regular(mesh, topology, t),
+            [false, false] => regular(surface, c) + regular(surface, t),
             [true, false] => rings.point(c),
             [false, true] => rings.point(t),
             [true, true] => 0.5 * (rings.point(c) + rings.point(t)),
@@ -107,7 +105,8 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
 }
 
 /// The regular stencil's half on the side of half-edge `c`.
-fn regular(mesh: &Mesh, topology: &Topology, c: u32) -> DVec3 {
+fn regular(surface: &Surface, c: u32) -> DVec3 {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let [end, opposite, wing] = REGULAR;
     let at = |c: usize| mesh.positions[mesh.faces.corners()[c] as usize];
     let (next, prev) = (next_in_triangle(c), prev_in_triangle(c));
@@ -119,23 +118,16 @@ fn regular(mesh: &Mesh, topology: &Topology, c: u32) -> DVec3 {
 ///
 /// # Errors
 /// As [`refine`].
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_tangents(mesh: &Mesh, topology: &Topology) -> Result<Vec<Tangents>> {
-    let fine = refine(mesh, topology)?;
-    let finer = refined_topology(topology, &fine);
-    Ok(tangents(&fine, &finer, mesh.len(), &TANGENTS))
+pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
+    let fine = Refinement::Butterfly.refined(surface)?;
+    Ok(tangents(&fine, surface.len(), &TANGENTS))
 }
 
 /// The unit normals of the limit surface at all vertices; zero where [`Tangents::normal`] is.
 ///
 /// # Errors
 /// As [`limit_tangents`].
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_normals(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    let tangents = limit_tangents(mesh, topology)?;
+pub fn limit_normals(surface: &Surface) -> Result<Vec<DVec3>> {
+    let tangents = limit_tangents(surface)?;
     Ok(tangents.iter().map(Tangents::normal).collect())
 }

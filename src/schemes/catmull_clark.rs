@@ -13,7 +13,7 @@ use super::star::{Circle, Tangents, centroid, for_each_star, require_closed, req
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
 use crate::mesh::incidence::{next_in, prev_in};
-use crate::mesh::{Faces, Mesh, Topology};
+use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
 use crate::parallel;
 
@@ -59,13 +59,11 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// (vertex, edge leaving it, face, edge entering it).
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold or the
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or the
 /// result too large for 32-bit indices.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-    require_closed(mesh, topology)?;
+pub fn refine(surface: &Surface) -> Result<Mesh> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
+    require_closed(surface)?;
     require_room(mesh, 4)?;
     let (old, incidence) = (&mesh.positions, &topology.incidence);
     let corners = mesh.faces.corners();
@@ -90,16 +88,12 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
         0.25 * one + 0.25 * other
     });
     positions.append(&mut centers);
-    Ok(Mesh::new(positions, split(mesh, topology, &edges)))
+    Ok(Mesh::new(positions, split(surface, &edges)))
 }
 
-/// The topology of `refined`, which is what [`refine`] made of `mesh`: that of [`Topology::new`], by index arithmetic
-/// from the coarse one.
-///
-/// # Panics
-/// If the three do not belong together.
-pub fn refined_topology(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
-    refined::of_quads(mesh, topology, refined)
+/// The topology of `refined`, which is what [`refine`] made of the surface.
+pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
+    refined::of_quads(surface, refined)
 }
 
 /// One step by Thall's in-place rule (Eq. 20 and 22): first the points of faces and edges, then each old vertex
@@ -109,16 +103,14 @@ pub fn refined_topology(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Top
 ///
 /// # Errors
 /// As [`refine`].
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn refine_in_place(mut mesh: Mesh, topology: &Topology) -> Result<Mesh> {
-    require_closed(&mesh, topology)?;
-    require_room(&mesh, 4)?;
+pub fn refine_in_place(mut surface: Surface) -> Result<Mesh> {
+    require_closed(&surface)?;
+    require_room(surface.mesh(), 4)?;
+    let mut points = surface.take_positions();
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let numbers = topology.edge_numbers();
-    let (vertices, edges) = (mesh.len(), topology.edges());
+    let (vertices, edges) = (topology.incidence.vertices(), topology.edges());
     let corners = mesh.faces.corners();
-    let mut points = std::mem::take(&mut mesh.positions);
     points.resize(vertices + edges + mesh.faces.len(), DVec3::ZERO);
     let face_point = |c: u32| vertices + edges + topology.incidence.face_of(c);
     for (f, face) in mesh.faces.iter().enumerate() {
@@ -136,12 +128,13 @@ pub fn refine_in_place(mut mesh: Mesh, topology: &Topology) -> Result<Mesh> {
             star.iter().map(|&c| 4.0 * points[vertices + numbers.of(c) as usize] - points[face_point(c)]).sum();
         points[v] = ((n * n - 3.0 * n) * points[v] + neighbors) / (n * n);
     }
-    let faces = split(&mesh, topology, &numbers);
+    let faces = split(&surface, &numbers);
     Ok(Mesh::new(points, faces))
 }
 
 /// The faces of the refined mesh: (vertex, edge leaving it, face, edge entering it) for each old corner.
-fn split(mesh: &Mesh, topology: &Topology, edges: &EdgeNumbers) -> Faces {
+fn split(surface: &Surface, edges: &EdgeNumbers) -> Faces {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let vertices = topology.incidence.vertices() as u32;
     let first_face = vertices + topology.edges() as u32;
     let corners = mesh.faces.corners();
@@ -171,12 +164,10 @@ pub fn limit_mask(n: usize) -> [f64; 3] {
 /// opposite corner of each face replaced by 4c_F − v − e_j − e_{j+1} (Thall Eq. 14).
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_positions(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    require_closed(mesh, topology)?;
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary.
+pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
+    require_closed(surface)?;
     let mut limits = vec![DVec3::ZERO; mesh.len()];
     for face in mesh.faces.iter() {
         let center = 4.0 * centroid(&mesh.positions, face);
@@ -211,17 +202,15 @@ pub fn tangent_mask(n: usize) -> Vec<[f64; 2]> {
 /// The tangents of the limit surface at all vertices.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_tangents(mesh: &Mesh, topology: &Topology) -> Result<Vec<Tangents>> {
-    require_closed(mesh, topology)?;
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary.
+pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
+    require_closed(surface)?;
     let corners = mesh.faces.corners();
     let mut tangents = Vec::with_capacity(mesh.len());
     let mut circle = Circle::default();
     let centers: Vec<DVec3> = mesh.faces.iter().map(|face| centroid(&mesh.positions, face)).collect();
-    for_each_star(mesh, topology, |v, star| {
+    for_each_star(surface, |v, star| {
         let n = star.len();
         let constant = tangent_constant(n);
         let circle = circle.of(n);
@@ -246,10 +235,7 @@ pub fn limit_tangents(mesh: &Mesh, topology: &Topology) -> Result<Vec<Tangents>>
 ///
 /// # Errors
 /// As [`limit_tangents`].
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_normals(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    let tangents = limit_tangents(mesh, topology)?;
+pub fn limit_normals(surface: &Surface) -> Result<Vec<DVec3>> {
+    let tangents = limit_tangents(surface)?;
     Ok(tangents.iter().map(Tangents::normal).collect())
 }

@@ -11,7 +11,7 @@ use super::refinement::{Class, RefinementRules, Size};
 use super::star::{CHUNK, Circle, Tangents, centroid, for_each_star, put_stars, require_closed, require_room, twin};
 use crate::Result;
 use crate::mesh::incidence::split_by_face;
-use crate::mesh::{Faces, Mesh, Topology};
+use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::filled;
 use crate::pages::large;
 use crate::parallel;
@@ -83,19 +83,16 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     refine,
     refined_topology,
     size: |c| Size { vertices: c.corners, faces: c.faces + c.edges() + c.vertices, corners: 4 * c.corners },
-    limit_positions: |mesh, topology| limit_positions(Rule::DooSabin, mesh, topology),
-    limit_normals: |mesh, topology| limit_normals(Rule::DooSabin, mesh, topology),
+    limit_positions: |surface| limit_positions(Rule::DooSabin, surface),
+    limit_normals: |surface| limit_normals(Rule::DooSabin, surface),
 };
 
 /// One step of Doo-Sabin: [`refine_by`] with [`Rule::DooSabin`].
 ///
 /// # Errors
 /// As [`refine_by`].
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-    refine_by(Rule::DooSabin, mesh, topology)
+pub fn refine(surface: &Surface) -> Result<Mesh> {
+    refine_by(Rule::DooSabin, surface)
 }
 
 /// One step by either rule.
@@ -105,13 +102,11 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
 /// for each old vertex, so that the face of vertex v has index F + E + v.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold or the
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or the
 /// result is too large for 32-bit indices.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-    require_closed(mesh, topology)?;
+pub fn refine_by(rule: Rule, surface: &Surface) -> Result<Mesh> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
+    require_closed(surface)?;
     require_room(mesh, 4)?;
     let count = mesh.faces.corners().len();
     let incidence = &topology.incidence;
@@ -124,7 +119,7 @@ pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
         let next = |c| incidence.next(&mesh.faces, c);
         [next(c), c, next(t), t]
     });
-    put_stars(mesh, topology, of_vertices);
+    put_stars(surface, of_vertices);
 
     let mut offsets = large(Vec::with_capacity(mesh.faces.len() + count / 2 + mesh.len() + 1));
     offsets.push(0);
@@ -136,25 +131,19 @@ pub fn refine_by(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     Ok(Mesh::new(corner_points(mesh, rule), Faces::from_parts(offsets, corners)))
 }
 
-/// The topology of `refined`, which is what [`refine_by`] made of `mesh`: that of [`Topology::new`], by index
-/// arithmetic from the coarse one.
-///
-/// # Panics
-/// If the three do not belong together.
-pub fn refined_topology(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
-    refined::of_corners(mesh, topology, refined)
+/// The topology of `refined`, which is what [`refine_by`] made of the surface.
+pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
+    refined::of_corners(surface, refined)
 }
 
 /// The limit points of all vertices when the first step is by `rule` and all others are Doo-Sabin: the
 /// centroids of the type-V faces, (1/n) Σ of the vertex's corner points.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_positions(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    require_closed(mesh, topology)?;
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary.
+pub fn limit_positions(rule: Rule, surface: &Surface) -> Result<Vec<DVec3>> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
+    require_closed(surface)?;
     let mut limits = vec![DVec3::ZERO; mesh.len()];
     for (&v, point) in mesh.faces.corners().iter().zip(corner_points(mesh, rule)) {
         limits[v as usize] += point;
@@ -168,16 +157,14 @@ pub fn limit_positions(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<V
 /// The unit normals of the limit surface at the [`limit_positions`]; zero where [`Tangents::normal`] is.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_normals(rule: Rule, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    let limits = limit_positions(rule, mesh, topology)?;
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary.
+pub fn limit_normals(rule: Rule, surface: &Surface) -> Result<Vec<DVec3>> {
+    let mesh = surface.mesh();
+    let limits = limit_positions(rule, surface)?;
     let points = corner_points(mesh, rule);
     let mut normals = Vec::with_capacity(mesh.len());
     let mut circle = Circle::default();
-    for_each_star(mesh, topology, |v, star| {
+    for_each_star(surface, |v, star| {
         let ring = star.iter().map(|&c| points[c as usize]);
         normals.push(ring_normal(limits[v], ring, circle.of(star.len())));
     });

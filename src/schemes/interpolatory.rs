@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 
 use super::star::{Tangents, next_in_triangle, require_triangles, twin};
 use crate::Result;
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::Surface;
 
 pub(super) const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
@@ -19,8 +19,9 @@ pub(super) struct RegularMask {
 }
 
 /// The limit points of all vertices: the vertices themselves.
-pub(super) fn vertices(name: &str, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    require_triangles(mesh, topology, name)?;
+pub(super) fn vertices(name: &str, surface: &Surface) -> Result<Vec<DVec3>> {
+    let mesh = surface.mesh();
+    require_triangles(surface, name)?;
     Ok(mesh.positions.clone())
 }
 
@@ -29,7 +30,8 @@ pub(super) fn vertices(name: &str, mesh: &Mesh, topology: &Topology) -> Result<V
 ///
 /// At an extraordinary vertex the rule of both schemes maps the ring to the ring by a circulant, so the first harmonic
 /// of the ring is the mask.
-pub(super) fn tangents(mesh: &Mesh, topology: &Topology, originals: usize, mask: &RegularMask) -> Vec<Tangents> {
+pub(super) fn tangents(surface: &Surface, originals: usize, mask: &RegularMask) -> Vec<Tangents> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let corners = mesh.faces.corners();
     let end = |c: u32| mesh.positions[corners[next_in_triangle(c)] as usize];
     let turned = |c: u32, times: usize| {

@@ -15,12 +15,12 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::interpolatory::{RegularMask, SQRT_3, tangents, vertices};
-use super::refinement::{Class, RefinementRules, Size};
+use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::ring::{Place, Rings, Rule};
 use super::sqrt3::{flip, refined_topology};
 use super::star::{Tangents, prev_in_triangle, require_room, require_triangles, twin};
 use crate::Result;
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::{Mesh, Surface};
 use crate::pages::large;
 use crate::parallel;
 
@@ -88,7 +88,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     refine,
     refined_topology,
     size: Size::in_three,
-    limit_positions: |mesh, topology| vertices(NAME, mesh, topology),
+    limit_positions: |surface| vertices(NAME, surface),
     limit_normals,
 };
 
@@ -98,16 +98,14 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// vertices' masks. Vertices and faces are numbered as by [`sqrt3::refine`](super::sqrt3::refine).
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold, a face is no triangle (the first is
-/// named), a vertex has valence < 3, or the result is too large for 32-bit indices.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-    require_triangles(mesh, topology, NAME)?;
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary, a face is no triangle (the first is
+/// named), or the result is too large for 32-bit indices.
+pub fn refine(surface: &Surface) -> Result<Mesh> {
+    let mesh = surface.mesh();
+    require_triangles(surface, NAME)?;
     require_room(mesh, 3)?;
-    let rule = Rule { name: NAME, place: Place::Triangle, mask: extraordinary_mask, amplitudes };
-    let rings = Rings::new(mesh, topology, rule)?;
+    let rule = Rule { place: Place::Triangle, mask: extraordinary_mask, amplitudes };
+    let rings = Rings::new(surface, rule);
     let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
     parallel::append(&mut positions, &mesh.positions);
     let center = |f: usize| {
@@ -115,7 +113,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
         let extraordinary = own.map(|c| rings.is_extraordinary(c));
         let sharing = extraordinary.map(usize::from).iter().sum::<usize>();
         if sharing == 0 {
-            return regular(mesh, topology, own);
+            return regular(surface, own);
         }
         let mut sum = DVec3::ZERO;
         for (c, extraordinary) in own.into_iter().zip(extraordinary) {
@@ -126,11 +124,12 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
         sum / sharing as f64
     };
     parallel::extend(&mut positions, mesh.faces.len(), |_| center);
-    Ok(Mesh::new(positions, flip(mesh, topology)))
+    Ok(Mesh::new(positions, flip(surface)))
 }
 
 /// The regular mask at the triangle with these corners.
-fn regular(mesh: &Mesh, topology: &Topology, own: [u32; 3]) -> DVec3 {
+fn regular(surface: &Surface, own: [u32; 3]) -> DVec3 {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let [corner, across, wing] = REGULAR;
     let at = |c: usize| mesh.positions[mesh.faces.corners()[c] as usize];
     let opposite = |c: u32| prev_in_triangle(twin(topology, c));
@@ -153,25 +152,16 @@ fn regular(mesh: &Mesh, topology: &Topology, own: [u32; 3]) -> DVec3 {
 ///
 /// # Errors
 /// As [`refine`].
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_tangents(mesh: &Mesh, topology: &Topology) -> Result<Vec<Tangents>> {
-    let once = refine(mesh, topology)?;
-    let finer = refined_topology(mesh, topology, &once);
-    let twice = refine(&once, &finer)?;
-    let finest = refined_topology(&once, &finer, &twice);
-    Ok(tangents(&twice, &finest, mesh.len(), &TANGENTS))
+pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
+    let twice = Refinement::LabsikGreiner.refined_n(surface, 2)?;
+    Ok(tangents(&twice, surface.len(), &TANGENTS))
 }
 
 /// The unit normals of the limit surface at all vertices; zero where [`Tangents::normal`] is.
 ///
 /// # Errors
 /// As [`limit_tangents`].
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_normals(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    let tangents = limit_tangents(mesh, topology)?;
+pub fn limit_normals(surface: &Surface) -> Result<Vec<DVec3>> {
+    let tangents = limit_tangents(surface)?;
     Ok(tangents.iter().map(Tangents::normal).collect())
 }

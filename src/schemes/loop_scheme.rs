@@ -12,7 +12,7 @@ use super::star::{
 };
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
-use crate::mesh::{Faces, Mesh, Topology};
+use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
 
 /// The mask of the vertex point at valence `n`: the weight of the vertex, 3/8 + (3/8 + ¼cos(2π/n))², and of
@@ -64,7 +64,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     class: Class::Primal,
     needs_triangles: true,
     refine,
-    refined_topology: |_, topology, refined| refined_topology(topology, refined),
+    refined_topology,
     size: Size::in_four,
     limit_positions,
     limit_normals,
@@ -77,18 +77,16 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// it), then the middle one.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold, a face is
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary, a face is
 /// no triangle (the first is named), or the result is too large for 32-bit indices.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-    require_triangles(mesh, topology, "loop")?;
+pub fn refine(surface: &Surface) -> Result<Mesh> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
+    require_triangles(surface, "loop")?;
     require_room(mesh, 4)?;
     let (old, corners) = (&mesh.positions, mesh.faces.corners());
     let edges = topology.edge_numbers();
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
-    push_blends(&mut positions, mesh, topology, vertex_mask);
+    push_blends(&mut positions, surface, vertex_mask);
     edges.extend(&mut positions, |c| {
         // 3/8 of the vertex that a side leaves, 1/8 of the vertex opposite to it.
         let [one, other] = [c, twin(topology, c)].map(|c| {
@@ -100,13 +98,9 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     Ok(Mesh::new(positions, split_in_four(mesh, &edges)))
 }
 
-/// The topology of `refined`, which is what [`refine`] or [`butterfly`](super::butterfly) made of a mesh of the given
-/// topology: that of [`Topology::new`], by index arithmetic from the coarse one.
-///
-/// # Panics
-/// If the two do not belong together.
-pub fn refined_topology(topology: &Topology, refined: &Mesh) -> Topology {
-    refined::of_fours(topology, refined)
+/// The topology of `refined`, which is what [`refine`] or [`butterfly`](super::butterfly) made of the surface.
+pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
+    refined::of_fours(surface.topology(), refined)
 }
 
 /// The faces of a 1-to-4 split of triangles.
@@ -126,38 +120,29 @@ pub(super) fn split_in_four(mesh: &Mesh, edges: &EdgeNumbers) -> Faces {
 /// The limit points of all vertices.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold or a face
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or a face
 /// is no triangle.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_positions(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    require_triangles(mesh, topology, "loop")?;
-    Ok(blend_with_neighbors(mesh, topology, limit_mask))
+pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
+    require_triangles(surface, "loop")?;
+    Ok(blend_with_neighbors(surface, limit_mask))
 }
 
 /// The tangents of the limit surface at all vertices: cos(2πj/n) and sin(2πj/n) on the neighbours in
 /// counter-clockwise order.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold or a face
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or a face
 /// is no triangle.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_tangents(mesh: &Mesh, topology: &Topology) -> Result<Vec<Tangents>> {
-    require_triangles(mesh, topology, "loop")?;
-    Ok(ring_tangents(mesh, topology))
+pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
+    require_triangles(surface, "loop")?;
+    Ok(ring_tangents(surface))
 }
 
 /// The unit normals of the limit surface at all vertices; zero where [`Tangents::normal`] is.
 ///
 /// # Errors
 /// As [`limit_tangents`].
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_normals(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    let tangents = limit_tangents(mesh, topology)?;
+pub fn limit_normals(surface: &Surface) -> Result<Vec<DVec3>> {
+    let tangents = limit_tangents(surface)?;
     Ok(tangents.iter().map(Tangents::normal).collect())
 }

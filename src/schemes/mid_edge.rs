@@ -12,7 +12,7 @@ use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{Definition, PaperNames, SingularSet};
 use super::star::{Tangents, blend_with_neighbors, require_closed, require_room, ring_tangents, stars, twin};
 use crate::Result;
-use crate::mesh::{Faces, Mesh, Topology};
+use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
 use crate::parallel;
 
@@ -57,23 +57,20 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// the edge of the old corner c, then those of the old vertices, counter-clockwise.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold or the result is too large for 32-bit
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or the result is too large for 32-bit
 /// indices.
 ///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-///
 /// ```
-/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::mesh::{Surface, builtin};
 /// use limitlab::schemes::mid_edge;
-/// let cube = builtin::builtin("cube")?;
-/// let topology = Topology::new(&cube.faces, cube.len());
-/// let cuboctahedron = mid_edge::refine(&cube, &topology)?;
+/// let cube = Surface::new(builtin::builtin("cube")?)?;
+/// let cuboctahedron = mid_edge::refine(&cube)?;
 /// assert_eq!((cuboctahedron.len(), cuboctahedron.faces.len()), (12, 6 + 8));
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-    require_closed(mesh, topology)?;
+pub fn refine(surface: &Surface) -> Result<Mesh> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
+    require_closed(surface)?;
     require_room(mesh, 2)?;
     let (points, old) = (&mesh.positions, mesh.faces.corners());
     let edges = topology.edge_numbers();
@@ -85,7 +82,7 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     let count = old.len();
     let mut corners = large(vec![0; 2 * count]);
     let (of_faces, of_vertices) = corners.split_at_mut(count);
-    let stars = stars(mesh, topology);
+    let stars = stars(surface);
     set_rows(of_faces, |c| [edges.of(c)]);
     set_rows(of_vertices, |p| [edges.of(stars[p as usize])]);
     let mut offsets = large(Vec::with_capacity(mesh.faces.len() + mesh.len() + 1));
@@ -96,13 +93,9 @@ pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
     Ok(Mesh::new(positions, Faces::from_parts(offsets, corners)))
 }
 
-/// The topology of `refined`, which is what [`refine`] made of `mesh`: that of [`Topology::new`], by index arithmetic
-/// from the coarse one.
-///
-/// # Panics
-/// If the three do not belong together.
-pub fn refined_topology(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
-    refined::of_midpoints(mesh, topology, refined)
+/// The topology of `refined`, which is what [`refine`] made of the surface.
+pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
+    refined::of_midpoints(surface, refined)
 }
 
 /// The limit mask of a vertex of valence `n`: ½ at the vertex, 1/(2n) at each neighbour.
@@ -113,13 +106,10 @@ pub fn limit_mask(n: usize) -> [f64; 2] {
 /// The limit points of all vertices: the centroids of their faces after a step, which all further ones keep.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_positions(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    require_closed(mesh, topology)?;
-    Ok(blend_with_neighbors(mesh, topology, limit_mask))
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary.
+pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
+    require_closed(surface)?;
+    Ok(blend_with_neighbors(surface, limit_mask))
 }
 
 /// The unit normals of the limit surface at the [`limit_positions`]; zero where [`Tangents::normal`] is. cos(2πj/n) and
@@ -130,10 +120,7 @@ pub fn limit_positions(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
 ///
 /// # Errors
 /// As [`limit_positions`].
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_normals(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    require_closed(mesh, topology)?;
-    Ok(ring_tangents(mesh, topology).iter().map(Tangents::normal).collect())
+pub fn limit_normals(surface: &Surface) -> Result<Vec<DVec3>> {
+    require_closed(surface)?;
+    Ok(ring_tangents(surface).iter().map(Tangents::normal).collect())
 }

@@ -18,11 +18,11 @@
 //! the same result for any number of threads; new faces, and their topology, come from index arithmetic on half-edges.
 //!
 //! ```
-//! use limitlab::mesh::{Faces, Mesh};
+//! use limitlab::mesh::{Faces, Mesh, Surface};
 //! use limitlab::schemes::Refinement;
 //! let points = [[1., 1., 1.], [-1., -1., 1.], [-1., 1., -1.], [1., -1., -1.]];
 //! let faces = Faces::from_lists([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]);
-//! let tetrahedron = Mesh::new(points.map(Into::into).to_vec(), faces);
+//! let tetrahedron = Surface::new(Mesh::new(points.map(Into::into).to_vec(), faces))?;
 //! let scheme: Refinement = "loop".parse()?;
 //! let refined = scheme.refine_n(&tetrahedron, 2)?;
 //! assert_eq!((refined.len(), refined.faces.len()), (34, 64));

@@ -1,14 +1,14 @@
 //! The topology of a refined mesh, by index arithmetic on that of the coarse one: nothing is searched or sorted but
 //! the four to six corners at a new vertex. Equal to [`Topology::new`] of the result, entry by entry.
 //!
-//! Half-edge c leaves corner c; t is its twin, V, E, F, C count the coarse mesh's vertices, edges, faces, corners.
-//! Some closed meshes have refinements with several edges between the same two vertices, whose sides
-//! [`Topology::new`] leaves without twins (a triangle and its back: the two faces of a vertex of valence 2 come to share
-//! two edges). Such meshes are recognised, and left to it.
+//! Half-edge c leaves corner c; t is its twin, V, E, F, C count the coarse mesh's vertices, edges, faces, corners. On a
+//! valid mesh no two faces share more than one edge (the vertex between two would have valence 2), and no face has the
+//! same one twice (it would name a vertex twice), so that no two new edges have the same ends, and the refined mesh is
+//! valid too.
 
 use super::star::{next_in_triangle, prev_in_triangle, stars};
 use crate::mesh::topology::Scatter;
-use crate::mesh::{Incidence, Mesh, Topology};
+use crate::mesh::{Incidence, Mesh, Surface, Topology};
 use crate::pages::large;
 use crate::parallel;
 
@@ -16,13 +16,10 @@ use crate::parallel;
 const CHUNK: usize = 4096;
 
 /// After the split of every face into quads, one a corner: quad c is (vertex, edge of c, face, edge of prev c).
-pub(super) fn of_quads(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+pub(super) fn of_quads(surface: &Surface, refined: &Mesh) -> Topology {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let (faces, incidence, twin) = (&mesh.faces, &topology.incidence, topology.twins());
     let count = twin.len();
-    let one_face_on_both_sides = parallel::any(count, |c| incidence.face_of(c as u32) == incidence.face_of(twin[c]));
-    if one_face_on_both_sides {
-        return Topology::new(&refined.faces, refined.len());
-    }
     let (next, prev) = (|c| incidence.next(faces, c), |c| incidence.prev(faces, c));
     let mut twins = large(vec![0; 4 * count]);
     set_rows(&mut twins, |c| {
@@ -53,9 +50,6 @@ pub(super) fn of_quads(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
 /// After the split of every triangle f in four: triangle 4f + i is (vertex, edge of c, edge of prev c) with c = 3f + i,
 /// triangle 4f + 3 has the three edges.
 pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
-    if has_valence_below_three(&topology.incidence) {
-        return Topology::new(&refined.faces, refined.len());
-    }
     let (incidence, twin) = (&topology.incidence, topology.twins());
     let count = twin.len();
     // The first corner of the triangle at corner c.
@@ -97,10 +91,8 @@ pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
 
 /// After the split of every triangle in three and the flip of every old edge: triangle c is (vertex, face of t, face
 /// of c).
-pub(super) fn of_flips(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
-    if has_valence_below_three(&topology.incidence) {
-        return Topology::new(&refined.faces, refined.len());
-    }
+pub(super) fn of_flips(surface: &Surface, refined: &Mesh) -> Topology {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let (incidence, twin) = (&topology.incidence, topology.twins());
     let count = twin.len();
     let mut twins = large(vec![0; 3 * count]);
@@ -138,11 +130,9 @@ pub(super) fn of_flips(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topo
 
 /// After Doo-Sabin's split: vertex c for every corner; the old faces, then (next c, c, next t, t) for every edge whose
 /// first side is c, then the corners around every vertex.
-pub(super) fn of_corners(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+pub(super) fn of_corners(surface: &Surface, refined: &Mesh) -> Topology {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let (faces, incidence, twin) = (&mesh.faces, &topology.incidence, topology.twins());
-    if has_valence_below_three(incidence) {
-        return Topology::new(&refined.faces, refined.len());
-    }
     let count = twin.len();
     let edges = topology.edge_numbers();
     let (next, prev) = (|c| incidence.next(faces, c), |c| incidence.prev(faces, c));
@@ -183,13 +173,11 @@ pub(super) fn of_corners(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> To
 }
 
 /// After the mid-edge split: a vertex for every edge; the old faces, then the corners around every vertex.
-pub(super) fn of_midpoints(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
+pub(super) fn of_midpoints(surface: &Surface, refined: &Mesh) -> Topology {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let (faces, incidence, twin) = (&mesh.faces, &topology.incidence, topology.twins());
-    if has_valence_below_three(incidence) {
-        return Topology::new(&refined.faces, refined.len());
-    }
     let count = twin.len();
-    let stars = stars(mesh, topology);
+    let stars = stars(surface);
     // Where each corner stands in the face of its vertex.
     let place = Scatter::new(count);
     parallel::each(count, |p| place.set(stars[p], (count + p) as u32));
@@ -208,11 +196,6 @@ pub(super) fn of_midpoints(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> 
     });
     let offsets = parallel::collect(count / 2 + 1, |e| 4 * e as u32);
     closed(refined, offsets, corners, twins)
-}
-
-/// A vertex whose faces may share two edges.
-fn has_valence_below_three(incidence: &Incidence) -> bool {
-    parallel::any(incidence.vertices(), |v| incidence.face_count(v) < 3)
 }
 
 fn closed(refined: &Mesh, offsets: Vec<u32>, corners: Vec<u32>, twins: Vec<u32>) -> Topology {

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::{butterfly, catmull_clark, doo_sabin, labsik_greiner, loop_scheme, mid_edge, sqrt3};
 use crate::memory::require;
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::{Mesh, Surface, Topology};
 use crate::{Error, Result};
 
 /// What a refinement does with the vertices.
@@ -50,12 +50,12 @@ pub(super) struct RefinementRules {
     pub(super) name: &'static str,
     pub(super) class: Class,
     pub(super) needs_triangles: bool,
-    pub(super) refine: fn(&Mesh, &Topology) -> Result<Mesh>,
-    /// Of a mesh, its topology and what `refine` made of it.
-    pub(super) refined_topology: fn(&Mesh, &Topology, &Mesh) -> Topology,
+    pub(super) refine: fn(&Surface) -> Result<Mesh>,
+    /// Of a mesh and what `refine` made of it.
+    pub(super) refined_topology: fn(&Surface, &Mesh) -> Topology,
     pub(super) size: fn(Size) -> Size,
-    pub(super) limit_positions: fn(&Mesh, &Topology) -> Result<Vec<DVec3>>,
-    pub(super) limit_normals: fn(&Mesh, &Topology) -> Result<Vec<DVec3>>,
+    pub(super) limit_positions: fn(&Surface) -> Result<Vec<DVec3>>,
+    pub(super) limit_normals: fn(&Surface) -> Result<Vec<DVec3>>,
 }
 
 /// A stationary refinement that needs nothing but the mesh.
@@ -109,36 +109,34 @@ impl Refinement {
         self.rules().needs_triangles
     }
 
-    /// One step. The scheme's own `refine` says how the result is numbered and what it refuses.
+    /// One step: positions and faces. The scheme's own `refine` says how the result is numbered.
     ///
     /// # Errors
-    /// [`Error::Mesh`] for a mesh that is not a closed manifold or, where the scheme needs triangles, has
-    /// another face.
-    ///
-    /// # Panics
-    /// If `topology` is not that of `mesh`.
-    pub fn refine(self, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-        (self.rules().refine)(mesh, topology)
+    /// [`Error::Mesh`] for a boundary or, where the scheme needs triangles, another face; a result too large for 32-bit
+    /// indices.
+    pub fn refine(self, surface: &Surface) -> Result<Mesh> {
+        (self.rules().refine)(surface)
     }
 
-    /// The topology of `refined`, which is what [`refine`](Self::refine) made of `mesh`. Equal to [`Topology::new`] of
-    /// its faces, at a fraction of the cost: index arithmetic on the coarse topology gives it.
+    /// One step, with its topology: equal to [`Topology::new`] of its faces, at a fraction of the cost, as index
+    /// arithmetic on the coarse one gives it. The refinement of a valid mesh is valid.
     ///
-    /// # Panics
-    /// If the three do not belong together.
+    /// # Errors
+    /// As [`refine`](Self::refine).
     ///
     /// ```
-    /// use limitlab::mesh::{Topology, builtin};
+    /// use limitlab::mesh::{Surface, Topology, builtin};
     /// use limitlab::schemes::Refinement;
-    /// let mesh = builtin::builtin("cube")?;
-    /// let topology = Topology::new(&mesh.faces, mesh.len());
-    /// let refined = Refinement::CatmullClark.refine(&mesh, &topology)?;
-    /// let finer = Refinement::CatmullClark.refined_topology(&mesh, &topology, &refined);
-    /// assert_eq!(finer, Topology::new(&refined.faces, refined.len()));
+    /// let cube = Surface::new(builtin::builtin("cube")?)?;
+    /// let refined = Refinement::CatmullClark.refined(&cube)?;
+    /// assert_eq!((refined.len(), refined.faces().len()), (8 + 12 + 6, 24));
+    /// assert_eq!(*refined.topology(), Topology::new(refined.faces(), refined.len()));
     /// # Ok::<(), limitlab::Error>(())
     /// ```
-    pub fn refined_topology(self, mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
-        (self.rules().refined_topology)(mesh, topology, refined)
+    pub fn refined(self, surface: &Surface) -> Result<Surface> {
+        let refined = self.refine(surface)?;
+        let topology = (self.rules().refined_topology)(surface, &refined);
+        Ok(Surface::of_topology(refined, topology))
     }
 
     /// Refuses, before the work, `levels` steps whose meshes have more corners than 32-bit indices name, or for which
@@ -179,22 +177,25 @@ impl Refinement {
     ///
     /// # Errors
     /// As [`check_size`](Self::check_size) and [`refine`](Self::refine).
-    ///
-    /// # Panics
-    /// If a face names a vertex that is not there (the validator reports such faces before).
-    pub fn refine_n(self, mesh: &Mesh, levels: usize) -> Result<Mesh> {
-        self.check_size(mesh, levels)?;
-        let mut topology = Topology::new(&mesh.faces, mesh.len());
+    pub fn refine_n(self, surface: &Surface, levels: usize) -> Result<Mesh> {
+        self.check_size(surface.mesh(), levels)?;
+        let Some(last) = levels.checked_sub(1) else {
+            return Ok(surface.mesh().clone());
+        };
         let mut coarse = None;
-        for level in 1..=levels {
-            let mesh = coarse.as_ref().unwrap_or(mesh);
-            let refined = self.refine(mesh, &topology)?;
-            if level < levels {
-                topology = self.refined_topology(mesh, &topology, &refined);
-            }
-            coarse = Some(refined);
+        for _ in 0..last {
+            coarse = Some(self.refined(coarse.as_ref().unwrap_or(surface))?);
         }
-        Ok(coarse.unwrap_or_else(|| mesh.clone()))
+        self.refine(coarse.as_ref().unwrap_or(surface))
+    }
+
+    /// As [`refine_n`](Self::refine_n), with the topology of the last level.
+    ///
+    /// # Errors
+    /// As [`refine_n`](Self::refine_n).
+    pub fn refined_n(self, surface: &Surface, levels: usize) -> Result<Surface> {
+        self.check_size(surface.mesh(), levels)?;
+        (0..levels).try_fold(surface.clone(), |coarse, _| self.refined(&coarse))
     }
 
     /// The limit points of all vertices; under dual refinements the centroids of the faces that they become, under the
@@ -202,11 +203,8 @@ impl Refinement {
     ///
     /// # Errors
     /// As [`refine`](Self::refine).
-    ///
-    /// # Panics
-    /// If `topology` is not that of `mesh`.
-    pub fn limit_positions(self, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-        (self.rules().limit_positions)(mesh, topology)
+    pub fn limit_positions(self, surface: &Surface) -> Result<Vec<DVec3>> {
+        (self.rules().limit_positions)(surface)
     }
 
     /// The unit normals of the limit surface at the [`limit_positions`](Self::limit_positions); zero where
@@ -214,11 +212,8 @@ impl Refinement {
     ///
     /// # Errors
     /// As [`refine`](Self::refine).
-    ///
-    /// # Panics
-    /// If `topology` is not that of `mesh`.
-    pub fn limit_normals(self, mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-        (self.rules().limit_normals)(mesh, topology)
+    pub fn limit_normals(self, surface: &Surface) -> Result<Vec<DVec3>> {
+        (self.rules().limit_normals)(surface)
     }
 }
 

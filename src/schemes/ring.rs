@@ -3,10 +3,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::star::{CHUNK, Circle, Harmonics, next_in_triangle, prev_in_triangle, refuse, twin};
-use crate::Result;
-use crate::mesh::{Mesh, Topology};
-use crate::parallel::{self, find_first};
+use super::star::{CHUNK, Circle, Harmonics, next_in_triangle, prev_in_triangle, twin};
+use crate::mesh::{Mesh, Surface, Topology};
+use crate::parallel;
 
 /// Up to this valence, the ring is walked once a new point: n² steps a vertex. Beyond, once a vertex.
 const WALKED: usize = 16;
@@ -25,7 +24,6 @@ pub(super) enum Place {
 
 /// The rule of a scheme at vertices of valence n ≥ 3, n ≠ 6.
 pub(super) struct Rule {
-    pub name: &'static str,
     pub place: Place,
     /// The weight of the vertex, and those of its neighbours in circular order: from the one on the edge; or the two
     /// of the triangle first.
@@ -56,17 +54,9 @@ pub(super) struct Rings<'a> {
 }
 
 impl<'a> Rings<'a> {
-    /// # Errors
-    /// [`Error::Mesh`](crate::Error::Mesh) with the first vertex of valence below 3.
-    pub(super) fn new(mesh: &'a Mesh, topology: &'a Topology, rule: Rule) -> Result<Self> {
+    pub(super) fn new(surface: &'a Surface, rule: Rule) -> Self {
+        let (mesh, topology) = (surface.mesh(), surface.topology());
         let valence = |v: usize| topology.incidence.face_count(v);
-        if let Some(v) = find_first(mesh.len(), |v| valence(v) < 3) {
-            return refuse(format!(
-                "vertex {v} has valence {}, for which {} has no rule: remove it",
-                valence(v),
-                rule.name
-            ));
-        }
         let half = |n: usize| {
             let mut half = Half::default();
             if n >= 3 {
@@ -84,16 +74,16 @@ impl<'a> Rings<'a> {
             }
             half
         };
-        Ok(Rings {
+        Rings {
             mesh,
             topology,
             valences: parallel::collect(mesh.len(), |v| valence(v).min(u8::MAX.into()) as u8),
             masks: (0..=WALKED).map(half).collect(),
             wide: parallel::flat_map(mesh.len(), CHUNK, |range| {
-                range.filter(|&v| valence(v) > WALKED).map(|v| Wide::new(mesh, topology, v, &rule)).collect()
+                range.filter(|&v| valence(v) > WALKED).map(|v| Wide::new(surface, v, &rule)).collect()
             }),
             rule,
-        })
+        }
     }
 
     /// Whether the vertex of corner `c` is extraordinary.
@@ -170,7 +160,8 @@ struct Wide {
 }
 
 impl Wide {
-    fn new(mesh: &Mesh, topology: &Topology, v: usize, rule: &Rule) -> Self {
+    fn new(surface: &Surface, v: usize, rule: &Rule) -> Self {
+        let (mesh, topology) = (surface.mesh(), surface.topology());
         let mut star = Vec::new();
         topology.star(&mesh.faces, v, &mut star);
         let n = star.len();

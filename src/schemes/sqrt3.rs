@@ -12,7 +12,7 @@ use super::star::{
     Tangents, blend_with_neighbors, centroid, push_blends, require_room, require_triangles, ring_tangents, twin,
 };
 use crate::Result;
-use crate::mesh::{Faces, Mesh, Topology};
+use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
 use crate::parallel;
 
@@ -79,31 +79,26 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// corner, in corner order, as (vertex, face across the edge that leaves it, its own face).
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold, a face is
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary, a face is
 /// no triangle (the first is named), or the result is too large for 32-bit indices.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn refine(mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
-    require_triangles(mesh, topology, "sqrt3")?;
+pub fn refine(surface: &Surface) -> Result<Mesh> {
+    let mesh = surface.mesh();
+    require_triangles(surface, "sqrt3")?;
     require_room(mesh, 3)?;
     let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
-    push_blends(&mut positions, mesh, topology, vertex_mask);
+    push_blends(&mut positions, surface, vertex_mask);
     parallel::extend(&mut positions, mesh.faces.len(), |_| |f| centroid(&mesh.positions, mesh.faces.face(f)));
-    Ok(Mesh::new(positions, flip(mesh, topology)))
+    Ok(Mesh::new(positions, flip(surface)))
 }
 
-/// The topology of `refined`, which is what [`refine`] or [`unified_sqrt3`](super::unified_sqrt3) made of `mesh`: that
-/// of [`Topology::new`], by index arithmetic from the coarse one.
-///
-/// # Panics
-/// If the three do not belong together.
-pub fn refined_topology(mesh: &Mesh, topology: &Topology, refined: &Mesh) -> Topology {
-    refined::of_flips(mesh, topology, refined)
+/// The topology of `refined`, which is what [`refine`] made of the surface.
+pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
+    refined::of_flips(surface, refined)
 }
 
 /// The faces after the split in three and the flip of every old edge: one for each half-edge.
-pub(super) fn flip(mesh: &Mesh, topology: &Topology) -> Faces {
+pub(super) fn flip(surface: &Surface) -> Faces {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let vertices = mesh.len() as u32;
     let old = mesh.faces.corners();
     let mut corners = large(vec![0; 3 * old.len()]);
@@ -117,14 +112,11 @@ pub(super) fn flip(mesh: &Mesh, topology: &Topology) -> Faces {
 /// The limit points of all vertices.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold or a face
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or a face
 /// is no triangle.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_positions(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    require_triangles(mesh, topology, "sqrt3")?;
-    Ok(blend_with_neighbors(mesh, topology, limit_mask))
+pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
+    require_triangles(surface, "sqrt3")?;
+    Ok(blend_with_neighbors(surface, limit_mask))
 }
 
 /// The tangents of the limit surface at all vertices: cos(2πj/n) and sin(2πj/n) on the neighbours in
@@ -132,24 +124,18 @@ pub fn limit_positions(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
 /// ⅔cos(π/n), so these span the left eigenspace of the subdominant pair.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold or a face
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or a face
 /// is no triangle.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_tangents(mesh: &Mesh, topology: &Topology) -> Result<Vec<Tangents>> {
-    require_triangles(mesh, topology, "sqrt3")?;
-    Ok(ring_tangents(mesh, topology))
+pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
+    require_triangles(surface, "sqrt3")?;
+    Ok(ring_tangents(surface))
 }
 
 /// The unit normals of the limit surface at all vertices; zero where [`Tangents::normal`] is.
 ///
 /// # Errors
 /// As [`limit_tangents`].
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub fn limit_normals(mesh: &Mesh, topology: &Topology) -> Result<Vec<DVec3>> {
-    let tangents = limit_tangents(mesh, topology)?;
+pub fn limit_normals(surface: &Surface) -> Result<Vec<DVec3>> {
+    let tangents = limit_tangents(surface)?;
     Ok(tangents.iter().map(Tangents::normal).collect())
 }

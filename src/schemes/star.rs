@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use crate::mesh::frame::magnitude;
 use crate::mesh::incidence::split_rows;
 use crate::mesh::topology::NONE;
-use crate::mesh::{Incidence, Mesh, Topology};
+use crate::mesh::{Incidence, Mesh, Surface, Topology};
 use crate::pages::large;
 use crate::parallel::{self, find_first};
 use crate::{Error, Result};
@@ -17,61 +17,30 @@ pub(super) const CHUNK: usize = 1024;
 /// A normal shorter than this, relative to the reach of its star squared, is rounding: some tens of ε.
 const DEGENERATE: f64 = 1e-14;
 
-/// Refuses a mesh that is not a closed manifold, or has an isolated vertex or a face of fewer than three corners.
-///
-/// # Panics
-/// If `topology` is not that of `mesh`.
-pub(crate) fn require_closed(mesh: &Mesh, topology: &Topology) -> Result<()> {
-    assert!(topology.incidence.vertices() == mesh.len(), "the topology is that of the mesh");
-    if let Some(edge) = topology.irregular_edges().first() {
-        let [v, w] = edge.vertices;
-        return refuse(format!(
-            "the edge of vertices {v} and {w} has {} face sides{}; subdivision needs a closed, oriented manifold",
-            edge.sides,
-            if edge.is_misoriented() { " in the same direction" } else { "" },
-        ));
+/// Refuses a boundary.
+pub(crate) fn require_closed(surface: &Surface) -> Result<()> {
+    if surface.is_closed() {
+        return Ok(());
     }
-    if topology.boundary_edges() > 0 {
-        let corners = mesh.faces.corners();
-        let open = (0..corners.len() as u32).find(|&c| topology.twin(c).is_none());
-        let place = open.map_or_else(String::new, |c| {
-            let vertex = corners[c as usize];
-            let face = topology.incidence.face_of(c);
-            format!(", the first from vertex {vertex} of face {face}")
-        });
-        return refuse(format!(
-            "open: {} boundary edges{place}; subdivision needs a closed mesh: fill the holes",
-            topology.boundary_edges()
-        ));
-    }
-    let incidence = &topology.incidence;
-    let split = |v| incidence.face_count(v) == 0 || !topology.is_one_umbrella(&mesh.faces, v);
-    if !topology.has_one_umbrella_each(&mesh.faces)
-        && let Some(v) = find_first(mesh.len(), split)
-    {
-        return refuse(if incidence.face_count(v) == 0 {
-            format!("vertex {v} belongs to no face: remove it")
-        } else {
-            format!("the faces at vertex {v} form more than one umbrella: split the vertex")
-        });
-    }
-    match first_face(mesh, |size| size < 3) {
-        Some(f) => refuse(format!("face {f} has {} corners, fewer than three: remove it", mesh.faces.face(f).len())),
-        None => Ok(()),
-    }
-}
-
-fn first_face(mesh: &Mesh, is_bad: impl Fn(usize) -> bool + Sync) -> Option<usize> {
-    find_first(mesh.faces.len(), |f| is_bad(mesh.faces.range(f).len()))
+    let topology = surface.topology();
+    let place = topology.boundary_half_edges().first().map_or_else(String::new, |&c| {
+        let vertex = surface.faces().corners()[c as usize];
+        format!(", the first from vertex {vertex} of face {}", topology.incidence.face_of(c))
+    });
+    refuse(format!(
+        "open: {} boundary edges{place}; subdivision needs a closed mesh: fill the holes",
+        topology.boundary_edges()
+    ))
 }
 
 /// Refuses a mesh that is not closed or has a face that is no triangle, naming the first such face.
-pub(crate) fn require_triangles(mesh: &Mesh, topology: &Topology, scheme: &str) -> Result<()> {
-    require_closed(mesh, topology)?;
-    match first_face(mesh, |size| size != 3) {
+pub(crate) fn require_triangles(surface: &Surface, scheme: &str) -> Result<()> {
+    require_closed(surface)?;
+    let faces = surface.faces();
+    match find_first(faces.len(), |f| faces.range(f).len() != 3) {
         Some(f) => refuse(format!(
             "face {f} has {} corners, but {scheme} needs triangles: split the faces or use catmull-clark",
-            mesh.faces.face(f).len()
+            faces.face(f).len()
         )),
         None => Ok(()),
     }
@@ -120,18 +89,19 @@ pub(crate) fn by_valence<T>(incidence: &Incidence, mask: impl Fn(usize) -> T) ->
 
 /// `mask(n) = [a, b]` at every vertex of a closed mesh: a times the vertex plus b times the sum of its n
 /// neighbours.
-pub(crate) fn blend_with_neighbors(mesh: &Mesh, topology: &Topology, mask: impl Fn(usize) -> [f64; 2]) -> Vec<DVec3> {
+pub(crate) fn blend_with_neighbors(surface: &Surface, mask: impl Fn(usize) -> [f64; 2]) -> Vec<DVec3> {
     let mut points = Vec::new();
-    push_blends(&mut points, mesh, topology, mask);
+    push_blends(&mut points, surface, mask);
     points
 }
 
 /// Appends the points of [`blend_with_neighbors`].
-pub(crate) fn push_blends(points: &mut Vec<DVec3>, mesh: &Mesh, topology: &Topology, mask: impl Fn(usize) -> [f64; 2]) {
-    let masks = by_valence(&topology.incidence, mask);
+pub(crate) fn push_blends(points: &mut Vec<DVec3>, surface: &Surface, mask: impl Fn(usize) -> [f64; 2]) {
+    let (mesh, incidence) = (surface.mesh(), surface.incidence());
+    let masks = by_valence(incidence, mask);
     parallel::extend(points, mesh.len(), |_| {
         |v| {
-            let (n, sum) = neighbor_sum(mesh, topology, v);
+            let (n, sum) = neighbor_sum(mesh, incidence, v);
             let [a, b] = masks[n];
             a * mesh.positions[v] + b * sum
         }
@@ -140,25 +110,27 @@ pub(crate) fn push_blends(points: &mut Vec<DVec3>, mesh: &Mesh, topology: &Topol
 
 /// The number of neighbours of vertex `v` of a closed mesh, and their sum.
 #[inline]
-pub(crate) fn neighbor_sum(mesh: &Mesh, topology: &Topology, v: usize) -> (usize, DVec3) {
-    let star = topology.incidence.corners_at(v);
+pub(crate) fn neighbor_sum(mesh: &Mesh, incidence: &Incidence, v: usize) -> (usize, DVec3) {
+    let star = incidence.corners_at(v);
     let mut sum = DVec3::ZERO;
     for &c in star {
-        let w = mesh.faces.corners()[topology.incidence.next(&mesh.faces, c) as usize];
+        let w = mesh.faces.corners()[incidence.next(&mesh.faces, c) as usize];
         sum += mesh.positions[w as usize];
     }
     (star.len(), sum)
 }
 
 /// The corners at each vertex in counter-clockwise order, one vertex after the other as in the incidence.
-pub(crate) fn stars(mesh: &Mesh, topology: &Topology) -> Vec<u32> {
+pub(crate) fn stars(surface: &Surface) -> Vec<u32> {
+    let mesh = surface.mesh();
     let mut stars = large(vec![0; mesh.faces.corners().len()]);
-    put_stars(mesh, topology, &mut stars);
+    put_stars(surface, &mut stars);
     stars
 }
 
 /// As [`stars`], into memory that is there already.
-pub(crate) fn put_stars(mesh: &Mesh, topology: &Topology, stars: &mut [u32]) {
+pub(crate) fn put_stars(surface: &Surface, stars: &mut [u32]) {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     parallel::parts(split_rows(topology.incidence.offsets(), CHUNK, stars), |range, mut part| {
         let mut star = Vec::new();
         for v in range {
@@ -171,7 +143,8 @@ pub(crate) fn put_stars(mesh: &Mesh, topology: &Topology, stars: &mut [u32]) {
 }
 
 /// Calls `visit(v, corners)` for every vertex with its corners in counter-clockwise order.
-pub(crate) fn for_each_star(mesh: &Mesh, topology: &Topology, mut visit: impl FnMut(usize, &[u32])) {
+pub(crate) fn for_each_star(surface: &Surface, mut visit: impl FnMut(usize, &[u32])) {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let mut star = Vec::new();
     for v in 0..mesh.len() {
         topology.star(&mesh.faces, v, &mut star);
@@ -288,13 +261,14 @@ impl Tangents {
 
 /// The tangents of schemes whose tangent mask is (cos, sin)(2πj/n) on the neighbours in counter-clockwise
 /// order: Loop, √3 and mid-edge.
-pub(crate) fn ring_tangents(mesh: &Mesh, topology: &Topology) -> Vec<Tangents> {
+pub(crate) fn ring_tangents(surface: &Surface) -> Vec<Tangents> {
+    let (mesh, incidence) = (surface.mesh(), surface.incidence());
     let mut tangents = Vec::with_capacity(mesh.len());
     let mut circle = Circle::default();
-    for_each_star(mesh, topology, |v, star| {
+    for_each_star(surface, |v, star| {
         let mut pair = Tangents::default();
         for (&c, &weights) in star.iter().zip(circle.of(star.len())) {
-            let w = mesh.faces.corners()[topology.incidence.next(&mesh.faces, c) as usize];
+            let w = mesh.faces.corners()[incidence.next(&mesh.faces, c) as usize];
             pair.add(weights, mesh.positions[w as usize] - mesh.positions[v]);
         }
         tangents.push(pair);

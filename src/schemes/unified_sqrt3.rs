@@ -1,10 +1,10 @@
 //! The unified √3 scheme of Lin & Luo (§4–5): a parameter α at every vertex blends the approximating √3 scheme
 //! (α = 0) with an interpolatory one (α = 1). New vertices take the mean α of their triangle.
 
-use super::sqrt3::{flip, relaxation};
+use super::sqrt3::{flip, refined_topology, relaxation};
 use super::star::{by_valence, centroid, neighbor_sum, refuse, require_room, require_triangles};
 use crate::Result;
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::{Mesh, Surface};
 use crate::pages::large;
 use crate::parallel::{self, find_first};
 
@@ -19,14 +19,15 @@ pub const ALPHA_RANGE: std::ops::RangeInclusive<f64> = 0.0..=2.0;
 /// faces are numbered as by [`sqrt3::refine`](super::sqrt3::refine).
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh is not a closed manifold, a face is
+/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary, a face is
 /// no triangle (the first is named), the result is too large for 32-bit indices, or a parameter lies outside [`ALPHA_RANGE`].
 ///
 /// # Panics
-/// If `topology` is not that of `mesh`, or `alpha` has not one entry for each vertex.
-pub fn refine(mesh: &Mesh, topology: &Topology, alpha: &[f64]) -> Result<(Mesh, Vec<f64>)> {
+/// If `alpha` has not one entry for each vertex.
+pub fn refine(surface: &Surface, alpha: &[f64]) -> Result<(Mesh, Vec<f64>)> {
+    let (mesh, incidence) = (surface.mesh(), surface.incidence());
     assert!(alpha.len() == mesh.len(), "one α for each vertex");
-    require_triangles(mesh, topology, "unified sqrt3")?;
+    require_triangles(surface, "unified sqrt3")?;
     require_room(mesh, 3)?;
     if let Some(v) = find_first(alpha.len(), |v| !ALPHA_RANGE.contains(&alpha[v])) {
         return refuse(format!(
@@ -34,14 +35,14 @@ pub fn refine(mesh: &Mesh, topology: &Topology, alpha: &[f64]) -> Result<(Mesh, 
             alpha[v]
         ));
     }
-    let masks = by_valence(&topology.incidence, |n| {
+    let masks = by_valence(incidence, |n| {
         let a = relaxation(n);
         [-a, a / n as f64]
     });
     let old = &mesh.positions;
     let count = mesh.len() + mesh.faces.len();
     let displacements = parallel::collect(mesh.len(), |v| {
-        let (n, sum) = neighbor_sum(mesh, topology, v);
+        let (n, sum) = neighbor_sum(mesh, incidence, v);
         let [a, b] = masks[n];
         a * old[v] + b * sum
     });
@@ -55,5 +56,18 @@ pub fn refine(mesh: &Mesh, topology: &Topology, alpha: &[f64]) -> Result<(Mesh, 
     parallel::append(&mut parameters, alpha);
     let sum = |face: &[u32]| face.iter().map(|&v| alpha[v as usize]).sum::<f64>();
     parallel::extend(&mut parameters, mesh.faces.len(), |_| |f| sum(mesh.faces.face(f)) / 3.0);
-    Ok((Mesh::new(positions, flip(mesh, topology)), parameters))
+    Ok((Mesh::new(positions, flip(surface)), parameters))
+}
+
+/// As [`refine`], with the topology of the refined mesh.
+///
+/// # Errors
+/// As [`refine`].
+///
+/// # Panics
+/// As [`refine`].
+pub fn refined(surface: &Surface, alpha: &[f64]) -> Result<(Surface, Vec<f64>)> {
+    let (mesh, parameters) = refine(surface, alpha)?;
+    let topology = refined_topology(surface, &mesh);
+    Ok((Surface::of_topology(mesh, topology), parameters))
 }

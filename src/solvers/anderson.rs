@@ -36,15 +36,14 @@ type Products = [[f64; MOST + 1]; 2];
 ///
 /// ```
 /// use limitlab::assemble::LimitSystem;
-/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::mesh::{Surface, builtin};
 /// use limitlab::schemes::Scheme;
 /// use limitlab::solvers::{Setup, Stop, run};
 ///
-/// let mesh = builtin::builtin("icosphere:2")?;
-/// let topology = Topology::new(&mesh.faces, mesh.len());
-/// let system = LimitSystem::new(&mesh, &topology, Scheme::Loop)?;
+/// let surface = Surface::new(builtin::builtin("icosphere:2")?)?;
+/// let system = LimitSystem::new(&surface, Scheme::Loop)?;
 /// let stop = Stop { tolerance: 1e-9, max_iterations: 200 };
-/// let steps = |setup| run(&system, &mesh.positions, setup, &stop).report.iterations;
+/// let steps = |setup| run(&system, surface.positions(), setup, &stop).report.iterations;
 /// let plain = steps(Setup::Pia { omega: 1.0 });
 /// assert!(2 * steps(Setup::AndersonPia { omega: 1.0, window: 5 }) < plain);
 /// # Ok::<(), limitlab::Error>(())

@@ -17,15 +17,14 @@ use super::system::System;
 ///
 /// ```
 /// use limitlab::assemble::LimitSystem;
-/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::mesh::{Surface, builtin};
 /// use limitlab::schemes::Scheme;
 /// use limitlab::solvers::{Setup, Stop, run};
 ///
-/// let mesh = builtin::builtin("icosphere:2")?;
-/// let topology = Topology::new(&mesh.faces, mesh.len());
-/// let system = LimitSystem::new(&mesh, &topology, Scheme::Loop)?;
+/// let surface = Surface::new(builtin::builtin("icosphere:2")?)?;
+/// let system = LimitSystem::new(&surface, Scheme::Loop)?;
 /// let stop = Stop { tolerance: 1e-9, max_iterations: 200 };
-/// let steps = |setup| run(&system, &mesh.positions, setup, &stop).report.iterations;
+/// let steps = |setup| run(&system, surface.positions(), setup, &stop).report.iterations;
 /// let spectrum = (system.bounds.lambda_min, system.bounds.lambda_max);
 /// assert!(steps(Setup::HeavyBall { spectrum }) < steps(Setup::Pia { omega: 1.0 }));
 /// # Ok::<(), limitlab::Error>(())

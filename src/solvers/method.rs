@@ -209,19 +209,18 @@ pub struct Solution {
 /// ```
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::schemes::Scheme;
-/// use limitlab::mesh::{builtin, Topology};
+/// use limitlab::mesh::{Surface, builtin};
 /// use limitlab::solvers::{Outcome, Setup, Stop, run};
 ///
-/// let mesh = builtin::builtin("octahedron")?;
-/// let topology = Topology::new(&mesh.faces, mesh.len());
-/// let system = LimitSystem::new(&mesh, &topology, Scheme::Loop)?;
+/// let surface = Surface::new(builtin::builtin("octahedron")?)?;
+/// let system = LimitSystem::new(&surface, Scheme::Loop)?;
 /// let stop = Stop { tolerance: 1e-9, max_iterations: 1000 };
-/// let solution = run(&system, &mesh.positions, Setup::Pia { omega: 1.0 }, &stop);
+/// let solution = run(&system, surface.positions(), Setup::Pia { omega: 1.0 }, &stop);
 /// assert_eq!(solution.report.outcome, Outcome::Converged);
 /// // By symmetry the control mesh is a larger octahedron: opposite corners excite the eigenvalue 2β₄ − 1… only.
 /// let v = solution.points[0];
-/// assert!((system.a.row_times(0, &solution.points) - mesh.positions[0]).length() < 1e-9);
-/// assert!(v.length() > mesh.positions[0].length());
+/// assert!((system.a.row_times(0, &solution.points) - surface.positions()[0]).length() < 1e-9);
+/// assert!(v.length() > surface.positions()[0].length());
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn run<S: System>(system: &S, points: &[DVec3], setup: Setup, stop: &Stop) -> Solution {
@@ -252,15 +251,14 @@ pub fn run_watched<S: System>(
 /// use std::ops::ControlFlow;
 ///
 /// use limitlab::assemble::LimitSystem;
-/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::mesh::{Surface, builtin};
 /// use limitlab::schemes::Scheme;
 /// use limitlab::solvers::{Setup, Step, Stop, run, run_from};
 ///
-/// let mesh = builtin::builtin("icosphere:2")?;
-/// let topology = Topology::new(&mesh.faces, mesh.len());
-/// let system = LimitSystem::new(&mesh, &topology, Scheme::Loop)?;
+/// let surface = Surface::new(builtin::builtin("icosphere:2")?)?;
+/// let system = LimitSystem::new(&surface, Scheme::Loop)?;
 /// // A rough solution, then on from there: the iterations of one run.
-/// let (setup, points) = (Setup::Pia { omega: 1.0 }, &mesh.positions);
+/// let (setup, points) = (Setup::Pia { omega: 1.0 }, surface.positions());
 /// let stop = |tolerance| Stop { tolerance, max_iterations: 1000 };
 /// let rough = run(&system, points, setup, &stop(1e-3));
 /// let watch = &mut |_: &Step<'_>| ControlFlow::Continue(());

@@ -3,8 +3,8 @@
 
 use glam::DVec3;
 use limitlab::assemble::LimitSystem;
-use limitlab::mesh::Mesh;
 use limitlab::mesh::generate::{random_polygons, random_triangulation};
+use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::doo_sabin::{self, Rule};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark, loop_scheme, mid_edge, sqrt3};
 use rayon::prelude::*;
@@ -13,22 +13,22 @@ use crate::common::meshes::*;
 use crate::common::tol;
 
 /// The limit points of the control mesh by the masks of the room `schemes`.
-fn limits(scheme: Scheme, mesh: &Mesh) -> Vec<DVec3> {
-    let topology = topology(mesh);
+fn limits(scheme: Scheme, surface: &Surface) -> Vec<DVec3> {
     match scheme {
-        Scheme::CatmullClark => catmull_clark::limit_positions(mesh, &topology),
-        Scheme::Loop => loop_scheme::limit_positions(mesh, &topology),
-        Scheme::Sqrt3 => sqrt3::limit_positions(mesh, &topology),
-        Scheme::Nasri => doo_sabin::limit_positions(Rule::DooSabin, mesh, &topology),
-        Scheme::ZhengCai => doo_sabin::limit_positions(Rule::ZhengCai, mesh, &topology),
-        Scheme::MidEdge => mid_edge::limit_positions(mesh, &topology),
+        Scheme::CatmullClark => catmull_clark::limit_positions(surface),
+        Scheme::Loop => loop_scheme::limit_positions(surface),
+        Scheme::Sqrt3 => sqrt3::limit_positions(surface),
+        Scheme::Nasri => doo_sabin::limit_positions(Rule::DooSabin, surface),
+        Scheme::ZhengCai => doo_sabin::limit_positions(Rule::ZhengCai, surface),
+        Scheme::MidEdge => mid_edge::limit_positions(surface),
     }
     .unwrap()
 }
 
-fn hold_against_masks(system: &LimitSystem, scheme: Scheme, mesh: &Mesh, what: &str) {
-    for (v, limit) in limits(scheme, mesh).into_iter().enumerate() {
-        let error = (system.a.row_times(v, &mesh.positions) - limit).length();
+fn hold_against_masks(scheme: Scheme, surface: &Surface, what: &str) {
+    let system = LimitSystem::new(surface, scheme).unwrap();
+    for (v, limit) in limits(scheme, surface).into_iter().enumerate() {
+        let error = (system.a.row_times(v, surface.positions()) - limit).length();
         let allowed = tol::rounding(system.a.row(v).len());
         assert!(error <= allowed, "{scheme}, {what}, vertex {v}: {error:e}");
     }
@@ -40,8 +40,8 @@ fn rows_are_the_limit_masks_on_random_meshes() {
         (0..150u64).into_par_iter().for_each(|seed| {
             let large = if scheme.needs_triangles() { random_triangulation(seed) } else { random_polygons(seed) };
             for mesh in [small_mesh(scheme, seed), large] {
-                let mesh = scattered(&mesh, seed);
-                hold_against_masks(&system(&mesh, scheme), scheme, &mesh, &format!("seed {seed}"));
+                let surface = Surface::new(scattered(&mesh, seed)).unwrap();
+                hold_against_masks(scheme, &surface, &format!("seed {seed}"));
             }
         });
     }
@@ -52,15 +52,15 @@ fn rows_are_the_limit_masks_on_random_meshes() {
 fn every_entry_is_the_response_to_a_unit_vector() {
     for scheme in Scheme::ALL {
         for seed in 0..12 {
-            let mut mesh = small_mesh(scheme, seed);
-            let system = system(&mesh, scheme);
-            for first in (0..mesh.len()).step_by(3) {
-                mesh.positions.fill(DVec3::ZERO);
-                let axes = 3.min(mesh.len() - first);
+            let mut surface = Surface::new(small_mesh(scheme, seed)).unwrap();
+            let system = LimitSystem::new(&surface, scheme).unwrap();
+            for first in (0..surface.len()).step_by(3) {
+                surface.positions_mut().fill(DVec3::ZERO);
+                let axes = 3.min(surface.len() - first);
                 for axis in 0..axes {
-                    mesh.positions[first + axis][axis] = 1.0;
+                    surface.positions_mut()[first + axis][axis] = 1.0;
                 }
-                for (i, limit) in limits(scheme, &mesh).into_iter().enumerate() {
+                for (i, limit) in limits(scheme, &surface).into_iter().enumerate() {
                     for axis in 0..axes {
                         let error = (system.a.get(i, first + axis) - limit[axis]).abs();
                         assert!(error <= tol::rounding(8), "{scheme} {seed}: {error:e}");
@@ -115,19 +115,18 @@ fn plain_refinement_ends_where_the_rows_say() {
         (Scheme::Sqrt3, Refinement::Sqrt3, 0),
     ] {
         for seed in 0..6 {
-            let mesh = scattered(&small_mesh(scheme, seed), seed);
-            let system = system(&mesh, scheme);
-            let incidence = topology(&mesh).incidence;
-            let mut level = refinement.refine_n(&mesh, first).unwrap();
-            let mut levels = vec![level.positions[..mesh.len()].to_vec()];
+            let surface = Surface::new(scattered(&small_mesh(scheme, seed), seed)).unwrap();
+            let system = LimitSystem::new(&surface, scheme).unwrap();
+            let mut level = refinement.refined_n(&surface, first).unwrap();
+            let mut levels = vec![level.positions()[..surface.len()].to_vec()];
             for _ in 0..4 {
-                level = refinement.refine_n(&level, 1).unwrap();
-                levels.push(level.positions[..mesh.len()].to_vec());
+                level = refinement.refined(&level).unwrap();
+                levels.push(level.positions()[..surface.len()].to_vec());
             }
-            for v in 0..mesh.len() {
+            for v in 0..surface.len() {
                 let path: Vec<DVec3> = levels.iter().map(|points| points[v]).collect();
-                let limit = extrapolate(scheme, incidence.face_count(v), &path);
-                let row = system.a.row_times(v, &mesh.positions);
+                let limit = extrapolate(scheme, surface.incidence().face_count(v), &path);
+                let row = system.a.row_times(v, surface.positions());
                 let error = (row - limit).length();
                 assert!(error < EXTRAPOLATION, "{scheme} {seed}, vertex {v}: {error:e}");
                 assert!((path[4] - row).length() < (path[0] - row).length() || error == 0.0);
@@ -141,16 +140,16 @@ fn plain_refinement_ends_where_the_rows_say() {
 fn the_faces_of_vertices_shrink_to_where_the_rows_say() {
     for (scheme, rule) in [(Scheme::Nasri, Rule::DooSabin), (Scheme::ZhengCai, Rule::ZhengCai)] {
         for seed in 0..8 {
-            let mesh = scattered(&small_polygons(seed), seed);
-            let (system, topology) = (system(&mesh, scheme), topology(&mesh));
-            let once = doo_sabin::refine_by(rule, &mesh, &topology).unwrap();
+            let surface = Surface::new(scattered(&small_polygons(seed), seed)).unwrap();
+            let system = LimitSystem::new(&surface, scheme).unwrap();
+            let once = Surface::new(doo_sabin::refine_by(rule, &surface).unwrap()).unwrap();
             let fine = Refinement::DooSabin.refine_n(&once, 3).unwrap();
-            for v in 0..mesh.len() {
-                let row = system.a.row_times(v, &mesh.positions);
-                let face = mesh.faces.len() + topology.edges() + v;
+            for v in 0..surface.len() {
+                let row = system.a.row_times(v, surface.positions());
+                let face = surface.faces().len() + surface.topology().edges() + v;
                 let corners =
                     |m: &Mesh| -> Vec<DVec3> { m.faces.face(face).iter().map(|&c| m.positions[c as usize]).collect() };
-                let (before, after) = (corners(&once), corners(&fine));
+                let (before, after) = (corners(once.mesh()), corners(&fine));
                 let mean = after.iter().sum::<DVec3>() / after.len() as f64;
                 assert!((mean - row).length() <= tol::rounding(64), "{scheme} {seed}, vertex {v}");
                 // Three halvings, in the norm in which the circulant is normal.

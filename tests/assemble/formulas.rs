@@ -5,7 +5,6 @@ use glam::DVec3;
 use limitlab::assemble::{Csr, LimitSystem};
 use limitlab::mesh::generate::{permute_vertices, random_polygons, random_triangulation};
 use limitlab::mesh::order::Order;
-use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Mesh, builtin};
 use limitlab::schemes::Scheme;
 use nalgebra_sparse::CsrMatrix;
@@ -93,22 +92,16 @@ fn identities_hold_at_large_valences_and_on_large_faces() {
     }
 }
 
-/// Two faces with two common edges; a pair of vertices joined twice; stars that share all their neighbours; the
-/// smallest meshes.
+/// Two faces with two common edges; stars that share all their neighbours; the smallest meshes.
 #[test]
 fn everything_counts_with_multiplicity() {
     let spliced = spliced_cubes();
-    assert!(validate(&spliced, None, Boundary::Refuse).is_valid());
     // Neither on an edge, but in both octagons: 4/8 from each.
     let octagons = system(&spliced, Scheme::CatmullClark);
     assert_eq!(octagons.m.get(0, 1), 1.0);
     assert_eq!(octagons.m.get(1, 8), 2.0 + 1.0);
 
-    let doubled = double_torus_row(5);
-    // Two edges, and all four faces of each.
-    assert_eq!(system(&doubled, Scheme::CatmullClark).m.get(0, 5), 2.0 * 2.0 + 4.0);
-
-    let mut meshes = vec![spliced, doubled, double_torus_row(3)];
+    let mut meshes = vec![spliced];
     for name in ["tetrahedron", "bipyramid:3", "octahedron", "prism:3", "torus:3x3", "tri-torus:3x3"] {
         meshes.push(built_in(name));
     }

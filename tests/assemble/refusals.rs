@@ -1,17 +1,16 @@
 //! Meshes that a scheme refuses, and open ones under the papers' treatment of the boundary.
 
 use limitlab::assemble::LimitSystem;
-use limitlab::mesh::validate::{Boundary, validate};
-use limitlab::mesh::{Faces, Mesh};
+use limitlab::mesh::validate::Boundary;
+use limitlab::mesh::{Faces, Mesh, Surface};
 use limitlab::schemes::Scheme;
 
 use crate::common::formulas::assemble;
 use crate::common::meshes::*;
 use crate::common::tol;
 
-fn refused(mesh: &Mesh, scheme: Scheme) -> String {
-    let error = LimitSystem::new(mesh, &topology(mesh), scheme).unwrap_err();
-    let line = error.to_string();
+fn refused(surface: &Surface, scheme: Scheme) -> String {
+    let line = LimitSystem::new(surface, scheme).unwrap_err().to_string();
     assert!(!line.contains('\n'), "{line}");
     line
 }
@@ -20,13 +19,13 @@ fn refused(mesh: &Mesh, scheme: Scheme) -> String {
 fn loop_and_sqrt3_name_the_first_face_that_is_no_triangle() {
     for scheme in [Scheme::Loop, Scheme::Sqrt3] {
         for seed in 0..40 {
-            let mesh = small_polygons(seed);
-            let Some(first) = mesh.faces.iter().position(|f| f.len() != 3) else {
-                assert!(LimitSystem::new(&mesh, &topology(&mesh), scheme).is_ok());
+            let surface = Surface::new(small_polygons(seed)).unwrap();
+            let Some(first) = surface.faces().iter().position(|f| f.len() != 3) else {
+                assert!(LimitSystem::new(&surface, scheme).is_ok());
                 continue;
             };
-            let line = refused(&mesh, scheme);
-            let size = mesh.faces.face(first).len();
+            let line = refused(&surface, scheme);
+            let size = surface.faces().face(first).len();
             assert!(line.contains(&format!("face {first} has {size} corners")), "{line}");
             assert!(line.contains("--scheme catmull-clark"), "{line}");
         }
@@ -48,20 +47,26 @@ fn open_torus() -> Mesh {
 }
 
 #[test]
+fn vertices_that_are_joined_twice_are_refused() {
+    for m in [3, 5, 6] {
+        let line = Surface::new(double_torus_row(m)).unwrap_err().to_string();
+        let start = format!("{m} edges with more than two faces (first: face 0, vertices 0 and {m}, 4 face sides)");
+        assert!(line.starts_with(&start), "{line}");
+    }
+}
+
+#[test]
 fn an_open_mesh_needs_masks_of_edges_alone() {
-    let mesh = open_torus();
+    let line = Surface::new(open_torus()).unwrap_err().to_string();
+    assert!(line.contains("--boundary as-interior"), "{line}");
+    let surface = Surface::examined(open_torus(), None, Boundary::AsInterior).unwrap();
     for scheme in [Scheme::CatmullClark, Scheme::Nasri, Scheme::ZhengCai] {
-        let line = refused(&mesh, scheme);
+        let line = refused(&surface, scheme);
         assert!(line.contains("boundary edges") && line.contains("--boundary as-interior"), "{line}");
     }
-    let line = validate(&mesh, None, Boundary::Refuse).summary_line();
-    assert!(line.contains("--boundary as-interior"), "{line}");
-
-    let report = validate(&mesh, None, Boundary::AsInterior);
-    assert!(report.is_valid(), "{}", report.summary_line());
     for scheme in [Scheme::Loop, Scheme::Sqrt3] {
-        let system = LimitSystem::new(&mesh, &topology(&mesh), scheme).unwrap();
-        let plain = assemble(scheme, &mesh);
+        let system = LimitSystem::new(&surface, scheme).unwrap();
+        let plain = assemble(scheme, surface.mesh());
         for (i, theirs) in plain.a.row_iter().enumerate() {
             let sum: f64 = system.a.row_values(i).iter().sum();
             assert!((sum - 1.0).abs() <= tol::rounding(8), "{scheme}, row {i}");
@@ -72,6 +77,6 @@ fn an_open_mesh_needs_masks_of_edges_alone() {
             }
         }
         let values = plain.eigenvalues();
-        assert!(values[0] >= system.bounds.lambda_min - tol::eigenvalues(mesh.len(), 1.0));
+        assert!(values[0] >= system.bounds.lambda_min - tol::eigenvalues(surface.len(), 1.0));
     }
 }

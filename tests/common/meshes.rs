@@ -6,7 +6,7 @@ use limitlab::mesh::generate::{
     connected_sum, dual, flip_edges, merge_faces, permute_vertices, quad_split, ring_sphere, shuffle_faces, union,
 };
 use limitlab::mesh::order::Order;
-use limitlab::mesh::{Faces, Mesh, Topology, builtin};
+use limitlab::mesh::{Faces, Mesh, Surface, Topology, builtin};
 use limitlab::schemes::Scheme;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -16,7 +16,7 @@ pub fn topology(mesh: &Mesh) -> Topology {
 }
 
 pub fn system(mesh: &Mesh, scheme: Scheme) -> LimitSystem {
-    LimitSystem::new(mesh, &topology(mesh), scheme).unwrap()
+    LimitSystem::new(&Surface::new(mesh.clone()).unwrap(), scheme).unwrap()
 }
 
 pub fn built_in(name: &str) -> Mesh {
@@ -97,7 +97,7 @@ pub fn scattered(mesh: &Mesh, seed: u64) -> Mesh {
 }
 
 /// A grid of 2 × `m` quads on a torus: (0, j) and (1, j) are joined twice, faces (0, j) and (1, j) share two edges.
-/// The validator refuses it, since a file cannot tell the two edges apart; the masks do not need to.
+/// The validator refuses it, since a file cannot tell the two edges apart.
 pub fn double_torus_row(m: u32) -> Mesh {
     let at = |i: u32, j: u32| (i % 2) * m + j % m;
     let faces = (0..2).flat_map(|i| (0..m).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));

@@ -1,9 +1,9 @@
 //! Small meshes and measures for the tests of whole pipelines.
 
 use glam::DVec3;
-use limitlab::mesh::{Mesh, builtin, noise};
+use limitlab::mesh::{Mesh, Surface, builtin, noise};
 
-pub use super::meshes::{distance, topology};
+pub use super::meshes::distance;
 
 /// Rounding of sums of some tens of terms of size 1.
 pub const ROUNDING: f64 = 1e-12;
@@ -13,6 +13,11 @@ pub fn noisy(name: &str) -> Mesh {
     let mut mesh = builtin::builtin(name).unwrap();
     noise::add_noise(&mut mesh, 0.1, 3);
     mesh
+}
+
+/// [`noisy`] as a surface.
+pub fn noisy_surface(name: &str) -> Surface {
+    Surface::new(noisy(name)).unwrap()
 }
 
 pub fn centroid(mesh: &Mesh, f: usize) -> DVec3 {

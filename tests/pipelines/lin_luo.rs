@@ -3,12 +3,12 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
-use limitlab::interpolate::lin_luo::curve::Ends;
-use limitlab::interpolate::lin_luo::{curve, surface};
-use limitlab::mesh::{Mesh, builtin};
+use limitlab::interpolate::lin_luo::curve::{self, Ends};
+use limitlab::interpolate::lin_luo::surface::{choose, largest_fold, popping, refine_n, volume};
+use limitlab::mesh::{Mesh, Surface, builtin};
 use limitlab::schemes::{Refinement, sqrt3};
 
-use crate::common::pipelines::{ROUNDING, distance, noisy, topology};
+use crate::common::pipelines::{ROUNDING, distance, noisy_surface};
 
 fn polygon(n: usize) -> Vec<DVec3> {
     let point = |i: usize| {
@@ -159,27 +159,27 @@ fn a_closed_spline_of_a_regular_polygon_is_nearly_a_circle() {
 
 #[test]
 fn surface_ends_and_chosen_vertices() {
-    let mesh = noisy("icosphere:1");
-    let zero = surface::refine_n(&mesh, &vec![0.0; mesh.len()], 3).unwrap().0;
-    let kobbelt = Refinement::Sqrt3.refine_n(&mesh, 3).unwrap();
-    assert_eq!(zero.faces, kobbelt.faces);
-    assert!(distance(&zero.positions, &kobbelt.positions) < ROUNDING);
-    let chosen: Vec<bool> = (0..mesh.len()).map(|v| v % 3 == 0).collect();
-    let alpha = surface::choose(&chosen, 0.25);
-    let (fine, parameters) = surface::refine_n(&mesh, &alpha, 4).unwrap();
+    let surface = noisy_surface("icosphere:1");
+    let zero = refine_n(&surface, &vec![0.0; surface.len()], 3).unwrap().0;
+    let kobbelt = Refinement::Sqrt3.refine_n(&surface, 3).unwrap();
+    assert_eq!(*zero.faces(), kobbelt.faces);
+    assert!(distance(zero.positions(), &kobbelt.positions) < ROUNDING);
+    let chosen: Vec<bool> = (0..surface.len()).map(|v| v % 3 == 0).collect();
+    let alpha = choose(&chosen, 0.25);
+    let (fine, parameters) = refine_n(&surface, &alpha, 4).unwrap();
     for (v, &marked) in chosen.iter().enumerate() {
         assert_eq!(parameters[v], if marked { 1.0 } else { 0.25 });
-        assert_eq!(fine.positions[v] == mesh.positions[v], marked);
+        assert_eq!(fine.positions()[v] == surface.positions()[v], marked);
     }
 }
 
 #[test]
 fn an_alpha_outside_the_range_is_an_error_that_names_the_vertex() {
-    let mesh = builtin::icosahedron();
+    let surface = Surface::new(builtin::icosahedron()).unwrap();
     for bad in [-0.1, 2.1, f64::NAN, f64::INFINITY] {
         let mut alpha = vec![1.0; 12];
         alpha[7] = bad;
-        let text = surface::refine_n(&mesh, &alpha, 1).unwrap_err().to_string();
+        let text = refine_n(&surface, &alpha, 1).unwrap_err().to_string();
         assert!(text.contains("vertex 7") && text.contains("to 2"), "{text}");
     }
 }
@@ -187,12 +187,12 @@ fn an_alpha_outside_the_range_is_an_error_that_names_the_vertex() {
 #[test]
 fn volumes_in_closed_form() {
     let cube = builtin::cube();
-    assert!((surface::volume(&cube) - 8.0).abs() < ROUNDING);
+    assert!((volume(&cube) - 8.0).abs() < ROUNDING);
     let mut far = cube.clone();
     far.positions.iter_mut().for_each(|p| *p = 0.5 * *p + DVec3::splat(1e4));
-    assert!((surface::volume(&far) - 1.0).abs() < 1e-10);
+    assert!((volume(&far) - 1.0).abs() < 1e-10);
     let inside_out = Mesh::new(cube.positions.iter().map(|p| -*p).collect(), cube.faces);
-    assert!((surface::volume(&inside_out) + 8.0).abs() < ROUNDING);
+    assert!((volume(&inside_out) + 8.0).abs() < ROUNDING);
 }
 
 /// L6 on convex meshes: the approximating end shrinks, the interpolating end bulges, and between them the volume
@@ -200,15 +200,15 @@ fn volumes_in_closed_form() {
 #[test]
 fn the_volume_grows_from_shrinking_to_bulging() {
     for name in ["icosahedron", "icosphere:1", "octahedron"] {
-        let mesh = builtin::builtin(name).unwrap();
-        let popping = |a: f64| surface::popping(&mesh, &vec![a; mesh.len()], 6).unwrap();
-        let rows: Vec<_> = (0..=10).map(|k| popping(f64::from(k) / 10.0)).collect();
+        let surface = Surface::new(builtin::builtin(name).unwrap()).unwrap();
+        let row = |k: u32| popping(&surface, &vec![f64::from(k) / 10.0; surface.len()], 6).unwrap();
+        let rows: Vec<_> = (0..=10).map(row).collect();
         assert!(rows[0].volume_ratio < 1.0 && rows[10].volume_ratio > 1.0, "{name}");
         assert!(rows.windows(2).all(|w| w[0].volume_ratio < w[1].volume_ratio));
         assert!(rows[0].center_outward < 0.0 || name != "icosahedron");
         assert!(rows[10].center_outward > 0.0 && rows[10].vertex_max == 0.0);
-        let limits = sqrt3::limit_positions(&mesh, &topology(&mesh)).unwrap();
-        let shrink = distance(&limits, &mesh.positions) / mesh.diagonal();
+        let limits = sqrt3::limit_positions(&surface).unwrap();
+        let shrink = distance(&limits, surface.positions()) / surface.diagonal();
         // A vertex keeps 2/3 − a_n of its way to the limit a step: 1/3 at valence 6, less below.
         assert!((rows[0].vertex_max - shrink).abs() < (1.0 + ROUNDING) * 3f64.powi(-6) * shrink);
     }
@@ -217,20 +217,16 @@ fn the_volume_grows_from_shrinking_to_bulging() {
 /// The folds of a C¹ surface fade with the edges; where no tangent plane exists (valence 3 at α = 1) they do not.
 #[test]
 fn folds_fade_where_the_surface_is_smooth() {
-    let folds = |mesh: &Mesh, a: f64| -> Vec<f64> {
-        (0..=7)
-            .map(|k| {
-                let fine = surface::refine_n(mesh, &vec![a; mesh.len()], k).unwrap().0;
-                surface::largest_fold(&fine, &topology(&fine))
-            })
-            .collect()
+    let folds = |surface: &Surface, a: f64| -> Vec<f64> {
+        let alpha = vec![a; surface.len()];
+        (0..=7).map(|k| largest_fold(&refine_n(surface, &alpha, k).unwrap().0)).collect()
     };
-    let regular = noisy("tri-torus:8x6");
+    let regular = noisy_surface("tri-torus:8x6");
     for a in [0.0, 0.5, 1.0] {
         let found = folds(&regular, a);
         assert!(found[7] < 0.35 * found[1], "{a}: {found:?}");
     }
-    let tetrahedron = builtin::tetrahedron();
+    let tetrahedron = Surface::new(builtin::tetrahedron()).unwrap();
     let (smooth, rough) = (folds(&tetrahedron, 0.0), folds(&tetrahedron, 1.0));
     assert!(smooth[7] < 0.3 * smooth[1], "{smooth:?}");
     assert!(rough[7] > 1.0, "{rough:?}");

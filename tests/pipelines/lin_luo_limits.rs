@@ -6,27 +6,26 @@ use glam::DVec3;
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix, condition_over_alpha};
 use limitlab::interpolate::lin_luo::limit::limits;
 use limitlab::interpolate::lin_luo::surface::refine_n;
-use limitlab::mesh::Mesh;
+use limitlab::mesh::Surface;
 use limitlab::schemes::sqrt3;
 
-use crate::common::pipelines::{ROUNDING, distance, noisy, topology};
+use crate::common::pipelines::{ROUNDING, distance, noisy_surface};
 
 const MESHES: [&str; 4] = ["star:5", "bipyramid:8", "irregular-tri:60", "icosphere:1"];
 
 /// Parameters without order, within the range where every valence above 3 has a tangent plane.
-fn mixed(mesh: &Mesh) -> Vec<f64> {
+fn mixed(surface: &Surface) -> Vec<f64> {
     let alpha = |v: usize| 0.75 + 0.75 * (5.3 * v as f64).sin();
-    (0..mesh.len()).map(alpha).collect()
+    (0..surface.len()).map(alpha).collect()
 }
 
 #[test]
 fn at_alpha_0_they_are_those_of_the_masks() {
     for name in MESHES.into_iter().chain(["tetrahedron"]) {
-        let mesh = noisy(name);
-        let found = limits(&mesh, &vec![0.0; mesh.len()]).unwrap();
-        let topology = topology(&mesh);
-        let positions = sqrt3::limit_positions(&mesh, &topology).unwrap();
-        let normals = sqrt3::limit_normals(&mesh, &topology).unwrap();
+        let surface = noisy_surface(name);
+        let found = limits(&surface, &vec![0.0; surface.len()]).unwrap();
+        let positions = sqrt3::limit_positions(&surface).unwrap();
+        let normals = sqrt3::limit_normals(&surface).unwrap();
         assert!(distance(&found.positions, &positions) < ROUNDING, "{name}");
         assert!(distance(&found.normals, &normals) < ROUNDING, "{name}");
     }
@@ -35,11 +34,11 @@ fn at_alpha_0_they_are_those_of_the_masks() {
 #[test]
 fn vertices_with_alpha_1_stay_whatever_is_beside_them() {
     for name in MESHES {
-        let mesh = noisy(name);
-        let alpha: Vec<f64> = (0..mesh.len()).map(|v| [1.0, 0.3, 1.7][v % 3]).collect();
-        let found = limits(&mesh, &alpha).unwrap();
-        for v in (0..mesh.len()).step_by(3) {
-            assert_eq!(found.positions[v], mesh.positions[v], "{name} {v}");
+        let surface = noisy_surface(name);
+        let alpha: Vec<f64> = (0..surface.len()).map(|v| [1.0, 0.3, 1.7][v % 3]).collect();
+        let found = limits(&surface, &alpha).unwrap();
+        for v in (0..surface.len()).step_by(3) {
+            assert_eq!(found.positions[v], surface.positions()[v], "{name} {v}");
         }
     }
 }
@@ -49,16 +48,16 @@ fn vertices_with_alpha_1_stay_whatever_is_beside_them() {
 #[test]
 fn a_refined_mesh_has_the_same_limits() {
     for name in MESHES {
-        let mesh = noisy(name);
-        let alpha = mixed(&mesh);
-        let found = limits(&mesh, &alpha).unwrap();
+        let surface = noisy_surface(name);
+        let alpha = mixed(&surface);
+        let found = limits(&surface, &alpha).unwrap();
         for levels in [1, 2] {
-            let (fine, parameters) = refine_n(&mesh, &alpha, levels).unwrap();
+            let (fine, parameters) = refine_n(&surface, &alpha, levels).unwrap();
             let again = limits(&fine, &parameters).unwrap();
-            let n = mesh.len();
+            let n = surface.len();
             assert!(distance(&found.positions, &again.positions[..n]) < ROUNDING, "{name}");
             assert!(distance(&found.normals, &again.normals[..n]) < 1e-9, "{name}");
-            let plain = |v: usize| topology(&mesh).incidence.face_count(v) > 3;
+            let plain = |v: usize| surface.incidence().face_count(v) > 3;
             let missing = (0..n).find(|&v| plain(v) && found.normals[v] == DVec3::ZERO);
             assert_eq!(missing, None, "{name}");
         }
@@ -69,28 +68,27 @@ fn a_refined_mesh_has_the_same_limits() {
 #[test]
 fn refinement_ends_at_the_limits() {
     for name in ["star:5", "bipyramid:8"] {
-        let mesh = noisy(name);
-        let alpha = mixed(&mesh);
-        let found = limits(&mesh, &alpha).unwrap();
+        let surface = noisy_surface(name);
+        let alpha = mixed(&surface);
+        let found = limits(&surface, &alpha).unwrap();
         let mut before = [f64::INFINITY; 2];
         for levels in [2, 4, 6, 8] {
-            let (fine, _) = refine_n(&mesh, &alpha, levels).unwrap();
-            let topology = topology(&fine);
+            let (fine, _) = refine_n(&surface, &alpha, levels).unwrap();
             let mut star = Vec::new();
             let mut turned = 0.0f64;
             for (v, normal) in found.normals.iter().enumerate() {
-                topology.star(&fine.faces, v, &mut star);
+                fine.topology().star(fine.faces(), v, &mut star);
                 let sum: DVec3 = star
                     .iter()
                     .map(|&c| {
-                        let face = fine.faces.face(c as usize / 3);
-                        let [a, b, c] = [0, 1, 2].map(|k| fine.positions[face[k] as usize]);
+                        let face = fine.faces().face(c as usize / 3);
+                        let [a, b, c] = [0, 1, 2].map(|k| fine.positions()[face[k] as usize]);
                         (b - a).cross(c - a)
                     })
                     .sum();
                 turned = turned.max(sum.normalize().distance(*normal));
             }
-            let off = distance(&fine.positions[..mesh.len()], &found.positions);
+            let off = distance(&fine.positions()[..surface.len()], &found.positions);
             assert!(off < 0.5 * before[0] && turned < 0.8 * before[1], "{name} {levels}");
             before = [off, turned];
         }
@@ -102,19 +100,18 @@ fn refinement_ends_at_the_limits() {
 /// steps leave regular.
 #[test]
 fn for_one_alpha_they_are_those_of_the_local_matrix() {
-    for (k, mesh) in [3, 4, 5, 8].map(|k| (k, noisy(&format!("bipyramid:{k}")))) {
+    for (k, surface) in [3, 4, 5, 8].map(|k| (k, noisy_surface(&format!("bipyramid:{k}")))) {
         for alpha in [0.3, 0.7, 1.4] {
-            let found = limits(&mesh, &vec![alpha; mesh.len()]).unwrap();
+            let found = limits(&surface, &vec![alpha; surface.len()]).unwrap();
             let matrix = SplittingMatrix::new(LocalScheme::Sqrt3 { alpha }, k).unwrap();
             let mask = matrix.limit_mask().unwrap();
-            let (fine, _) = refine_n(&mesh, &vec![alpha; mesh.len()], 2).unwrap();
-            let topology = topology(&fine);
+            let (fine, _) = refine_n(&surface, &vec![alpha; surface.len()], 2).unwrap();
             // Apices are vertices k and k + 1.
             for v in [k, k + 1] {
-                let root = topology.incidence.corners_at(v)[0];
+                let root = fine.incidence().corners_at(v)[0];
                 let layout = LocalScheme::Sqrt3 { alpha }.layout();
-                let star = layout.walk(&fine.faces, &topology, root, k, 3).unwrap();
-                let limit: DVec3 = star.iter().zip(mask.iter()).map(|(&i, w)| *w * fine.positions[i as usize]).sum();
+                let star = layout.walk(&fine, root, k, 3).unwrap();
+                let limit: DVec3 = star.iter().zip(mask.iter()).map(|(&i, w)| *w * fine.positions()[i as usize]).sum();
                 assert!(limit.distance(found.positions[v]) < ROUNDING, "{k} {alpha}");
             }
         }
@@ -128,8 +125,8 @@ fn normals_are_where_the_eigenvalue_condition_holds() {
     let alphas = [0.0, 0.4, 0.7, 0.9, 1.0, 1.3, 1.6, 2.0];
     let mut seen = [0, 0];
     for condition in condition_over_alpha(&valences, &alphas).unwrap() {
-        let mesh = noisy(&format!("bipyramid:{}", condition.valence));
-        let found = limits(&mesh, &vec![condition.alpha; mesh.len()]).unwrap();
+        let surface = noisy_surface(&format!("bipyramid:{}", condition.valence));
+        let found = limits(&surface, &vec![condition.alpha; surface.len()]).unwrap();
         let normal = found.normals[condition.valence];
         let what = format!("{} {}", condition.valence, condition.alpha);
         assert_eq!(normal != DVec3::ZERO, condition.holds, "{what}");
@@ -140,18 +137,18 @@ fn normals_are_where_the_eigenvalue_condition_holds() {
 
 #[test]
 fn degenerate_stars_have_limits_and_no_normals() {
-    let mut mesh = noisy("star:5");
-    mesh.positions.fill(DVec3::ONE);
-    let found = limits(&mesh, &mixed(&mesh)).unwrap();
+    let mut surface = noisy_surface("star:5");
+    surface.positions_mut().fill(DVec3::ONE);
+    let found = limits(&surface, &mixed(&surface)).unwrap();
     assert!(found.positions.iter().all(|p| p.distance(DVec3::ONE) < ROUNDING));
     assert!(found.normals.iter().all(|n| *n == DVec3::ZERO));
     // All points on a line.
-    for (v, p) in mesh.positions.iter_mut().enumerate() {
+    for (v, p) in surface.positions_mut().iter_mut().enumerate() {
         *p = (TAU * v as f64).sin() * DVec3::X + v as f64 * DVec3::X;
     }
-    let found = limits(&mesh, &mixed(&mesh)).unwrap();
+    let found = limits(&surface, &mixed(&surface)).unwrap();
     assert!(found.positions.iter().all(|p| p.is_finite()));
     assert!(found.normals.iter().all(|n| *n == DVec3::ZERO));
-    let error = limits(&mesh, &vec![2.5; mesh.len()]).unwrap_err();
+    let error = limits(&surface, &vec![2.5; surface.len()]).unwrap_err();
     assert!(error.to_string().contains("at vertex 0"));
 }

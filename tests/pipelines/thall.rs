@@ -7,18 +7,17 @@ use glam::{DQuat, DVec3};
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::normals::{Rotation, rotate_rings};
 use limitlab::interpolate::thall::*;
-use limitlab::mesh::{Faces, Mesh, Topology, builtin};
+use limitlab::mesh::{Faces, Mesh, Surface, builtin};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
 use limitlab::solvers::iteration::Iterate;
 use limitlab::solvers::{Outcome, Setup, Stop, run, run_watched, solve};
 
-use crate::common::pipelines::{ROUNDING, centroid, distance, noisy, topology};
+use crate::common::pipelines::{ROUNDING, centroid, distance, noisy_surface};
 
 const MESHES: [&str; 5] = ["torus:7x5", "quad-sphere:2", "dodecahedron", "irregular-poly:60", "icosphere:1"];
 
-fn run_local(mesh: &Mesh, inverse: Inverse, iterations: usize) -> Vec<Vec<DVec3>> {
-    let topology = topology(mesh);
-    let mut local = LocalIteration::new(mesh, &topology, inverse);
+fn run_local(surface: &Surface, inverse: Inverse, iterations: usize) -> Vec<Vec<DVec3>> {
+    let mut local = LocalIteration::new(surface, inverse);
     let mut iterates = vec![local.points().to_vec()];
     for _ in 0..iterations {
         local.errors();
@@ -31,11 +30,11 @@ fn run_local(mesh: &Mesh, inverse: Inverse, iterations: usize) -> Vec<Vec<DVec3>
 #[test]
 fn local_masks_are_jacobi_with_one_half_iterate_by_iterate() {
     for name in MESHES {
-        let mesh = noisy(name);
-        let system = LimitSystem::new(&mesh, &topology(&mesh), Scheme::CatmullClark).unwrap();
-        let iterates = run_local(&mesh, Inverse::Exact, 12);
+        let surface = noisy_surface(name);
+        let system = LimitSystem::new(&surface, Scheme::CatmullClark).unwrap();
+        let iterates = run_local(&surface, Inverse::Exact, 12);
         let stop = Stop { tolerance: 0.0, max_iterations: 12 };
-        run_watched(&system, &mesh.positions, Setup::THALL, &stop, &mut |step| {
+        run_watched(&system, surface.positions(), Setup::THALL, &stop, &mut |step| {
             let error = distance(step.points, &iterates[step.iteration]);
             assert!(error < ROUNDING, "{name} {}: {error:e}", step.iteration);
             ControlFlow::Continue(())
@@ -48,16 +47,15 @@ fn local_masks_are_jacobi_with_one_half_iterate_by_iterate() {
 #[test]
 fn the_inverse_mask_gives_the_wanted_limit_of_one_vertex() {
     for (name, quads) in [("torus:7x5", true), ("dodecahedron", false), ("irregular-poly:60", false)] {
-        let mesh = noisy(name);
-        let topology = topology(&mesh);
+        let surface = noisy_surface(name);
         for inverse in [Inverse::Exact, Inverse::Regular] {
-            let step = &run_local(&mesh, inverse, 1)[1];
+            let step = &run_local(&surface, inverse, 1)[1];
             let mut worst: f64 = 0.0;
             for (v, moved) in step.iter().enumerate() {
-                let mut one = mesh.clone();
-                one.positions[v] += 2.0 * (*moved - mesh.positions[v]);
-                let limit = catmull_clark::limit_positions(&one, &topology).unwrap()[v];
-                worst = worst.max(limit.distance(mesh.positions[v]));
+                let mut one = surface.clone();
+                one.positions_mut()[v] += 2.0 * (*moved - surface.positions()[v]);
+                let limit = catmull_clark::limit_positions(&one).unwrap()[v];
+                worst = worst.max(limit.distance(surface.positions()[v]));
             }
             if quads || inverse == Inverse::Exact {
                 assert!(worst < ROUNDING, "{name} {worst:e}");
@@ -70,13 +68,12 @@ fn the_inverse_mask_gives_the_wanted_limit_of_one_vertex() {
 
 #[test]
 fn both_inverses_converge_to_the_direct_solution() {
-    let mesh = noisy("irregular-poly:60");
-    let topology = topology(&mesh);
-    let system = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark).unwrap();
+    let surface = noisy_surface("irregular-poly:60");
+    let system = LimitSystem::new(&surface, Scheme::CatmullClark).unwrap();
     let stop = Stop { tolerance: 1e-13, max_iterations: 5000 };
-    let exact = run(&system, &mesh.positions, Setup::Lu, &stop).points;
+    let exact = run(&system, surface.positions(), Setup::Lu, &stop).points;
     for inverse in [Inverse::Exact, Inverse::Regular] {
-        let mut local = LocalIteration::new(&mesh, &topology, inverse);
+        let mut local = LocalIteration::new(&surface, inverse);
         let report = solve(&mut local, &stop, &mut |_| ControlFlow::Continue(()));
         assert_eq!(report.outcome, Outcome::Converged);
         assert!(distance(local.points(), &exact) < 1e-9);
@@ -85,11 +82,10 @@ fn both_inverses_converge_to_the_direct_solution() {
 
 #[test]
 fn local_iterates_follow_affine_maps() {
-    let mesh = noisy("irregular-poly:60");
+    let surface = noisy_surface("irregular-poly:60");
     let map = |p: DVec3| DVec3::new(p.x + 2.0 * p.y, p.z - 3.0, 0.5 * p.x - p.y + 4.0 * p.z);
-    let mut moved = mesh.clone();
-    moved.positions.iter_mut().for_each(|p| *p = map(*p));
-    let (here, there) = (run_local(&mesh, Inverse::Exact, 6), run_local(&moved, Inverse::Exact, 6));
+    let moved = surface.with_positions(surface.positions().iter().map(|p| map(*p)).collect());
+    let (here, there) = (run_local(&surface, Inverse::Exact, 6), run_local(&moved, Inverse::Exact, 6));
     for (a, b) in here.iter().zip(&there) {
         let a: Vec<DVec3> = a.iter().map(|p| map(*p)).collect();
         assert!(distance(&a, b) < ROUNDING);
@@ -131,41 +127,40 @@ fn normal_deviation_is_the_angle() {
     assert_eq!(normal_deviations(&[DVec3::ZERO], &[DVec3::Y]), [PI]);
 }
 
-fn primal(name: &str) -> (Mesh, Vec<Refinement>) {
-    let mesh = noisy(name);
+fn primal(name: &str) -> (Surface, Vec<Refinement>) {
+    let surface = noisy_surface(name);
     let mut schemes = vec![Refinement::CatmullClark];
-    if mesh.faces.uniform_size() == Some(3) {
+    if surface.faces().uniform_size() == Some(3) {
         schemes.extend([Refinement::Loop, Refinement::Sqrt3]);
     }
-    (mesh, schemes)
+    (surface, schemes)
 }
 
 /// Directions that lean away from the vertex normals by up to about a radian; none at every third vertex.
-fn leaning(mesh: &Mesh) -> Vec<Option<DVec3>> {
-    let outward = catmull_clark::limit_normals(mesh, &topology(mesh)).unwrap();
+fn leaning(surface: &Surface) -> Vec<Option<DVec3>> {
+    let outward = catmull_clark::limit_normals(surface).unwrap();
     let lean = |v: usize| DVec3::new((v as f64).sin(), (3.0 * v as f64).cos(), (v as f64).cos());
-    (0..mesh.len()).map(|v| (v % 3 != 2).then(|| 1.5 * outward[v] + lean(v))).collect()
+    (0..surface.len()).map(|v| (v % 3 != 2).then(|| 1.5 * outward[v] + lean(v))).collect()
 }
 
 /// T16: exactly the wanted normals, and all limit points where they were; spread over levels too.
 #[test]
 fn turned_rings_have_the_given_normals_and_keep_the_limits() {
     for name in MESHES {
-        let (mesh, schemes) = primal(name);
-        let wanted = leaning(&mesh);
+        let (surface, schemes) = primal(name);
+        let wanted = leaning(&surface);
         for scheme in schemes {
-            let before = scheme.limit_positions(&mesh, &topology(&mesh)).unwrap();
-            let untouched = scheme.limit_normals(&mesh, &topology(&mesh)).unwrap();
+            let before = scheme.limit_positions(&surface).unwrap();
+            let untouched = scheme.limit_normals(&surface).unwrap();
             for levels in [1, 3] {
                 let rotation = Rotation { levels, ..Rotation::default() };
-                let result = rotate_rings(&mesh, scheme, &wanted, rotation).unwrap();
+                let result = rotate_rings(&surface, scheme, &wanted, rotation).unwrap();
                 assert_eq!(result.refinements, levels + 1);
                 // One more refinement: nothing depends on the level where it is looked at.
-                let fine = scheme.refine_n(&result.mesh, 1).unwrap();
-                let fine_topology = topology(&fine);
-                let limits = scheme.limit_positions(&fine, &fine_topology).unwrap();
-                assert!(distance(&before, &limits[..mesh.len()]) < ROUNDING);
-                let found = scheme.limit_normals(&fine, &fine_topology).unwrap();
+                let fine = scheme.refined(&result.surface).unwrap();
+                let limits = scheme.limit_positions(&fine).unwrap();
+                assert!(distance(&before, &limits[..surface.len()]) < ROUNDING);
+                let found = scheme.limit_normals(&fine).unwrap();
                 for (v, normal) in wanted.iter().enumerate() {
                     let expected = normal.map_or(untouched[v], |n| n.normalize());
                     assert!(found[v].distance(expected) < ROUNDING, "{name} {scheme} {v}");
@@ -177,12 +172,12 @@ fn turned_rings_have_the_given_normals_and_keep_the_limits() {
 
 #[test]
 fn rings_turn_only_beyond_the_threshold_and_stop_at_the_tolerance() {
-    let mesh = noisy("irregular-poly:60");
-    let wanted = leaning(&mesh);
-    let before = catmull_clark::limit_normals(&mesh, &topology(&mesh)).unwrap();
+    let surface = noisy_surface("irregular-poly:60");
+    let wanted = leaning(&surface);
+    let before = catmull_clark::limit_normals(&surface).unwrap();
     let rotation = Rotation { threshold: 0.4, tolerance: 0.1, levels: 2 };
-    let result = rotate_rings(&mesh, Refinement::CatmullClark, &wanted, rotation).unwrap();
-    let after = catmull_clark::limit_normals(&result.mesh, &topology(&result.mesh)).unwrap();
+    let result = rotate_rings(&surface, Refinement::CatmullClark, &wanted, rotation).unwrap();
+    let after = catmull_clark::limit_normals(&result.surface).unwrap();
     let (mut turned, mut left) = (0, 0);
     for (v, normal) in wanted.iter().enumerate() {
         let Some(normal) = normal.map(DVec3::normalize) else {
@@ -201,7 +196,7 @@ fn rings_turn_only_beyond_the_threshold_and_stop_at_the_tolerance() {
     assert!(turned > 3 && left > 3, "the test sees both: {turned} {left}");
     // A normal within the tolerance is right, whatever the threshold.
     let rotation = Rotation { threshold: 0.0, tolerance: 0.4, levels: 1 };
-    let tolerant = rotate_rings(&mesh, Refinement::CatmullClark, &wanted, rotation).unwrap().turned;
+    let tolerant = rotate_rings(&surface, Refinement::CatmullClark, &wanted, rotation).unwrap().turned;
     assert!(tolerant.iter().map(|t| t.0).eq(result.turned.iter().map(|t| t.0)));
     assert!(tolerant.iter().all(|t| t.1 > 0.0));
 }
@@ -210,14 +205,14 @@ fn rings_turn_only_beyond_the_threshold_and_stop_at_the_tolerance() {
 #[test]
 fn rings_are_disjoint_after_two_refinements_and_not_after_one() {
     for name in MESHES {
-        let (mesh, schemes) = primal(name);
+        let (surface, schemes) = primal(name);
         for scheme in schemes {
             for (levels, disjoint) in [(1, false), (2, true)] {
-                let fine = scheme.refine_n(&mesh, levels).unwrap();
+                let fine = scheme.refine_n(&surface, levels).unwrap();
                 let mut owner = vec![None; fine.len()];
                 let mut shared = false;
                 for face in fine.faces.iter() {
-                    for &v in face.iter().filter(|&&v| (v as usize) < mesh.len()) {
+                    for &v in face.iter().filter(|&&v| (v as usize) < surface.len()) {
                         for &w in face {
                             shared |= owner[w as usize].replace(v).is_some_and(|u| u != v);
                         }
@@ -231,20 +226,19 @@ fn rings_are_disjoint_after_two_refinements_and_not_after_one() {
 
 #[test]
 fn normals_without_sense_are_errors_that_name_the_vertex() {
-    let mesh = builtin::icosahedron();
+    let surface = Surface::new(builtin::icosahedron()).unwrap();
     let refused = |normal: DVec3| {
-        let mut normals = vec![None; mesh.len()];
+        let mut normals = vec![None; surface.len()];
         normals[4] = Some(normal);
-        let result = rotate_rings(&mesh, Refinement::Loop, &normals, Rotation::default());
+        let result = rotate_rings(&surface, Refinement::Loop, &normals, Rotation::default());
         result.unwrap_err().to_string()
     };
     for normal in [DVec3::ZERO, DVec3::NAN, DVec3::splat(f64::INFINITY)] {
         assert!(refused(normal).contains("vertex 4") && refused(normal).contains("no direction"));
     }
-    assert!(refused(-mesh.positions[4]).contains("vertex 4: the given normal is opposite"));
-    let mut flat = mesh.clone();
-    flat.positions.iter_mut().for_each(|p| *p = DVec3::X * p.x);
-    let normals = vec![Some(DVec3::Z); mesh.len()];
+    assert!(refused(-surface.positions()[4]).contains("vertex 4: the given normal is opposite"));
+    let flat = surface.with_positions(surface.positions().iter().map(|p| DVec3::X * p.x).collect());
+    let normals = vec![Some(DVec3::Z); surface.len()];
     let result = rotate_rings(&flat, Refinement::Loop, &normals, Rotation::default());
     assert!(result.unwrap_err().to_string().contains("vertex 0: the surface has no normal"));
 }
@@ -252,33 +246,31 @@ fn normals_without_sense_are_errors_that_name_the_vertex() {
 /// T17: values stay by the midpoint rule, creep by the scheme's own, and come back where they interpolate.
 #[test]
 fn attributes_stay_creep_or_interpolate() {
-    let mesh = noisy("irregular-poly:60");
+    let surface = noisy_surface("irregular-poly:60");
     let values: Vec<DVec3> =
-        (0..mesh.len()).map(|v| DVec3::new((v as f64).sin(), v as f64 / 60.0, (0.3 * v as f64).cos())).collect();
-    let topology = topology(&mesh);
-    let refine = |values: Vec<DVec3>, rule| refine_attributes(&mesh, &topology, values, rule).unwrap();
+        (0..surface.len()).map(|v| DVec3::new((v as f64).sin(), v as f64 / 60.0, (0.3 * v as f64).cos())).collect();
+    let refine = |values: Vec<DVec3>, rule| refine_attributes(&surface, values, rule).unwrap();
     let mid = refine(values.clone(), AttributeRule::Midpoint);
-    assert_eq!(mid[..mesh.len()], values);
-    let fine = catmull_clark::refine(&mesh, &topology).unwrap();
+    assert_eq!(mid[..surface.len()], values);
+    let fine = catmull_clark::refine(&surface).unwrap();
     assert_eq!(mid.len(), fine.len());
-    let field = Mesh::new(values.clone(), mesh.faces.clone());
-    let first_face = mesh.len() + topology.edges();
-    for f in 0..mesh.faces.len() {
-        assert!(mid[first_face + f].distance(centroid(&field, f)) < ROUNDING);
+    let field = surface.with_positions(values.clone());
+    let first_face = surface.len() + surface.topology().edges();
+    for f in 0..surface.faces().len() {
+        assert!(mid[first_face + f].distance(centroid(field.mesh(), f)) < ROUNDING);
         // The new quads name edge points between their even vertices: the numbering is that of the mesh.
-        let quad = fine.faces.face(mesh.faces.range(f).start);
-        let face = mesh.faces.face(f);
+        let quad = fine.faces.face(surface.faces().range(f).start);
+        let face = surface.faces().face(f);
         let mean = 0.5 * (values[face[0] as usize] + values[face[1] as usize]);
         assert!(mid[quad[1] as usize].distance(mean) < ROUNDING);
     }
     let crept = refine(values.clone(), AttributeRule::Scheme);
-    assert!(distance(&crept[..mesh.len()], &values) > 1e-2);
+    assert!(distance(&crept[..surface.len()], &values) > 1e-2);
     // The limit system is that of the points: solved for the values, their limits are the given ones.
-    let system = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark).unwrap();
+    let system = LimitSystem::new(&surface, Scheme::CatmullClark).unwrap();
     let stop = Stop { tolerance: 1e-13, max_iterations: 10 };
     let control = run(&system, &values, Setup::Lu, &stop).points;
-    let refined = Mesh::new(refine(control, AttributeRule::Scheme), fine.faces);
-    let fine = Topology::new(&refined.faces, refined.len());
-    let limits = catmull_clark::limit_positions(&refined, &fine).unwrap();
-    assert!(distance(&limits[..mesh.len()], &values) < 1e-10);
+    let refined = Surface::new(Mesh::new(refine(control, AttributeRule::Scheme), fine.faces)).unwrap();
+    let limits = catmull_clark::limit_positions(&refined).unwrap();
+    assert!(distance(&limits[..surface.len()], &values) < 1e-10);
 }

@@ -7,27 +7,26 @@ use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::nasri;
 use limitlab::interpolate::subset::Restriction;
 use limitlab::interpolate::zheng_cai::*;
-use limitlab::mesh::{Mesh, builtin, io};
+use limitlab::mesh::{Mesh, Surface, builtin, io};
 use limitlab::schemes::Scheme;
 use limitlab::schemes::doo_sabin::{self, Rule};
 use limitlab::solvers::{Outcome, Setup, Stop, run, run_watched};
 
-use crate::common::pipelines::{ROUNDING, centroid, distance, noisy, topology};
+use crate::common::pipelines::{ROUNDING, centroid, distance, noisy_surface};
 
 const MESHES: [&str; 4] = ["torus:7x5", "dodecahedron", "irregular-poly:60", "icosphere:1"];
 
 /// Every second vertex or so, by no pattern of the mesh.
-fn half(mesh: &Mesh) -> Vec<bool> {
-    (0..mesh.len()).map(|v| (v * v + v / 3) % 5 < 3).collect()
+fn half(surface: &Surface) -> Vec<bool> {
+    (0..surface.len()).map(|v| (v * v + v / 3) % 5 < 3).collect()
 }
 
 #[test]
 fn both_sweeps_are_the_solvers_of_the_same_system() {
     for name in MESHES {
-        let mesh = noisy(name);
-        let topology = topology(&mesh);
-        let system = LimitSystem::new(&mesh, &topology, Scheme::ZhengCai).unwrap();
-        let order: Vec<u32> = (0..mesh.len() as u32).rev().collect();
+        let surface = noisy_surface(name);
+        let system = LimitSystem::new(&surface, Scheme::ZhengCai).unwrap();
+        let order: Vec<u32> = (0..surface.len() as u32).rev().collect();
         let file = Sweep::GaussSeidel(None);
         let reverse = Sweep::GaussSeidel(Some(&order));
         for (sweep, setup) in [
@@ -36,11 +35,11 @@ fn both_sweeps_are_the_solvers_of_the_same_system() {
             (reverse, Setup::Sor { omega: 1.0, order: Some(&order) }),
         ] {
             let stop = Stop { tolerance: 0.0, max_iterations: 8 };
-            let mut before = mesh.positions.clone();
-            run_watched(&system, &mesh.positions, setup, &stop, &mut |step| {
+            let mut before = surface.positions().to_vec();
+            run_watched(&system, surface.positions(), setup, &stop, &mut |step| {
                 let phase = PhaseOne { sweep, max_iterations: step.iteration, eps: 0.0 };
-                let found = auxiliary(&mesh, &topology, None, &phase).unwrap();
-                assert!(distance(&found.mesh.positions, step.points) < ROUNDING, "{name}");
+                let found = auxiliary(&surface, None, &phase).unwrap();
+                assert!(distance(found.surface.positions(), step.points) < ROUNDING, "{name}");
                 if let Some(&update) = found.updates.last() {
                     assert!((update - distance(&before, step.points)).abs() < ROUNDING);
                 }
@@ -53,17 +52,15 @@ fn both_sweeps_are_the_solvers_of_the_same_system() {
 
 #[test]
 fn the_largest_update_ends_the_sweeps() {
-    let mesh = noisy("irregular-poly:60");
-    let topology = topology(&mesh);
-    let all =
-        auxiliary(&mesh, &topology, None, &PhaseOne { max_iterations: 40, eps: 0.0, ..PhaseOne::default() }).unwrap();
+    let surface = noisy_surface("irregular-poly:60");
+    let all = auxiliary(&surface, None, &PhaseOne { max_iterations: 40, eps: 0.0, ..PhaseOne::default() }).unwrap();
     assert!(!all.passed && all.updates.len() == 40);
     // Each update just above the tolerance, and just below.
-    let near = all.updates[..8].iter().flat_map(|u| [u / 1.01, u * 1.01]).map(|u| u / mesh.diagonal());
+    let near = all.updates[..8].iter().flat_map(|u| [u / 1.01, u * 1.01]).map(|u| u / surface.diagonal());
     for eps in near.chain([1e-2, 3e-3, 1e-8]) {
         let phase = PhaseOne { max_iterations: 40, eps, ..PhaseOne::default() };
-        let found = auxiliary(&mesh, &topology, None, &phase).unwrap();
-        let tolerance = eps * mesh.diagonal();
+        let found = auxiliary(&surface, None, &phase).unwrap();
+        let tolerance = eps * surface.diagonal();
         let first = all.updates.iter().position(|&u| u <= tolerance).unwrap();
         assert!(found.passed);
         assert_eq!(found.updates, all.updates[..=first]);
@@ -79,11 +76,11 @@ fn the_paper_s_first_example_takes_three_sweeps() {
         writeln!(std::io::stderr(), "skipped: {path} is not there").unwrap();
         return;
     };
-    let mesh = loaded.mesh;
-    assert_eq!(mesh.len(), 562);
-    let found = auxiliary(&mesh, &topology(&mesh), None, &PhaseOne::default()).unwrap();
+    let surface = Surface::new(loaded.mesh).unwrap();
+    assert_eq!(surface.len(), 562);
+    let found = auxiliary(&surface, None, &PhaseOne::default()).unwrap();
     assert!(found.passed);
-    let relative: Vec<f64> = found.updates.iter().map(|u| u / mesh.diagonal()).collect();
+    let relative: Vec<f64> = found.updates.iter().map(|u| u / surface.diagonal()).collect();
     assert_eq!(relative.len(), 3);
     assert!((relative[1] - 0.0106).abs() < 1e-4 && (relative[2] - 0.00145).abs() < 1e-5, "{relative:?}");
 }
@@ -94,10 +91,10 @@ fn is_planar(mesh: &Mesh, f: usize, normal: DVec3, center: DVec3) -> bool {
 }
 
 /// Directions that lean away from the mean direction of the faces, at some interpolated vertices.
-fn leaning(mesh: &Mesh, interpolated: &[bool]) -> Vec<Option<DVec3>> {
-    let outward = doo_sabin::limit_normals(Rule::ZhengCai, mesh, &topology(mesh)).unwrap();
+fn leaning(surface: &Surface, interpolated: &[bool]) -> Vec<Option<DVec3>> {
+    let outward = doo_sabin::limit_normals(Rule::ZhengCai, surface).unwrap();
     let lean = |v: usize| DVec3::new((v as f64).sin(), (3.0 * v as f64).cos(), (v as f64).cos());
-    (0..mesh.len()).map(|v| (interpolated[v] && v % 3 == 0).then(|| 2.0 * outward[v] + 0.4 * lean(v))).collect()
+    (0..surface.len()).map(|v| (interpolated[v] && v % 3 == 0).then(|| 2.0 * outward[v] + 0.4 * lean(v))).collect()
 }
 
 /// Z7, Z14, Z15, Z16, Z17: exact centroids, planes and normals after one sweep as after many, at every level, with
@@ -105,28 +102,27 @@ fn leaning(mesh: &Mesh, interpolated: &[bool]) -> Vec<Option<DVec3>> {
 #[test]
 fn centroids_planes_and_normals_are_exact_at_every_level() {
     for name in MESHES {
-        let mesh = noisy(name);
-        let topology = topology(&mesh);
-        let some = half(&mesh);
-        let normals = leaning(&mesh, &some);
+        let surface = noisy_surface(name);
+        let some = half(&surface);
+        let normals = leaning(&surface, &some);
         let handles: Vec<f64> =
-            (0..mesh.len()).map(|v| if some[v] { 0.4 + 0.1 * (v % 20) as f64 } else { 1.0 }).collect();
+            (0..surface.len()).map(|v| if some[v] { 0.4 + 0.1 * (v % 20) as f64 } else { 1.0 }).collect();
         for sweeps in [0, 1, 7] {
             let phase = PhaseOne { max_iterations: sweeps, eps: 0.0, ..PhaseOne::default() };
             let constraints =
                 Constraints { interpolated: Some(&some), normals: Some(&normals), handles: Some(&handles) };
-            let result = interpolate(&mesh, &topology, &constraints, &phase).unwrap();
+            let result = interpolate(&surface, &constraints, &phase).unwrap();
             assert!(result.first.not_flattened.is_empty());
-            for v in (0..mesh.len()).filter(|&v| !some[v]) {
-                assert_eq!(result.auxiliary.mesh.positions[v], mesh.positions[v]);
+            for v in (0..surface.len()).filter(|&v| !some[v]) {
+                assert_eq!(result.auxiliary.surface.positions()[v], surface.positions()[v]);
             }
             for level in [1, 2, 4] {
-                let fine = result.first.surface(level).unwrap();
+                let fine = result.first.at_level(level).unwrap();
                 let found = doo_sabin::face_normals(&fine);
-                for v in (0..mesh.len()).filter(|&v| some[v]) {
+                for v in (0..surface.len()).filter(|&v| some[v]) {
                     let f = result.first.first_vertex_face + v;
-                    assert!(centroid(&fine, f).distance(mesh.positions[v]) < ROUNDING);
-                    assert!(is_planar(&fine, f, found[f], mesh.positions[v]), "{name} {level} {v}");
+                    assert!(centroid(&fine, f).distance(surface.positions()[v]) < ROUNDING);
+                    assert!(is_planar(&fine, f, found[f], surface.positions()[v]), "{name} {level} {v}");
                     if let Some(n) = normals[v] {
                         assert!(found[f].cross(n.normalize()).length() < ROUNDING, "{name} {v}");
                     }
@@ -138,23 +134,22 @@ fn centroids_planes_and_normals_are_exact_at_every_level() {
 
 #[test]
 fn opposite_normals_are_the_same_and_handles_scale() {
-    let mesh = noisy("irregular-poly:60");
-    let topology = topology(&mesh);
-    let all = vec![true; mesh.len()];
-    let normals = leaning(&mesh, &all);
+    let surface = noisy_surface("irregular-poly:60");
+    let all = vec![true; surface.len()];
+    let normals = leaning(&surface, &all);
     let turned: Vec<Option<DVec3>> = normals.iter().map(|n| n.map(|n| -3.0 * n)).collect();
-    let handles: Vec<f64> = (0..mesh.len()).map(|v| 0.5 + (v % 4) as f64).collect();
+    let handles: Vec<f64> = (0..surface.len()).map(|v| 0.5 + (v % 4) as f64).collect();
     let first = |normals: &[Option<DVec3>], handles: Option<&[f64]>| {
         let constraints = Constraints { normals: Some(normals), handles, ..Constraints::default() };
-        interpolate(&mesh, &topology, &constraints, &PhaseOne::default()).unwrap().first
+        interpolate(&surface, &constraints, &PhaseOne::default()).unwrap().first
     };
     let plain = first(&normals, None);
-    assert!(distance(&plain.mesh.positions, &first(&turned, None).mesh.positions) < ROUNDING);
+    assert!(distance(plain.surface.positions(), first(&turned, None).surface.positions()) < ROUNDING);
     let scaled = first(&normals, Some(&handles));
     for (v, &s) in handles.iter().enumerate() {
-        for &c in plain.mesh.faces.face(plain.first_vertex_face + v) {
-            let (p, q) = (plain.mesh.positions[c as usize], scaled.mesh.positions[c as usize]);
-            let expected = mesh.positions[v] + s * (p - mesh.positions[v]);
+        for &c in plain.surface.faces().face(plain.first_vertex_face + v) {
+            let (p, q) = (plain.surface.positions()[c as usize], scaled.surface.positions()[c as usize]);
+            let expected = surface.positions()[v] + s * (p - surface.positions()[v]);
             assert!(q.distance(expected) < ROUNDING);
         }
     }
@@ -164,13 +159,12 @@ fn opposite_normals_are_the_same_and_handles_scale() {
 /// the projection onto the constraints' null space: the move is orthogonal to every move that keeps them.
 #[test]
 fn the_correction_is_the_smallest() {
-    let mesh = noisy("irregular-poly:60");
-    let topology = topology(&mesh);
+    let surface = noisy_surface("irregular-poly:60");
     let phase = PhaseOne { max_iterations: 1, eps: 0.0, ..PhaseOne::default() };
-    let result = interpolate(&mesh, &topology, &Constraints::default(), &phase).unwrap();
-    let before = doo_sabin::refine_by(Rule::ZhengCai, &result.auxiliary.mesh, &topology).unwrap();
-    let normals = doo_sabin::face_normals(&result.first.mesh);
-    for v in 0..mesh.len() {
+    let result = interpolate(&surface, &Constraints::default(), &phase).unwrap();
+    let before = doo_sabin::refine_by(Rule::ZhengCai, &result.auxiliary.surface).unwrap();
+    let normals = doo_sabin::face_normals(result.first.surface.mesh());
+    for v in 0..surface.len() {
         let f = result.first.first_vertex_face + v;
         // Eq. 10, the paper's average normal, up to sign the normal of the planar face.
         let face = before.faces.face(f);
@@ -178,7 +172,7 @@ fn the_correction_is_the_smallest() {
         let average: DVec3 = ring().zip(ring().cycle().skip(1)).map(|(a, b)| a.cross(b)).sum();
         assert!(average.normalize().cross(normals[f]).length() < 1e-10);
         let moves: Vec<DVec3> =
-            face.iter().map(|&c| result.first.mesh.positions[c as usize] - before.positions[c as usize]).collect();
+            face.iter().map(|&c| result.first.surface.positions()[c as usize] - before.positions[c as usize]).collect();
         let mean = moves.iter().sum::<DVec3>() / moves.len() as f64;
         for m in moves {
             // Free moves are within the plane and of sum 0: the correction's part there is constant.
@@ -190,22 +184,20 @@ fn the_correction_is_the_smallest() {
 
 #[test]
 fn affine_maps_commute_with_phase_one() {
-    let mesh = noisy("irregular-poly:60");
+    let surface = noisy_surface("irregular-poly:60");
     let map = |p: &DVec3| DVec3::new(p.x + 2.0 * p.y, p.z - 3.0, 0.5 * p.x - p.y + 4.0 * p.z);
-    let moved = Mesh::new(mesh.positions.iter().map(map).collect(), mesh.faces.clone());
+    let moved = surface.with_positions(surface.positions().iter().map(map).collect());
     let phase = PhaseOne { eps: 0.0, ..PhaseOne::default() };
-    let [here, there] = [&mesh, &moved].map(|m| auxiliary(m, &topology(m), None, &phase).unwrap().mesh.positions);
-    let here: Vec<DVec3> = here.iter().map(map).collect();
-    assert!(distance(&here, &there) < 1e-11);
+    let [here, there] = [&surface, &moved].map(|s| auxiliary(s, None, &phase).unwrap().surface);
+    let here: Vec<DVec3> = here.positions().iter().map(map).collect();
+    assert!(distance(&here, there.positions()) < 1e-11);
 }
 
 #[test]
 fn constraints_without_sense_are_errors_that_name_the_vertex() {
-    let mesh = builtin::icosahedron();
-    let topology = topology(&mesh);
-    let refused = |constraints: &Constraints| {
-        interpolate(&mesh, &topology, constraints, &PhaseOne::default()).unwrap_err().to_string()
-    };
+    let surface = Surface::new(builtin::icosahedron()).unwrap();
+    let refused =
+        |constraints: &Constraints| interpolate(&surface, constraints, &PhaseOne::default()).unwrap_err().to_string();
     let mut some = vec![true; 12];
     some[5] = false;
     let mut normals = vec![None; 12];
@@ -226,10 +218,10 @@ fn constraints_without_sense_are_errors_that_name_the_vertex() {
     assert!(refused(&Constraints { interpolated: Some(&none), ..Constraints::default() }).contains("at least one"));
     // Z24: a normal in the plane of the face. Before any sweep the face lies square to the axis, by symmetry.
     let mut normals = vec![None; 12];
-    normals[0] = Some(mesh.positions[0].any_orthogonal_vector());
+    normals[0] = Some(surface.positions()[0].any_orthogonal_vector());
     let edge_on = Constraints { normals: Some(&normals), ..Constraints::default() };
     let none = PhaseOne { max_iterations: 0, ..PhaseOne::default() };
-    let text = interpolate(&mesh, &topology, &edge_on, &none).unwrap_err().to_string();
+    let text = interpolate(&surface, &edge_on, &none).unwrap_err().to_string();
     assert!(text.contains("vertex 0: the given normal lies in the plane"), "{text}");
     normals[0] = Some(DVec3::ZERO);
     assert!(refused(&Constraints { normals: Some(&normals), ..Constraints::default() }).contains("vertex 0"));
@@ -238,34 +230,31 @@ fn constraints_without_sense_are_errors_that_name_the_vertex() {
 /// The thinner the mesh, the smaller the areas of its faces against their sides; only rounding takes the normal away.
 #[test]
 fn thin_faces_are_flattened_down_to_rounding() {
-    let mesh = noisy("irregular-poly:60");
-    let topology = topology(&mesh);
+    let surface = noisy_surface("irregular-poly:60");
     for (thin, flattened) in [(1e-3, true), (1e-6, true), (1e-9, true), (1e-15, false), (0.0, false)] {
-        let positions = mesh.positions.iter().map(|p| DVec3::new(p.x, thin * p.y, thin * p.z)).collect();
-        let mesh = Mesh::new(positions, mesh.faces.clone());
-        let first = interpolate(&mesh, &topology, &Constraints::default(), &PhaseOne::default()).unwrap().first;
-        let expected = if flattened { 0 } else { mesh.len() };
+        let positions = surface.positions().iter().map(|p| DVec3::new(p.x, thin * p.y, thin * p.z)).collect();
+        let thinned = surface.with_positions(positions);
+        let first = interpolate(&thinned, &Constraints::default(), &PhaseOne::default()).unwrap().first;
+        let expected = if flattened { 0 } else { surface.len() };
         assert_eq!(first.not_flattened.len(), expected, "{thin:e}");
     }
 }
 
 #[test]
 fn coincident_points_give_finite_meshes() {
-    let mut mesh = noisy("torus:7x5");
-    let p = mesh.positions[0];
-    for q in &mut mesh.positions[..15] {
+    let mut surface = noisy_surface("torus:7x5");
+    let p = surface.positions()[0];
+    for q in &mut surface.positions_mut()[..15] {
         *q = p;
     }
-    let topology = topology(&mesh);
-    let mut flat = mesh.clone();
-    flat.positions.iter_mut().for_each(|q| *q = DVec3::X * q.x);
-    for mesh in [mesh, flat] {
-        let result = interpolate(&mesh, &topology, &Constraints::default(), &PhaseOne::default()).unwrap();
-        let fine = result.first.surface(3).unwrap();
+    let flat = surface.with_positions(surface.positions().iter().map(|q| DVec3::X * q.x).collect());
+    for surface in [surface, flat] {
+        let result = interpolate(&surface, &Constraints::default(), &PhaseOne::default()).unwrap();
+        let fine = result.first.at_level(3).unwrap();
         assert!(fine.positions.iter().all(|p| p.is_finite()));
-        for v in 0..mesh.len() {
+        for v in 0..surface.len() {
             let f = result.first.first_vertex_face + v;
-            assert!(centroid(&fine, f).distance(mesh.positions[v]) < ROUNDING);
+            assert!(centroid(&fine, f).distance(surface.positions()[v]) < ROUNDING);
         }
     }
 }
@@ -273,18 +262,17 @@ fn coincident_points_give_finite_meshes() {
 #[test]
 fn nasri_s_faces_have_the_given_centroids() {
     for name in MESHES {
-        let mesh = noisy(name);
-        let topology = topology(&mesh);
-        let some = half(&mesh);
+        let surface = noisy_surface(name);
+        let some = half(&surface);
         let stop = Stop { tolerance: 1e-13, max_iterations: 5000 };
         for marks in [None, Some(&some[..])] {
-            let solution = nasri::control_points(&mesh, &topology, marks, Setup::Cholesky, &stop).unwrap();
+            let solution = nasri::control_points(&surface, marks, Setup::Cholesky, &stop).unwrap();
             assert_eq!(solution.report.outcome, Outcome::Converged);
-            let control = Mesh::new(solution.points, mesh.faces.clone());
-            let limits = doo_sabin::limit_positions(Rule::DooSabin, &control, &topology).unwrap();
-            for v in 0..mesh.len() {
-                let expected = if marks.is_none_or(|m| m[v]) { limits[v] } else { control.positions[v] };
-                assert!(expected.distance(mesh.positions[v]) < ROUNDING, "{name} {v}");
+            let control = surface.with_positions(solution.points);
+            let limits = doo_sabin::limit_positions(Rule::DooSabin, &control).unwrap();
+            for v in 0..surface.len() {
+                let expected = if marks.is_none_or(|m| m[v]) { limits[v] } else { control.positions()[v] };
+                assert!(expected.distance(surface.positions()[v]) < ROUNDING, "{name} {v}");
             }
         }
     }
@@ -293,14 +281,13 @@ fn nasri_s_faces_have_the_given_centroids() {
 /// Every method on a subset finds the same control points, and they satisfy the rows that are asked for.
 #[test]
 fn a_subset_is_interpolated_by_every_scheme_and_method() {
-    let mesh = noisy("icosphere:1");
-    let topology = topology(&mesh);
-    let some = half(&mesh);
+    let surface = noisy_surface("icosphere:1");
+    let some = half(&surface);
     let stop = Stop { tolerance: 1e-12, max_iterations: 5000 };
     for scheme in Scheme::ALL {
-        let full = LimitSystem::new(&mesh, &topology, scheme).unwrap();
+        let full = LimitSystem::new(&surface, scheme).unwrap();
         let part = Restriction::new(&full, &some).unwrap();
-        let file: Vec<u32> = (0..mesh.len() as u32).rev().collect();
+        let file: Vec<u32> = (0..surface.len() as u32).rev().collect();
         let order = part.order(&file);
         assert_eq!(order.len(), part.vertices.len());
         let mut first: Option<Vec<DVec3>> = None;
@@ -313,11 +300,11 @@ fn a_subset_is_interpolated_by_every_scheme_and_method() {
             Setup::Sor { omega: 1.0, order: Some(&order) },
             Setup::Chebyshev { spectrum: (full.bounds.lambda_min.max(0.02), 1.0) },
         ] {
-            let solution = part.solve(&full, &mesh.positions, setup, &stop, &mut |_| ControlFlow::Continue(()));
+            let solution = part.solve(&full, surface.positions(), setup, &stop, &mut |_| ControlFlow::Continue(()));
             assert_eq!(solution.report.outcome, Outcome::Converged, "{scheme} {setup:?}");
             for (v, &marked) in some.iter().enumerate() {
                 let value = if marked { full.a.row_times(v, &solution.points) } else { solution.points[v] };
-                assert!(value.distance(mesh.positions[v]) < 1e-11);
+                assert!(value.distance(surface.positions()[v]) < 1e-11);
             }
             match &first {
                 None => first = Some(solution.points),
@@ -326,14 +313,14 @@ fn a_subset_is_interpolated_by_every_scheme_and_method() {
         }
     }
     // All vertices: the whole system, one PIA step ahead.
-    let full = LimitSystem::new(&mesh, &topology, Scheme::Loop).unwrap();
-    let part = Restriction::new(&full, &vec![true; mesh.len()]).unwrap();
+    let full = LimitSystem::new(&surface, Scheme::Loop).unwrap();
+    let part = Restriction::new(&full, &vec![true; surface.len()]).unwrap();
     assert_eq!(part.system.a, full.a);
     let pia = Setup::Pia { omega: 1.0 };
-    let ahead = part.solve(&full, &mesh.positions, pia, &Stop { tolerance: 0.0, max_iterations: 4 }, &mut |_| {
+    let ahead = part.solve(&full, surface.positions(), pia, &Stop { tolerance: 0.0, max_iterations: 4 }, &mut |_| {
         ControlFlow::Continue(())
     });
-    let five = run(&full, &mesh.positions, pia, &Stop { tolerance: 0.0, max_iterations: 5 });
+    let five = run(&full, surface.positions(), pia, &Stop { tolerance: 0.0, max_iterations: 5 });
     assert!(distance(&ahead.points, &five.points) < ROUNDING);
-    assert!(Restriction::new(&full, &vec![false; mesh.len()]).is_err());
+    assert!(Restriction::new(&full, &vec![false; surface.len()]).is_err());
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
-use limitlab::mesh::Mesh;
+use limitlab::mesh::Surface;
 use limitlab::schemes::{Refinement, butterfly, labsik_greiner, sqrt3, unified_sqrt3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -13,9 +13,9 @@ use super::meshes::*;
 
 #[test]
 fn butterfly_keeps_its_vertices() {
-    for mesh in triangle_meshes() {
-        let fine = Refinement::Butterfly.refine_n(&mesh, 3).unwrap();
-        assert_eq!(fine.positions[..mesh.len()], mesh.positions);
+    for surface in triangle_meshes() {
+        let fine = Refinement::Butterfly.refine_n(&surface, 3).unwrap();
+        assert_eq!(&fine.positions[..surface.len()], surface.positions());
     }
 }
 
@@ -49,11 +49,11 @@ fn butterfly_masks_are_the_published_ones() {
 }
 
 /// The weighted mean of the ring around v in counter-clockwise order, starting at w, found by matching sides.
-fn extraordinary_point(mesh: &Mesh, v: u32, w: u32) -> DVec3 {
+fn extraordinary_point(surface: &Surface, v: u32, w: u32) -> DVec3 {
     let mut ring = vec![w];
     loop {
         let last = ring[ring.len() - 1];
-        let next = mesh.faces.iter().find_map(|face| {
+        let next = surface.faces().iter().find_map(|face| {
             (0..3).find_map(|i| {
                 let (a, b, c) = (face[i], face[(i + 1) % 3], face[(i + 2) % 3]);
                 (a == v && b == last).then_some(c)
@@ -66,8 +66,8 @@ fn extraordinary_point(mesh: &Mesh, v: u32, w: u32) -> DVec3 {
     }
     let mask = butterfly::extraordinary_mask(ring.len());
     let terms = ring.iter().zip(mask);
-    let sum: DVec3 = terms.map(|(&u, s)| s * mesh.positions[u as usize]).sum();
-    butterfly::CENTER * mesh.positions[v as usize] + sum
+    let sum: DVec3 = terms.map(|(&u, s)| s * surface.positions()[u as usize]).sum();
+    butterfly::CENTER * surface.positions()[v as usize] + sum
 }
 
 #[test]
@@ -75,17 +75,16 @@ fn butterfly_edge_points_equal_their_masks() {
     let mut kinds = [0; 3];
     // Rings up to 16 neighbours and wider ones take different ways.
     let wide = [7, 8, 9, 15, 16, 17, 40].map(|k| scattered(bipyramid(k), k.into()));
-    for mesh in triangle_meshes().into_iter().chain(wide) {
-        let topology = topology(&mesh);
-        let fine = butterfly::refine(&mesh, &topology).unwrap();
-        let regular = |v: u32| topology.incidence.face_count(v as usize) == 6;
-        for (f, face) in mesh.faces.iter().enumerate() {
+    for surface in triangle_meshes().into_iter().chain(wide) {
+        let fine = butterfly::refine(&surface).unwrap();
+        let regular = |v: u32| surface.incidence().face_count(v as usize) == 6;
+        for (f, face) in surface.faces().iter().enumerate() {
             for (i, &e) in fine.faces.face(4 * f + 3).iter().enumerate() {
                 let (v, w) = (face[i], face[(i + 1) % 3]);
                 let expected = match (regular(v), regular(w)) {
-                    (false, false) => 0.5 * (extraordinary_point(&mesh, v, w) + extraordinary_point(&mesh, w, v)),
-                    (false, true) => extraordinary_point(&mesh, v, w),
-                    (true, false) => extraordinary_point(&mesh, w, v),
+                    (false, false) => 0.5 * (extraordinary_point(&surface, v, w) + extraordinary_point(&surface, w, v)),
+                    (false, true) => extraordinary_point(&surface, v, w),
+                    (true, false) => extraordinary_point(&surface, w, v),
                     // Next test.
                     (true, true) => {
                         kinds[0] += 1;
@@ -114,13 +113,13 @@ fn cubic(i: f64, j: f64) -> DVec3 {
 #[test]
 fn butterfly_reproduces_cubics_on_the_regular_lattice() {
     let size = 9;
-    let mut mesh = tri_torus(size, size);
-    for (v, p) in mesh.positions.iter_mut().enumerate() {
+    let mut surface = tri_torus(size, size);
+    for (v, p) in surface.positions_mut().iter_mut().enumerate() {
         *p = cubic((v / 9) as f64, (v % 9) as f64);
     }
-    let fine = Refinement::Butterfly.refine_n(&mesh, 1).unwrap();
+    let fine = Refinement::Butterfly.refine_n(&surface, 1).unwrap();
     let mut seen = 0;
-    for (f, face) in mesh.faces.iter().enumerate() {
+    for (f, face) in surface.faces().iter().enumerate() {
         for (i, &e) in fine.faces.face(4 * f + 3).iter().enumerate() {
             let lattice = |v: u32| ((v / size) as f64, (v % size) as f64);
             let (v, w) = (lattice(face[i]), lattice(face[(i + 1) % 3]));
@@ -141,20 +140,16 @@ fn butterfly_reproduces_cubics_on_the_regular_lattice() {
 fn regular_tangents_are_the_derivatives_of_cubics() {
     let size = 12usize;
     let lattice = |v: usize| ((v / size) as f64, (v % size) as f64);
-    let mut mesh = tri_torus(12, 12);
-    for v in 0..mesh.len() {
+    let mut surface = tri_torus(12, 12);
+    for v in 0..surface.len() {
         let (i, j) = lattice(v);
-        mesh.positions[v] = cubic(i, j);
+        surface.positions_mut()[v] = cubic(i, j);
     }
-    let topology = topology(&mesh);
-    let found = [
-        butterfly::limit_tangents(&mesh, &topology).unwrap(),
-        labsik_greiner::limit_tangents(&mesh, &topology).unwrap(),
-    ];
+    let found = [butterfly::limit_tangents(&surface).unwrap(), labsik_greiner::limit_tangents(&surface).unwrap()];
     for tangents in found {
         // One mask for all vertices, so the ratios of the lengths are known once one of them is.
         let mut scale = None;
-        for v in (0..mesh.len()).filter(|&v| {
+        for v in (0..surface.len()).filter(|&v| {
             let (i, j) = lattice(v);
             (4.0..=7.0).contains(&i) && (4.0..=7.0).contains(&j)
         }) {
@@ -175,15 +170,14 @@ fn regular_tangents_are_the_derivatives_of_cubics() {
 
 #[test]
 fn unified_sqrt3_ends_at_the_approximating_and_the_interpolating_scheme() {
-    for mesh in triangle_meshes() {
-        let topology = topology(&mesh);
-        let (fine, alpha) = unified_sqrt3::refine(&mesh, &topology, &vec![0.0; mesh.len()]).unwrap();
-        let kobbelt = sqrt3::refine(&mesh, &topology).unwrap();
+    for surface in triangle_meshes() {
+        let (fine, alpha) = unified_sqrt3::refine(&surface, &vec![0.0; surface.len()]).unwrap();
+        let kobbelt = sqrt3::refine(&surface).unwrap();
         assert!(distance(&fine.positions, &kobbelt.positions) < ROUNDING);
         assert_eq!(fine.faces, kobbelt.faces);
         assert_eq!(alpha, vec![0.0; fine.len()]);
-        let (fine, alpha) = unified_sqrt3::refine(&mesh, &topology, &vec![1.0; mesh.len()]).unwrap();
-        assert_eq!(fine.positions[..mesh.len()], mesh.positions);
+        let (fine, alpha) = unified_sqrt3::refine(&surface, &vec![1.0; surface.len()]).unwrap();
+        assert_eq!(&fine.positions[..surface.len()], surface.positions());
         assert!(alpha.iter().all(|a| (a - 1.0).abs() < 1e-15));
     }
 }
@@ -192,51 +186,50 @@ fn unified_sqrt3_ends_at_the_approximating_and_the_interpolating_scheme() {
 #[test]
 fn unified_sqrt3_equals_the_papers_formulas() {
     let mut rng = ChaCha8Rng::seed_from_u64(31);
-    for mesh in triangle_meshes() {
-        let alpha: Vec<f64> = (0..mesh.len()).map(|_| rng.random_range(0.0..2.0)).collect();
-        let (fine, refined) = unified_sqrt3::refine(&mesh, &topology(&mesh), &alpha).unwrap();
+    for surface in triangle_meshes() {
+        let alpha: Vec<f64> = (0..surface.len()).map(|_| rng.random_range(0.0..2.0)).collect();
+        let (fine, refined) = unified_sqrt3::refine(&surface, &alpha).unwrap();
         let mut shares = Vec::new();
         for (v, &a) in alpha.iter().enumerate() {
-            let star = star(&mesh, v);
+            let star = star(&surface, v);
             let cosine = (TAU / star.valence as f64).cos();
             let mean = star.neighbors / star.valence as f64;
-            let point = mesh.positions[v];
+            let point = surface.positions()[v];
             shares.push((9.0 + 4.0 * a - 2.0 * a * cosine) / 27.0 * point - (4.0 * a - 2.0 * a * cosine) / 27.0 * mean);
             let moved = (5.0 + 4.0 * a + 2.0 * (1.0 - a) * cosine) / 9.0 * point
                 + (1.0 - a) * (4.0 - 2.0 * cosine) / 9.0 * mean;
             assert!((fine.positions[v] - moved).length() < ROUNDING);
         }
-        for (f, face) in mesh.faces.iter().enumerate() {
-            let new = mesh.len() + f;
+        for (f, face) in surface.faces().iter().enumerate() {
+            let new = surface.len() + f;
             let expected: DVec3 = face.iter().map(|&v| shares[v as usize]).sum();
             assert!((fine.positions[new] - expected).length() < ROUNDING);
             let mean = face.iter().map(|&v| alpha[v as usize]).sum::<f64>() / 3.0;
             assert!((refined[new] - mean).abs() < 1e-15);
         }
-        assert_eq!(refined[..mesh.len()], alpha);
+        assert_eq!(refined[..surface.len()], alpha);
     }
 }
 
 #[test]
 fn unified_sqrt3_keeps_planes_and_refuses_parameters_without_meaning() {
-    let mut mesh = tri_torus(8, 8);
-    for (v, p) in mesh.positions.iter_mut().enumerate() {
+    let mut surface = tri_torus(8, 8);
+    for (v, p) in surface.positions_mut().iter_mut().enumerate() {
         *p = DVec3::new((v / 8) as f64, (v % 8) as f64, 0.0);
     }
-    let grid = topology(&mesh);
     let alpha: Vec<f64> = (0..64).map(|v| f64::from(v) / 32.0).collect();
-    let (fine, _) = unified_sqrt3::refine(&mesh, &grid, &alpha).unwrap();
+    let (fine, _) = unified_sqrt3::refine(&surface, &alpha).unwrap();
     // Away from the seam the lattice's stars are symmetric: a point stays, and the new one is the centroid.
     for v in (8..56).filter(|v| (1..7).contains(&(v % 8))) {
-        assert!((fine.positions[v] - mesh.positions[v]).length() < ROUNDING);
+        assert!((fine.positions[v] - surface.positions()[v]).length() < ROUNDING);
     }
     for bad in [-0.01, 2.01, f64::NAN, f64::INFINITY] {
         let mut alpha = alpha.clone();
         alpha[5] = bad;
-        let error = unified_sqrt3::refine(&mesh, &grid, &alpha).unwrap_err();
+        let error = unified_sqrt3::refine(&surface, &alpha).unwrap_err();
         assert!(error.to_string().contains("at vertex 5"));
     }
     let quads = torus(3, 3);
-    let error = unified_sqrt3::refine(&quads, &topology(&quads), &[1.0; 9]).unwrap_err();
+    let error = unified_sqrt3::refine(&quads, &[1.0; 9]).unwrap_err();
     assert!(error.to_string().contains("face 0 has 4 corners"));
 }

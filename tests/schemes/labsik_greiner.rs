@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
-use limitlab::mesh::Mesh;
+use limitlab::mesh::Surface;
 use limitlab::schemes::{Refinement, labsik_greiner};
 use nalgebra::{DMatrix, DVector};
 
@@ -122,11 +122,11 @@ fn the_formula_continues_to_valence_6() {
     }
 }
 
-fn neighbors(mesh: &Mesh, v: u32, w: u32) -> Vec<u32> {
+fn neighbors(surface: &Surface, v: u32, w: u32) -> Vec<u32> {
     let mut ring = vec![w];
     loop {
         let last = ring[ring.len() - 1];
-        let next = mesh.faces.iter().find_map(|face| {
+        let next = surface.faces().iter().find_map(|face| {
             (0..3).find_map(|i| {
                 let (a, b, c) = (face[i], face[(i + 1) % 3], face[(i + 2) % 3]);
                 (a == v && b == last).then_some(c)
@@ -140,9 +140,9 @@ fn neighbors(mesh: &Mesh, v: u32, w: u32) -> Vec<u32> {
 }
 
 /// The vertex across side (v, w) of a face: found by looking at every face.
-fn across(mesh: &Mesh, v: u32, w: u32) -> u32 {
-    let found = mesh
-        .faces
+fn across(surface: &Surface, v: u32, w: u32) -> u32 {
+    let found = surface
+        .faces()
         .iter()
         .find_map(|face| (0..3).find_map(|i| (face[i] == w && face[(i + 1) % 3] == v).then(|| face[(i + 2) % 3])));
     found.unwrap()
@@ -153,13 +153,12 @@ fn new_points_equal_their_masks() {
     let mut kinds = [0; 4];
     // Rings up to 16 neighbours and wider ones take different ways.
     let wide = [7, 8, 9, 15, 16, 17, 40].map(|k| scattered(bipyramid(k), k.into()));
-    for mesh in triangle_meshes().into_iter().chain(wide) {
-        let topology = topology(&mesh);
-        let fine = labsik_greiner::refine(&mesh, &topology).unwrap();
-        assert_eq!(fine.positions[..mesh.len()], mesh.positions);
-        let at = |v: u32| mesh.positions[v as usize];
-        let is_regular = |v: u32| topology.incidence.face_count(v as usize) == 6;
-        for (f, face) in mesh.faces.iter().enumerate() {
+    for surface in triangle_meshes().into_iter().chain(wide) {
+        let fine = labsik_greiner::refine(&surface).unwrap();
+        assert_eq!(&fine.positions[..surface.len()], surface.positions());
+        let at = |v: u32| surface.positions()[v as usize];
+        let is_regular = |v: u32| surface.incidence().face_count(v as usize) == 6;
+        for (f, face) in surface.faces().iter().enumerate() {
             let irregular: Vec<usize> = (0..3).filter(|&i| !is_regular(face[i])).collect();
             kinds[irregular.len()] += 1;
             let expected = if irregular.is_empty() {
@@ -167,21 +166,21 @@ fn new_points_equal_their_masks() {
                 let mut sum = DVec3::ZERO;
                 for i in 0..3 {
                     let (v, w) = (face[i], face[(i + 1) % 3]);
-                    let tip = across(&mesh, v, w);
+                    let tip = across(&surface, v, w);
                     sum += corner * at(v) + opposite * at(tip);
-                    sum += wing * (at(across(&mesh, v, tip)) + at(across(&mesh, tip, w)));
+                    sum += wing * (at(across(&surface, v, tip)) + at(across(&surface, tip, w)));
                 }
                 sum
             } else {
                 let blend = |&i: &usize| {
-                    let ring = neighbors(&mesh, face[i], face[(i + 1) % 3]);
+                    let ring = neighbors(&surface, face[i], face[(i + 1) % 3]);
                     let (center, weights) = labsik_greiner::extraordinary_mask(ring.len());
                     let terms = ring.iter().zip(weights).map(|(&u, w)| w * at(u));
                     center * at(face[i]) + terms.sum::<DVec3>()
                 };
                 irregular.iter().map(blend).sum::<DVec3>() / irregular.len() as f64
             };
-            assert!((fine.positions[mesh.len() + f] - expected).length() < ROUNDING);
+            assert!((fine.positions[surface.len() + f] - expected).length() < ROUNDING);
         }
     }
     assert!(kinds.iter().all(|&count| count >= 8), "{kinds:?}");
@@ -201,16 +200,16 @@ fn cubics_stay_on_the_regular_lattice() {
     };
     let plain = tri_torus(size, size);
     let lattice = |v: usize| ((v / size as usize) as f64, (v % size as usize) as f64);
-    let mut mesh = plain.clone();
+    let mut surface = plain.clone();
     let mut parameters = plain;
-    for v in 0..mesh.len() {
+    for v in 0..surface.len() {
         let (i, j) = lattice(v);
-        mesh.positions[v] = cubic(i, j);
-        parameters.positions[v] = DVec3::new(i, j, 0.0);
+        surface.positions_mut()[v] = cubic(i, j);
+        parameters.positions_mut()[v] = DVec3::new(i, j, 0.0);
     }
     let mut seen = 0;
     for steps in 1..=2 {
-        let fine = Refinement::LabsikGreiner.refine_n(&mesh, steps).unwrap();
+        let fine = Refinement::LabsikGreiner.refine_n(&surface, steps).unwrap();
         // Linear functions are reproduced, so the parameters tell where a new point belongs: away from the seam.
         let places = Refinement::LabsikGreiner.refine_n(&parameters, steps).unwrap();
         for (point, place) in fine.positions.iter().zip(&places.positions) {
@@ -261,21 +260,20 @@ fn the_local_matrix_has_the_eigenvalues_of_the_mask() {
 /// vectors give. A star of regular vertices, refined nowhere, in which two steps are one round.
 #[test]
 fn the_regular_tangent_mask_is_the_matrix_s() {
-    let mesh = tri_torus(14, 14);
-    let at = topology(&mesh);
+    let surface = tri_torus(14, 14);
     let matrix = SplittingMatrix::new(LocalScheme::LabsikGreiner, 6).unwrap();
     let space = matrix.eigenspaces().unwrap().into_iter().find(|s| (s.value - 1.0 / 3.0).norm() < 1e-9).unwrap();
     assert_eq!(space.multiplicity(), 2);
     let v = 14 * 7 + 7;
     let layout = LocalScheme::LabsikGreiner.layout();
-    let star = layout.walk(&mesh.faces, &at, at.incidence.corners_at(v)[0], 6, 3).unwrap();
+    let star = layout.walk(&surface, surface.incidence().corners_at(v)[0], 6, 3).unwrap();
     // Random points: the plane of the tangents is that of the subspace's two sums.
     for seed in 0..5 {
-        let mesh = scattered(mesh.clone(), seed);
-        let normal = Refinement::LabsikGreiner.limit_normals(&mesh, &at).unwrap()[v];
+        let surface = scattered(surface.clone(), seed);
+        let normal = Refinement::LabsikGreiner.limit_normals(&surface).unwrap()[v];
         let sum = |k: usize| -> DVec3 {
             let terms = star.iter().enumerate();
-            terms.map(|(i, &w)| space.left[(i, k)] * mesh.positions[w as usize]).sum()
+            terms.map(|(i, &w)| space.left[(i, k)] * surface.positions()[w as usize]).sum()
         };
         let expected = sum(0).cross(sum(1)).normalize();
         assert!(normal.cross(expected).length() < 1e-10);
@@ -286,16 +284,15 @@ fn the_regular_tangent_mask_is_the_matrix_s() {
 /// other modes shrinks by their eigenvalue.
 #[test]
 fn deep_rings_are_affine_images_of_the_characteristic_one() {
-    let first_harmonic = |mesh: &Mesh, v: u32| {
-        let topology = topology(mesh);
+    let first_harmonic = |surface: &Surface, v: u32| {
         let mut star = Vec::new();
-        topology.star(&mesh.faces, v as usize, &mut star);
-        let corners = mesh.faces.corners();
+        surface.topology().star(surface.faces(), v as usize, &mut star);
+        let corners = surface.faces().corners();
         let ring: Vec<DVec3> = star
             .iter()
             .map(|&c| {
                 let next = if c % 3 == 2 { c - 2 } else { c + 1 };
-                mesh.positions[corners[next as usize] as usize] - mesh.positions[v as usize]
+                surface.positions()[corners[next as usize] as usize] - surface.positions()[v as usize]
             })
             .collect();
         let n = ring.len() as f64;
@@ -312,8 +309,8 @@ fn deep_rings_are_affine_images_of_the_characteristic_one() {
         rest.fold(0.0, f64::max)
     };
     for k in [3, 4, 5, 8] {
-        let mesh = scattered(bipyramid(k), 3);
-        let levels = [4, 6].map(|l| Refinement::LabsikGreiner.refine_n(&mesh, l).unwrap());
+        let surface = scattered(bipyramid(k), 3);
+        let levels = [4, 6].map(|l| Refinement::LabsikGreiner.refined_n(&surface, l).unwrap());
         // Apices have valence k.
         let [before, after] = levels.each_ref().map(|m| first_harmonic(m, k));
         let mu = labsik_greiner::subdominant(k as usize);

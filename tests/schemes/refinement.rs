@@ -1,13 +1,15 @@
 //! The refinement steps: counts, topology, regular grids, affine maps, refused meshes, names.
 
 use glam::{DMat3, DVec3};
-use limitlab::mesh::{Faces, Mesh};
+use limitlab::mesh::validate::Boundary;
+use limitlab::mesh::{Faces, Mesh, Surface};
 use limitlab::schemes::{Class, Refinement, catmull_clark, doo_sabin, loop_scheme, sqrt3};
 
 use super::ROUNDING;
 use super::meshes::*;
+use crate::common::meshes::random_points;
 
-fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
+fn meshes_for(scheme: Refinement) -> Vec<Surface> {
     match scheme {
         Refinement::CatmullClark | Refinement::DooSabin | Refinement::MidEdge => polygon_meshes(),
         Refinement::Loop | Refinement::Sqrt3 | Refinement::Butterfly | Refinement::LabsikGreiner => triangle_meshes(),
@@ -17,34 +19,29 @@ fn meshes_for(scheme: Refinement) -> Vec<Mesh> {
 #[test]
 fn test_meshes_are_as_irregular_as_claimed() {
     let sizes: Vec<usize> =
-        polygon_meshes().iter().flat_map(|m| m.faces.iter().map(<[u32]>::len).collect::<Vec<_>>()).collect();
+        polygon_meshes().iter().flat_map(|s| s.faces().iter().map(<[u32]>::len).collect::<Vec<_>>()).collect();
     let valences: Vec<usize> = triangle_meshes()
         .iter()
-        .flat_map(|m| {
-            let incidence = topology(m).incidence;
-            (0..m.len()).map(move |v| incidence.face_count(v)).collect::<Vec<_>>()
-        })
+        .flat_map(|s| (0..s.len()).map(|v| s.incidence().face_count(v)).collect::<Vec<_>>())
         .collect();
     for k in 3..=12 {
         assert!(sizes.contains(&k) && valences.contains(&k), "{k}");
     }
-    for mesh in polygon_meshes() {
-        let euler = topology(&mesh).euler_characteristic(&mesh.faces);
-        assert_manifold(&mesh, euler);
+    for surface in polygon_meshes() {
+        let euler = surface.topology().euler_characteristic(surface.faces());
+        assert_manifold(&surface, euler);
     }
 }
 
 #[test]
 fn counts_and_topology_after_each_step() {
     for scheme in Refinement::ALL {
-        for mesh in meshes_for(scheme) {
-            let mut coarse = mesh;
+        for mut coarse in meshes_for(scheme) {
             for level in 1..=2 {
-                let old = topology(&coarse);
-                let (v, e, f) = (coarse.len(), old.edges(), coarse.faces.len());
-                let c = coarse.faces.corners().len();
-                let euler = old.euler_characteristic(&coarse.faces);
-                let fine = scheme.refine(&coarse, &old).unwrap();
+                let (v, e, f) = (coarse.len(), coarse.topology().edges(), coarse.faces().len());
+                let c = coarse.faces().corners().len();
+                let euler = coarse.topology().euler_characteristic(coarse.faces());
+                let fine = Surface::new(scheme.refine(&coarse).unwrap()).unwrap();
                 let expected = match scheme {
                     Refinement::CatmullClark => (v + e + f, c),
                     Refinement::Loop | Refinement::Butterfly => (v + e, 4 * f),
@@ -52,15 +49,14 @@ fn counts_and_topology_after_each_step() {
                     Refinement::Sqrt3 | Refinement::LabsikGreiner => (v + f, c),
                     Refinement::MidEdge => (e, f + v),
                 };
-                assert_eq!((fine.len(), fine.faces.len()), expected, "{scheme} {level}");
+                assert_eq!((fine.len(), fine.faces().len()), expected, "{scheme} {level}");
                 assert_manifold(&fine, euler);
                 match scheme {
-                    Refinement::CatmullClark => assert_eq!(fine.faces.uniform_size(), Some(4)),
+                    Refinement::CatmullClark => assert_eq!(fine.faces().uniform_size(), Some(4)),
                     Refinement::DooSabin | Refinement::MidEdge => {
-                        let incidence = topology(&fine).incidence;
-                        assert!((0..fine.len()).all(|v| incidence.face_count(v) == 4));
+                        assert!((0..fine.len()).all(|v| fine.incidence().face_count(v) == 4));
                     }
-                    _ => assert_eq!(fine.faces.uniform_size(), Some(3)),
+                    _ => assert_eq!(fine.faces().uniform_size(), Some(3)),
                 }
                 coarse = fine;
             }
@@ -74,10 +70,10 @@ fn valences_of_old_vertices_stay() {
         if scheme.class() == Class::Dual {
             continue;
         }
-        for mesh in meshes_for(scheme) {
-            let fine = scheme.refine_n(&mesh, 1).unwrap();
-            let (old, new) = (topology(&mesh).incidence, topology(&fine).incidence);
-            for v in 0..mesh.len() {
+        for surface in meshes_for(scheme) {
+            let fine = Surface::new(scheme.refine_n(&surface, 1).unwrap()).unwrap();
+            let (old, new) = (surface.incidence(), fine.incidence());
+            for v in 0..surface.len() {
                 assert_eq!(old.face_count(v), new.face_count(v), "{scheme}");
             }
         }
@@ -87,8 +83,8 @@ fn valences_of_old_vertices_stay() {
 #[test]
 fn faces_are_numbered_as_documented() {
     // The tetrahedron's base [2, 1, 0] is face 0; face 1 is [0, 1, 3], across half-edge 1 (from 1 to 0).
-    let mesh = tetrahedron();
-    let refine = |scheme: Refinement| scheme.refine_n(&mesh, 1).unwrap().faces;
+    let surface = tetrahedron();
+    let refine = |scheme: Refinement| scheme.refine_n(&surface, 1).unwrap().faces;
     assert_eq!(refine(Refinement::CatmullClark).face(1), [1, 4 + 1, 10, 4]);
     assert_eq!(refine(Refinement::Loop).face(0), [2, 4, 4 + 2]);
     assert_eq!(refine(Refinement::Loop).face(3), [4, 5, 6]);
@@ -113,9 +109,9 @@ fn affine_maps_commute_with_refinement() {
     let matrix = DMat3::from_cols_array(&[1.1, 0.2, -0.7, 0.4, -0.9, 0.3, 0.6, 0.5, 1.3]);
     let map = |p: &DVec3| matrix * *p + DVec3::new(3.0, -2.0, 1.0);
     for scheme in Refinement::ALL {
-        for mesh in meshes_for(scheme) {
-            let mapped = Mesh::new(mesh.positions.iter().map(map).collect(), mesh.faces.clone());
-            let first = scheme.refine_n(&mesh, 2).unwrap();
+        for surface in meshes_for(scheme) {
+            let mapped = surface.with_positions(surface.positions().iter().map(map).collect());
+            let first = scheme.refine_n(&surface, 2).unwrap();
             let expected: Vec<DVec3> = first.positions.iter().map(map).collect();
             let found = scheme.refine_n(&mapped, 2).unwrap();
             assert!(distance(&found.positions, &expected) < ROUNDING, "{scheme}");
@@ -135,8 +131,14 @@ fn insert_knots(data: &[DVec3], even: [f64; 3], odd: [f64; 2]) -> Vec<DVec3> {
 }
 
 /// [`insert_knots`] along both directions of a torus grid.
-fn insert_knots_on_torus(mesh: &Mesh, rows: usize, columns: usize, even: [f64; 3], odd: [f64; 2]) -> Vec<Vec<DVec3>> {
-    let wide: Vec<Vec<DVec3>> = mesh.positions.chunks(columns).map(|row| insert_knots(row, even, odd)).collect();
+fn insert_knots_on_torus(
+    positions: &[DVec3],
+    rows: usize,
+    columns: usize,
+    even: [f64; 3],
+    odd: [f64; 2],
+) -> Vec<Vec<DVec3>> {
+    let wide: Vec<Vec<DVec3>> = positions.chunks(columns).map(|row| insert_knots(row, even, odd)).collect();
     let mut fine = vec![vec![DVec3::ZERO; 2 * columns]; 2 * rows];
     for j in 0..2 * columns {
         let column: Vec<DVec3> = wide.iter().map(|row| row[j]).collect();
@@ -150,9 +152,9 @@ fn insert_knots_on_torus(mesh: &Mesh, rows: usize, columns: usize, even: [f64; 3
 #[test]
 fn catmull_clark_on_a_regular_grid_is_cubic_knot_insertion() {
     let (rows, columns) = (5, 6);
-    let mesh = scattered(torus(5, 6), 3);
-    let fine = catmull_clark::refine(&mesh, &topology(&mesh)).unwrap();
-    let expected = insert_knots_on_torus(&mesh, rows, columns, [0.125, 0.75, 0.125], [0.5, 0.5]);
+    let surface = scattered(torus(5, 6), 3);
+    let fine = catmull_clark::refine(&surface).unwrap();
+    let expected = insert_knots_on_torus(surface.positions(), rows, columns, [0.125, 0.75, 0.125], [0.5, 0.5]);
     for i in 0..rows {
         for j in 0..columns {
             // The first corner's quad: (2i, 2j), next row, both, next column.
@@ -168,10 +170,10 @@ fn catmull_clark_on_a_regular_grid_is_cubic_knot_insertion() {
 #[test]
 fn doo_sabin_on_a_regular_grid_is_quadratic_knot_insertion() {
     let (rows, columns) = (5, 6);
-    let mesh = scattered(torus(5, 6), 4);
-    let fine = doo_sabin::refine(&mesh, &topology(&mesh)).unwrap();
+    let surface = scattered(torus(5, 6), 4);
+    let fine = doo_sabin::refine(&surface).unwrap();
     // Chaikin: (3 here + after)/4, then (here + 3 after)/4.
-    let expected = insert_knots_on_torus(&mesh, rows, columns, [0.0, 0.75, 0.25], [0.25, 0.75]);
+    let expected = insert_knots_on_torus(surface.positions(), rows, columns, [0.0, 0.75, 0.25], [0.25, 0.75]);
     for i in 0..rows {
         for j in 0..columns {
             let quad = fine.faces.face(i * columns + j);
@@ -185,55 +187,55 @@ fn doo_sabin_on_a_regular_grid_is_quadratic_knot_insertion() {
 
 #[test]
 fn steps_equal_their_masks_evaluated_face_by_face() {
-    for mesh in polygon_meshes() {
-        let fine = catmull_clark::refine(&mesh, &topology(&mesh)).unwrap();
-        for v in 0..mesh.len() {
-            let star = star(&mesh, v);
+    for surface in polygon_meshes() {
+        let fine = catmull_clark::refine(&surface).unwrap();
+        for v in 0..surface.len() {
+            let star = star(&surface, v);
             let n = star.valence as f64;
-            let expected = (n - 2.0) / n * mesh.positions[v] + (star.neighbors + star.centroids) / (n * n);
+            let expected = (n - 2.0) / n * surface.positions()[v] + (star.neighbors + star.centroids) / (n * n);
             assert!((fine.positions[v] - expected).length() < ROUNDING);
         }
         for rule in [doo_sabin::Rule::DooSabin, doo_sabin::Rule::ZhengCai] {
-            let points = doo_sabin::corner_points(&mesh, rule);
-            for (f, face) in mesh.faces.iter().enumerate() {
+            let points = doo_sabin::corner_points(surface.mesh(), rule);
+            for (f, face) in surface.faces().iter().enumerate() {
                 let m = face.len();
                 let weights = rule.circulant(m);
-                for (i, c) in mesh.faces.range(f).enumerate() {
+                for (i, c) in surface.faces().range(f).enumerate() {
                     let terms = face.iter().enumerate();
                     let expected: DVec3 =
-                        terms.map(|(j, &v)| weights[(m + j - i) % m] * mesh.positions[v as usize]).sum();
+                        terms.map(|(j, &v)| weights[(m + j - i) % m] * surface.positions()[v as usize]).sum();
                     assert!((points[c] - expected).length() < ROUNDING);
                 }
             }
         }
     }
-    for mesh in triangle_meshes() {
-        let looped = loop_scheme::refine(&mesh, &topology(&mesh)).unwrap();
-        let flipped = sqrt3::refine(&mesh, &topology(&mesh)).unwrap();
-        for v in 0..mesh.len() {
-            let star = star(&mesh, v);
+    for surface in triangle_meshes() {
+        let looped = loop_scheme::refine(&surface).unwrap();
+        let flipped = sqrt3::refine(&surface).unwrap();
+        for v in 0..surface.len() {
+            let star = star(&surface, v);
             for (fine, [a, b]) in
                 [(&looped, loop_scheme::vertex_mask(star.valence)), (&flipped, sqrt3::vertex_mask(star.valence))]
             {
-                let expected = a * mesh.positions[v] + b * star.neighbors;
+                let expected = a * surface.positions()[v] + b * star.neighbors;
                 assert!((fine.positions[v] - expected).length() < ROUNDING);
             }
         }
-        for (f, face) in mesh.faces.iter().enumerate() {
-            let points: Vec<DVec3> = face.iter().map(|&v| mesh.positions[v as usize]).collect();
+        for (f, face) in surface.faces().iter().enumerate() {
+            let points: Vec<DVec3> = face.iter().map(|&v| surface.positions()[v as usize]).collect();
             let third = (points[0] + points[1] + points[2]) / 3.0;
-            assert!((flipped.positions[mesh.len() + f] - third).length() < ROUNDING);
+            assert!((flipped.positions[surface.len() + f] - third).length() < ROUNDING);
         }
         // The middle triangle of face f holds the points of its edges; each is ⅜, ⅜, ⅛, ⅛.
-        for (f, face) in mesh.faces.iter().enumerate() {
+        for (f, face) in surface.faces().iter().enumerate() {
             for (i, &e) in looped.faces.face(4 * f + 3).iter().enumerate() {
                 let (v, w) = (face[i], face[(i + 1) % 3]);
-                let mut expected = 0.375 * (mesh.positions[v as usize] + mesh.positions[w as usize]);
-                for other in mesh.faces.iter() {
+                let mut expected = 0.375 * (surface.positions()[v as usize] + surface.positions()[w as usize]);
+                for other in surface.faces().iter() {
                     let forward = (0..3).find(|&k| (other[k], other[(k + 1) % 3]) == (v, w));
                     let backward = (0..3).find(|&k| (other[k], other[(k + 1) % 3]) == (w, v));
                     if let Some(k) = forward.or(backward) {
-                        expected += 0.125 * mesh.positions[other[(k + 2) % 3] as usize];
+                        expected += 0.125 * surface.positions()[other[(k + 2) % 3] as usize];
                     }
                 }
                 assert!((looped.positions[e as usize] - expected).length() < ROUNDING);
@@ -270,55 +272,58 @@ fn published_weights() {
 
 #[test]
 fn meshes_that_cannot_be_refined_are_refused_with_their_place() {
-    let message = |scheme: Refinement, mesh: &Mesh| {
-        let text = scheme.refine(mesh, &topology(mesh)).unwrap_err().to_string();
+    let message = |scheme: Refinement, surface: &Surface| {
+        let text = scheme.refine(surface).unwrap_err().to_string();
         assert!(!text.contains('\n'));
         text
     };
-    let mut open = tetrahedron();
-    open.faces = Faces::from_lists(open.faces.iter().take(3).map(<[u32]>::to_vec));
-    let mut lonely = tetrahedron();
-    lonely.positions.push(DVec3::X);
-    let mut turned = tetrahedron();
-    turned.faces.corners_mut().swap(0, 1);
+    let mut open = tetrahedron().into_mesh();
+    open.faces = Faces::from_lists(open.faces.iter().take(3));
+    let open = Surface::examined(open, None, Boundary::AsInterior).unwrap();
     for scheme in Refinement::ALL {
         assert!(message(scheme, &open).contains("3 boundary edges"));
-        assert!(message(scheme, &lonely).contains("vertex 4 belongs to no face"));
-        assert!(message(scheme, &turned).contains("in the same direction"));
     }
     for scheme in [Refinement::Loop, Refinement::Sqrt3, Refinement::Butterfly, Refinement::LabsikGreiner] {
         let text = message(scheme, &pyramid(5));
         assert!(text.contains("face 0 has 5 corners") && text.contains(scheme.name()));
     }
+}
 
+#[test]
+fn meshes_with_defects_are_no_surfaces() {
+    let mut lonely = tetrahedron().into_mesh();
+    lonely.positions.push(DVec3::X);
+    let mut turned = tetrahedron().into_mesh();
+    turned.faces.corners_mut().swap(0, 1);
     let digon = Mesh::new(vec![DVec3::ZERO, DVec3::X], Faces::from_lists([[0, 1]]));
-    assert!(message(Refinement::CatmullClark, &digon).contains("face 0 has 2 corners"));
-
     // Two tetrahedra that share vertex 3.
-    let mut faces = tetrahedron().faces;
-    for face in tetrahedron().faces.iter() {
+    let mut faces = tetrahedron().faces().clone();
+    for face in tetrahedron().faces().iter() {
         faces.push(&[0, 1, 2].map(|i| if face[i] == 3 { 3 } else { face[i] + 4 }));
     }
-    let pinched = scattered(Mesh::new(vec![DVec3::ZERO; 7], faces), 1);
-    for scheme in Refinement::ALL {
-        assert!(message(scheme, &pinched).contains("vertex 3 form more than one umbrella"));
-    }
-
+    let pinched = Mesh::new(random_points(7, 1), faces);
     let pillow = Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], Faces::from_lists([[0, 1, 2], [0, 2, 1]]));
-    for scheme in [Refinement::Butterfly, Refinement::LabsikGreiner] {
-        assert!(message(scheme, &pillow).contains("vertex 0 has valence 2"));
+    for (mesh, told) in [
+        (lonely, "isolated vertex (vertex 4)"),
+        (turned, "3 edges with two faces in the same direction"),
+        (digon, "face with fewer than three corners (face 0, corners: 2)"),
+        (pinched, "non-manifold vertex (vertex 3, 2 umbrellas)"),
+        (pillow, "3 vertices of valence below three (first: vertex 0, valence 2)"),
+    ] {
+        let text = Surface::new(mesh).unwrap_err().to_string();
+        assert!(text.contains(told) && !text.contains('\n'), "{text}");
     }
-    assert!(Refinement::Loop.refine_n(&pillow, 1).is_ok());
 }
 
 #[test]
 fn refine_n_repeats_the_step() {
-    let mesh = stacked(5, 12);
+    let surface = stacked(5, 12);
     for scheme in Refinement::ALL {
-        assert_eq!(scheme.refine_n(&mesh, 0).unwrap(), mesh);
-        let once = scheme.refine(&mesh, &topology(&mesh)).unwrap();
-        let twice = scheme.refine(&once, &topology(&once)).unwrap();
-        assert_eq!(scheme.refine_n(&mesh, 2).unwrap(), twice);
+        assert_eq!(scheme.refine_n(&surface, 0).unwrap(), *surface.mesh());
+        let once = Surface::new(scheme.refine(&surface).unwrap()).unwrap();
+        let twice = scheme.refine(&once).unwrap();
+        assert_eq!(scheme.refine_n(&surface, 2).unwrap(), twice);
+        assert_eq!(*scheme.refined_n(&surface, 2).unwrap().mesh(), twice);
     }
 }
 
@@ -336,10 +341,9 @@ fn names_read_back_and_unknown_ones_list_all() {
 /// Thall Eq. 22: the old vertices from their new neighbours alone.
 #[test]
 fn catmull_clark_in_place_is_the_usual_step() {
-    for mesh in polygon_meshes() {
-        let topology = topology(&mesh);
-        let usual = catmull_clark::refine(&mesh, &topology).unwrap();
-        let in_place = catmull_clark::refine_in_place(mesh, &topology).unwrap();
+    for surface in polygon_meshes() {
+        let usual = catmull_clark::refine(&surface).unwrap();
+        let in_place = catmull_clark::refine_in_place(surface).unwrap();
         assert_eq!(in_place.faces, usual.faces);
         assert!(distance(&in_place.positions, &usual.positions) < ROUNDING);
     }

@@ -1,7 +1,7 @@
 //! Every method under every scheme on both back ends: the stored matrix, and the operator without one.
 
 use limitlab::assemble::{LimitSystem, Operator};
-use limitlab::mesh::Mesh;
+use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Outcome, Setup, Stop, run};
 
@@ -58,9 +58,10 @@ fn hold(scheme: Scheme, mesh: &Mesh, explicit: &LimitSystem, free: &Operator) {
 fn every_method_under_every_scheme_runs_on_both_back_ends_alike() {
     for scheme in Scheme::ALL {
         for mesh in meshes(scheme) {
-            let topology = topology(&mesh);
-            let free = Operator::new(&mesh.faces, &topology, scheme).expect("an operator");
-            hold(scheme, &mesh, &system(&mesh, scheme), &free);
+            let surface = Surface::new(mesh).unwrap();
+            let free = Operator::new(&surface, scheme).expect("an operator");
+            let stored = LimitSystem::new(&surface, scheme).expect("a system");
+            hold(scheme, surface.mesh(), &stored, &free);
         }
     }
 }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::automatic::control_points;
-use limitlab::mesh::Mesh;
+use limitlab::mesh::Surface;
 use limitlab::schemes::{Masks, Scheme};
 use limitlab::solvers::{Outcome, Setup, Stop, run};
 
@@ -33,22 +33,22 @@ impl Masks for Neighbours {
 
 #[test]
 fn a_breakdown_is_an_outcome_that_says_where() {
-    let mesh = noisy("icosahedron");
-    let system = LimitSystem::with_masks(&mesh, &topology(&mesh), &Neighbours).unwrap();
+    let surface = Surface::new(noisy("icosahedron")).unwrap();
+    let system = LimitSystem::with_masks(&surface, &Neighbours).unwrap();
     let stop = Stop { tolerance: 1e-10, max_iterations: 100 };
-    let report = checked(&system, &mesh.positions, Setup::PcgIc0, &stop).report;
+    let report = checked(&system, surface.positions(), Setup::PcgIc0, &stop).report;
     assert_eq!((report.outcome, report.iterations), (Outcome::Breakdown, 0));
     let detail = report.detail.unwrap();
     assert!(detail.contains("vertex 0") && detail.contains("pivot"), "{detail}");
     // M is indefinite, which conjugate gradients find out or live with: never a false claim.
     for setup in [Setup::Cg, Setup::PlainCg] {
-        let report = checked(&system, &mesh.positions, setup, &stop).report;
+        let report = checked(&system, surface.positions(), setup, &stop).report;
         assert!(matches!(report.outcome, Outcome::Breakdown | Outcome::Converged), "{:?}", report.outcome);
     }
     // Cholesky wants positive pivots, LDLᵀ and LU do not.
-    let report = checked(&system, &mesh.positions, Setup::Cholesky, &stop).report;
+    let report = checked(&system, surface.positions(), Setup::Cholesky, &stop).report;
     assert_eq!(report.outcome, Outcome::Singular);
-    let report = checked(&system, &mesh.positions, Setup::Lu, &stop).report;
+    let report = checked(&system, surface.positions(), Setup::Lu, &stop).report;
     assert_eq!(report.outcome, Outcome::Converged);
 }
 
@@ -144,18 +144,18 @@ fn the_smallest_mesh_is_solved_by_every_method() {
 /// Squares of such lengths vanish or overflow: whatever a run tells, it is not that the start solves the system.
 #[test]
 fn lengths_whose_squares_are_lost_never_converge() {
-    let mesh = noisy("icosphere:1");
-    let system = system(&mesh, Scheme::Loop);
-    let order = reversed(mesh.len());
+    let surface = Surface::new(noisy("icosphere:1")).unwrap();
+    let system = LimitSystem::new(&surface, Scheme::Loop).unwrap();
+    let order = reversed(surface.len());
     for unit in [1e-300, 1e-170, 1e-160, 1e155, 1e300] {
-        let points: Vec<DVec3> = mesh.positions.iter().map(|p| unit * *p).collect();
+        let points: Vec<DVec3> = surface.positions().iter().map(|p| unit * *p).collect();
         let stop = Stop { tolerance: 1e-10 * unit, max_iterations: 300 };
         for (name, setup) in all(&system, &order) {
             let report = run(&system, &points, setup, &stop).report;
             let told = !report.history.iter().any(|e| e.max <= stop.tolerance);
             assert!(report.outcome != Outcome::Converged && told, "{name} at {unit:e}: {report:?}");
         }
-        let found = control_points(&Mesh::new(points, mesh.faces.clone()), None, Scheme::Loop, &stop).unwrap();
+        let found = control_points(&surface.with_positions(points), Scheme::Loop, &stop).unwrap();
         assert_ne!(found.report.outcome, Outcome::Converged, "{unit:e}");
     }
 }

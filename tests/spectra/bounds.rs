@@ -10,7 +10,7 @@ use limitlab::analysis::spectrum::{Operator, Source, ends, mesh_ends};
 use limitlab::analysis::{comparison, dense};
 use limitlab::assemble::Operator as MatrixFree;
 use limitlab::mesh::noise::add_noise;
-use limitlab::mesh::{Mesh, Topology, builtin};
+use limitlab::mesh::{Surface, builtin};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, Outcome, Setup, Stop, run};
 
@@ -26,10 +26,9 @@ fn a_regular_grid_attains_its_bounds_at_once() {
 }
 
 /// The interval, the spectrum of A or D⁻¹A, and what valences prove of its lower end.
-fn intervals(mesh: &Mesh, scheme: Scheme) -> [(limitlab::analysis::interval::Interval, f64, f64, f64); 2] {
-    let topology = Topology::new(&mesh.faces, mesh.len());
-    let operator = MatrixFree::new(&mesh.faces, &topology, scheme).expect("a closed mesh");
-    let exact = mesh_ends(mesh, &topology, scheme).expect("values").spectrum();
+fn intervals(surface: &Surface, scheme: Scheme) -> [(limitlab::analysis::interval::Interval, f64, f64, f64); 2] {
+    let operator = MatrixFree::new(surface, scheme).expect("an operator");
+    let exact = mesh_ends(surface, scheme).expect("values").spectrum();
     let b = operator.bounds();
     [(Operator::A, exact.a, b.lambda_min), (Operator::Jacobi, exact.jacobi, b.jacobi_lambda_min)].map(
         |(which, exact, bound)| {
@@ -41,8 +40,8 @@ fn intervals(mesh: &Mesh, scheme: Scheme) -> [(limitlab::analysis::interval::Int
 
 #[test]
 fn cheap_intervals_are_proven_above_and_sharp_below() {
-    for (name, mesh, scheme, _) in random_systems(120) {
-        for (found, min, max, bound) in intervals(&mesh, scheme) {
+    for (name, surface, scheme, _) in random_systems(120) {
+        for (found, min, max, bound) in intervals(&surface, scheme) {
             assert!(max <= found.high + 1e-12, "{name}: {found:?} {max}");
             // Small meshes are their own sample.
             assert!(found.least >= min - 1e-12, "{name}: {found:?} {min}");
@@ -60,7 +59,8 @@ fn cheap_intervals_are_proven_above_and_sharp_below() {
         ("quad-sphere:6", Scheme::CatmullClark),
         ("torus:200x200", Scheme::CatmullClark),
     ] {
-        for (found, min, max, _) in intervals(&named(name), scheme) {
+        let surface = Surface::new(named(name)).expect("a closed mesh");
+        for (found, min, max, _) in intervals(&surface, scheme) {
             assert!(max <= found.high * (1.0 + 1e-12) && found.high < 1.06 * max, "{name}: {found:?} {max}");
             assert!(min <= found.least * (1.0 + 1e-9) && found.least < 1.03 * min, "{name}: {found:?} {min}");
             assert!(found.low <= min * (1.0 + 1e-12), "{name}: {found:?} {min}");
@@ -71,8 +71,7 @@ fn cheap_intervals_are_proven_above_and_sharp_below() {
 #[test]
 fn elements_prove_at_least_what_valences_do() {
     let mut better = 0;
-    for (name, mesh, scheme, system) in random_systems(120) {
-        let topology = Topology::new(&mesh.faces, mesh.len());
+    for (name, surface, scheme, system) in random_systems(120) {
         let all = dense::eigenvalues(&system).expect("small");
         let b = system.bounds;
         let last = all.a.len() - 1;
@@ -82,7 +81,7 @@ fn elements_prove_at_least_what_valences_do() {
             (Operator::Jacobi, End::Lowest, b.jacobi_lambda_min, all.jacobi[0]),
             (Operator::Jacobi, End::Highest, b.jacobi_lambda_max, all.jacobi[last]),
         ] {
-            let bound = element_bound(&mesh.faces, &topology, scheme, operator, end).expect("closed");
+            let bound = element_bound(&surface, scheme, operator, end).expect("closed");
             let outwards = match end {
                 End::Lowest => -1.0,
                 End::Highest => 1.0,
@@ -98,7 +97,7 @@ fn elements_prove_at_least_what_valences_do() {
 #[test]
 fn proven_bounds_hold_on_hundreds_of_random_meshes() {
     let mut tried = 0;
-    for (name, mesh, scheme, system) in random_systems(260) {
+    for (name, surface, scheme, system) in random_systems(260) {
         let all = dense::eigenvalues(&system).expect("small");
         let b = system.bounds;
         let slack = 1e-12;
@@ -117,8 +116,7 @@ fn proven_bounds_hold_on_hundreds_of_random_meshes() {
         let promise = Promise::new(&system.bounds);
         assert!(promise.safe_omega_jacobi >= 0.5 - slack);
         // The detective's theory against the numbers.
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        let verdict = Singularity::detect(&mesh, &topology, scheme);
+        let verdict = Singularity::detect(&surface, scheme);
         let zeros = all.a.iter().filter(|l| l.abs() < 1e-10).count();
         assert_eq!(verdict.kernel_dimension(), zeros, "{name}");
         tried += 1;
@@ -129,7 +127,8 @@ fn proven_bounds_hold_on_hundreds_of_random_meshes() {
 #[test]
 fn promised_counts_are_kept_by_runs() {
     let mut tight = 0;
-    for (name, mut mesh, _, system) in random_systems(60) {
+    for (name, surface, _, system) in random_systems(60) {
+        let mut mesh = surface.into_mesh();
         add_noise(&mut mesh, 0.1, 5);
         let tolerance = 1e-8 * mesh.diagonal();
         let promise = Promise::new(&system.bounds);

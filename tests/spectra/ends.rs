@@ -7,7 +7,8 @@ use limitlab::analysis::eigen::{End, Request, extreme};
 use limitlab::analysis::singularity::modes;
 use limitlab::analysis::spectrum::{Operator, ends, mesh_ends, symmetric};
 use limitlab::analysis::valence_study::{regular_band, valence_study};
-use limitlab::mesh::{Faces, Mesh, Topology, builtin, generate};
+use limitlab::assemble::LimitSystem;
+use limitlab::mesh::{Faces, Mesh, Surface, builtin, generate};
 use limitlab::schemes::Scheme;
 
 #[test]
@@ -131,12 +132,13 @@ fn brackets_hold_the_ends_and_count_them() {
             meshes.push(("together", torus_with_defects(scheme, 42, 2)));
         }
         for (kind, mesh) in meshes {
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            assert!(topology.is_closed() && topology.euler_characteristic(&mesh.faces) == 0);
-            let all = dense::full_eigenvalues(&assemble(&mesh, scheme)).expect("below the limit");
+            let surface = Surface::new(mesh).expect("a closed mesh");
+            assert_eq!(surface.topology().euler_characteristic(surface.faces()), 0);
+            let system = LimitSystem::new(&surface, scheme).expect("a system");
+            let all = dense::full_eigenvalues(&system).expect("below the limit");
             for (operator, values) in [(Operator::A, &all.a), (Operator::Jacobi, &all.jacobi)] {
                 for end in [End::Lowest, End::Highest] {
-                    let found = bracket(&mesh.faces, &topology, scheme, operator, end, 1e-9).expect("finite numbers");
+                    let found = bracket(&surface, scheme, operator, end, 1e-9).expect("finite numbers");
                     let Some(found) = found else { continue };
                     closed.push((scheme, kind, operator, end, found.width));
                     let name = format!("{scheme}, {kind}, {operator:?} {end:?}: {found:?}");
@@ -177,10 +179,11 @@ fn ends_of_meshes_have_the_multiplicities_of_dense_eigenvalues() {
     ];
     let mut counted = 0;
     for (name, mesh, scheme) in meshes {
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        let found = mesh_ends(&mesh, &topology, scheme).expect("values");
+        let surface = Surface::new(mesh).expect("a closed mesh");
+        let found = mesh_ends(&surface, scheme).expect("values");
         assert!(found.converged(), "{name}: {found:?}");
-        let all = dense::full_eigenvalues(&assemble(&mesh, scheme)).expect("below the limit");
+        let system = LimitSystem::new(&surface, scheme).expect("a system");
+        let all = dense::full_eigenvalues(&system).expect("below the limit");
         for (estimate, values, lowest) in [
             (found.lambda_min, &all.a, true),
             (found.lambda_max, &all.a, false),
@@ -204,14 +207,12 @@ fn ends_of_meshes_have_the_multiplicities_of_dense_eigenvalues() {
 #[test]
 fn a_cluster_of_eight_on_a_sphere_of_quads() {
     // Held against a block iteration on the whole mesh.
-    let mesh = named("quad-sphere:7");
-    let topology = Topology::new(&mesh.faces, mesh.len());
+    let surface = Surface::new(named("quad-sphere:7")).expect("a closed mesh");
     let scheme = Scheme::CatmullClark;
-    let found = bracket(&mesh.faces, &topology, scheme, Operator::A, End::Lowest, 1e-9)
-        .expect("finite numbers")
-        .expect("eight corners");
+    let found =
+        bracket(&surface, scheme, Operator::A, End::Lowest, 1e-9).expect("finite numbers").expect("eight corners");
     assert_eq!((found.multiplicity, found.patches, found.kinds), (8, 8, 1));
-    let system = assemble(&mesh, scheme);
+    let system = LimitSystem::new(&surface, scheme).expect("a system");
     let request = Request { end: End::Lowest, count: 9, tolerance: 1e-10, spectrum: (0.0, 1.0) };
     let pairs = extreme(&symmetric(&system, Operator::A), &request).expect("large enough");
     for v in &pairs.values[..8] {

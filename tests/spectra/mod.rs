@@ -8,13 +8,13 @@ mod singular;
 mod sweeps;
 
 use limitlab::assemble::LimitSystem;
-use limitlab::mesh::{Mesh, Topology, builtin, generate};
+use limitlab::mesh::{Mesh, Surface, builtin, generate};
 use limitlab::schemes::Scheme;
 use std::f64::consts::TAU;
 
 fn assemble(mesh: &Mesh, scheme: Scheme) -> LimitSystem {
-    let topology = Topology::new(&mesh.faces, mesh.len());
-    LimitSystem::new(mesh, &topology, scheme).expect("a closed mesh")
+    let surface = Surface::new(mesh.clone()).expect("a closed mesh");
+    LimitSystem::new(&surface, scheme).expect("a system")
 }
 
 fn named(name: &str) -> Mesh {
@@ -43,17 +43,17 @@ fn torus(scheme: Scheme, n: usize, m: usize) -> Mesh {
 }
 
 /// Meshes of all kinds, small enough for dense eigenvalues.
-fn random_systems(count: u64) -> impl Iterator<Item = (String, Mesh, Scheme, LimitSystem)> {
+fn random_systems(count: u64) -> impl Iterator<Item = (String, Surface, Scheme, LimitSystem)> {
     (0..count).flat_map(|seed| {
-        let triangles = generate::random_triangulation(seed);
-        let polygons = generate::random_polygons(seed);
+        let triangles = Surface::new(generate::random_triangulation(seed)).expect("a closed mesh");
+        let polygons = Surface::new(generate::random_polygons(seed)).expect("a closed mesh");
         Scheme::ALL.into_iter().filter_map(move |scheme| {
-            let mesh = if scheme.needs_triangles() { triangles.clone() } else { polygons.clone() };
-            if mesh.len() > 260 {
+            let surface = if scheme.needs_triangles() { triangles.clone() } else { polygons.clone() };
+            if surface.len() > 260 {
                 return None;
             }
-            let system = assemble(&mesh, scheme);
-            Some((format!("{scheme}, seed {seed}"), mesh, scheme, system))
+            let system = LimitSystem::new(&surface, scheme).expect("a system");
+            Some((format!("{scheme}, seed {seed}"), surface, scheme, system))
         })
     })
 }

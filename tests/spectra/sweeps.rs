@@ -5,7 +5,8 @@ use glam::DVec3;
 use limitlab::analysis::dense;
 use limitlab::analysis::order_study::{self, gauss_southwell, order_study, random_spread};
 use limitlab::analysis::radius::spectral_radius;
-use limitlab::mesh::Topology;
+use limitlab::assemble::LimitSystem;
+use limitlab::mesh::Surface;
 use limitlab::mesh::noise::add_noise;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::gauss_seidel::sweep;
@@ -39,18 +40,18 @@ fn spectral_radii_of_sweeps_agree_with_dense_ones() {
 fn greedy_and_ordered_sweeps_solve_the_same_system() {
     let mut mesh = named("irregular-quad:400");
     add_noise(&mut mesh, 0.1, 1);
-    let topology = Topology::new(&mesh.faces, mesh.len());
+    let surface = Surface::new(mesh).expect("a closed mesh");
     for scheme in [Scheme::CatmullClark, Scheme::Nasri, Scheme::ZhengCai] {
-        let system = assemble(&mesh, scheme);
-        let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 2000 };
-        let greedy = gauss_southwell(&system, &mesh.positions, &stop);
+        let system = LimitSystem::new(&surface, scheme).expect("a system");
+        let stop = Stop { tolerance: 1e-10 * surface.diagonal(), max_iterations: 2000 };
+        let greedy = gauss_southwell(&system, surface.positions(), &stop);
         assert_eq!(greedy.outcome, Outcome::Converged);
         assert!(greedy.max_error <= 1.01 * stop.tolerance);
-        let direct = run(&system, &mesh.positions, Setup::Cholesky, &stop).points;
+        let direct = run(&system, surface.positions(), Setup::Cholesky, &stop).points;
         for (a, b) in greedy.points.iter().zip(&direct) {
-            assert!(a.distance(*b) < 1e-6 * mesh.diagonal());
+            assert!(a.distance(*b) < 1e-6 * surface.diagonal());
         }
-        let rows = order_study(&mesh, &topology, &system, &[1.0], 5, &stop).expect("rows");
+        let rows = order_study(&surface, &system, &[1.0], 5, &stop).expect("rows");
         assert_eq!(rows.len(), 7 + 5 + 1);
         assert!(rows.iter().all(|r| r.outcome == Outcome::Converged));
         let spread = random_spread(&rows, 1.0).expect("five random orders");

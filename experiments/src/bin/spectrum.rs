@@ -151,7 +151,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             }
             None => {
                 let input = arguments.mesh.input(name, &arguments.common)?;
-                (input.subject(), analyse(&input, arguments)?, input.mesh.len())
+                (input.subject(), analyse(&input, arguments)?, input.surface.len())
             }
         };
         let out = &arguments.output.out;
@@ -242,16 +242,16 @@ fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
     // Only some of what can be asked for needs entries.
     let explicit = arguments.full || !arguments.no_sweeps || arguments.modes > 0 || arguments.certify;
     let system = explicit.then(|| input.system()).transpose()?;
-    let (mesh, topology) = (&input.mesh, input.topology());
-    let operator =
-        limitlab::assemble::Operator::new(&mesh.faces, topology, input.scheme).map_err(|e| input.named(e))?;
+    let surface = &input.surface;
+    let mesh = surface.mesh();
+    let operator = limitlab::assemble::Operator::new(surface, input.scheme).map_err(|e| input.named(e))?;
     let progress = Progress::new(&input.name, 5, arguments.common.quiet);
     let parts = Parts {
         name: &input.name,
         bounds: operator.bounds(),
-        verdict: Some(Singularity::detect(mesh, topology, input.scheme)),
+        verdict: Some(Singularity::detect(surface, input.scheme)),
         stop: input.stop(&arguments.stop),
-        ends: &|| mesh_ends(mesh, topology, input.scheme),
+        ends: &|| mesh_ends(surface, input.scheme),
     };
     analyse_any(system.as_ref(), &operator, &mesh.positions, parts, &progress, arguments).map_err(|e| input.named(e))
 }

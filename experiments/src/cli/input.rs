@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 use std::path::Path;
-use std::sync::OnceLock;
 use std::time::Instant;
 
 use clap::Args;
@@ -12,12 +11,12 @@ use serde_json::{Value, json};
 use super::{CommonFlags, StopFlags};
 use limitlab::assemble::LimitSystem;
 use limitlab::error::{Error, Result, short};
-use limitlab::interpolate::automatic::{Renumbered, renumbered, require_memory};
+use limitlab::interpolate::automatic::require_memory;
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::io::{self, Loaded, has_mesh_ending};
-use limitlab::mesh::noise::{Noise, add_noise};
-use limitlab::mesh::validate::{Boundary, Validation, validate};
-use limitlab::mesh::{Mesh, Topology, bounding_box, builtin};
+use limitlab::mesh::noise::{Noise, move_vertices};
+use limitlab::mesh::validate::{Boundary, validate};
+use limitlab::mesh::{Surface, bounding_box, builtin};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::Stop;
 
@@ -45,11 +44,9 @@ pub struct Input {
     /// The name, with the noise if there is any: for tables and plots.
     pub label: String,
     /// Its positions are given in [`frame`](Self::frame).
-    pub mesh: Mesh,
+    pub surface: Surface,
     /// Where the file's own points lie: all lengths of this mesh times [`Frame::scale`] are in mesh units.
     pub frame: Frame,
-    topology: OnceLock<Topology>,
-    renumbered: Option<(Renumbered, Topology)>,
     pub scheme: Scheme,
     /// Reading the file or making the built-in mesh.
     pub read_seconds: f64,
@@ -108,7 +105,8 @@ impl MeshFlags {
         }
         let mut results = Vec::with_capacity(names.len());
         for name in names {
-            results.push(self.report(&self.loaded(name.as_ref(), common)?).0);
+            let loaded = self.loaded(name.as_ref(), common)?;
+            results.push(validate(&loaded.mesh, numbers(&loaded.lines), self.boundary));
         }
         super::print_results(&results)?;
         Ok(true)
@@ -134,27 +132,20 @@ impl MeshFlags {
         let loaded = self.loaded(name, common)?;
         let read_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let (report, renumbered) = self.report(&loaded);
-        for remark in &report.remarks {
+        let Loaded { mesh, lines, .. } = loaded;
+        let mut surface = Surface::examined(mesh, numbers(&lines), self.boundary).map_err(|report| {
+            report.remarks.iter().for_each(|remark| common.remark(format_args!("{name}: {remark}")));
+            Error::mesh(name, report.summary_line())
+        })?;
+        for remark in surface.remarks() {
             common.remark(format_args!("{name}: {remark}"));
         }
-        let found = report.into_topology(name)?;
-        let Loaded { mut mesh, lines, .. } = loaded;
-        let frame = self.place(&mut mesh).map_err(|(v, what)| {
+        let frame = self.place(&mut surface).map_err(|(v, what)| {
             let line = lines.as_ref().map_or_else(String::new, |l| format!(", line {}", l.vertices[v]));
             Error::mesh(name, format!("vertex {v}{line}: {what}"))
         })?;
-        let (topology, renumbered) = match renumbered {
-            Some(mut renumbered) => {
-                if self.noise.is_some() || !frame.is_identity() {
-                    renumbered.mesh.positions = renumbered.numbering.there(&mesh.positions);
-                }
-                (OnceLock::new(), Some((renumbered, found)))
-            }
-            None => (OnceLock::from(found), None),
-        };
         let scheme = self.scheme.unwrap_or_else(|| {
-            let scheme = Scheme::default_for(&mesh.faces);
+            let scheme = Scheme::default_for(surface.faces());
             common.remark(format_args!("{name}: scheme {scheme} (choose with --scheme)"));
             scheme
         });
@@ -165,10 +156,8 @@ impl MeshFlags {
         Ok(Input {
             name: name.to_owned(),
             label,
-            mesh,
+            surface,
             frame,
-            topology,
-            renumbered,
             scheme,
             read_seconds,
             check_seconds: start.elapsed().as_secs_f64(),
@@ -176,36 +165,26 @@ impl MeshFlags {
     }
 
     /// Adds the noise to the points of a valid mesh, and takes them to their frame; or a vertex, and what is wrong there.
-    fn place(&self, mesh: &mut Mesh) -> std::result::Result<Frame, (usize, String)> {
+    fn place(&self, surface: &mut Surface) -> std::result::Result<Frame, (usize, String)> {
         if let Some(noise) = self.noise {
-            add_noise(mesh, noise.amplitude, noise.seed);
-            if let Some(v) = mesh.positions.iter().position(|p| !p.is_finite()) {
+            move_vertices(surface, noise.amplitude, noise.seed);
+            if let Some(v) = surface.positions().iter().position(|p| !p.is_finite()) {
                 return Err((v, format!("--noise {noise} moves it beyond the largest double: choose a smaller one")));
             }
         }
-        let frame = Frame::of(&mesh.positions).map_err(|v| {
+        let frame = Frame::of(surface.positions()).map_err(|v| {
             let what = "a coordinate is more than 10^300 times smaller than the largest of the mesh, and doubles cannot \
                         hold both: correct it, or set it to 0";
             (v, what.to_owned())
         })?;
-        frame.enter(&mut mesh.positions);
+        frame.enter(surface.positions_mut());
         Ok(frame)
     }
+}
 
-    /// The validator's report on a loaded mesh, or on this mesh renumbered.
-    fn report(&self, loaded: &Loaded) -> (Validation, Option<Renumbered>) {
-        let mesh = &loaded.mesh;
-        if let Some(moved) = renumbered(mesh) {
-            // Looking for what is not there is many times faster on a renumbered copy. What is there needs the
-            // file's own numbers.
-            let report = validate(&moved.mesh, None, self.boundary);
-            if report.is_valid() && report.remarks.is_empty() {
-                return (report, Some(moved));
-            }
-        }
-        let lines = loaded.lines.as_ref().map(|l| (l.vertices.as_slice(), l.faces.as_slice()));
-        (validate(mesh, lines, self.boundary), None)
-    }
+/// The lines of vertices and faces.
+fn numbers(lines: &Option<io::Lines>) -> Option<(&[u32], &[u32])> {
+    lines.as_ref().map(|l| (l.vertices.as_slice(), l.faces.as_slice()))
 }
 
 /// A name with hyphens for what does not belong in the names of files.
@@ -226,27 +205,17 @@ pub(super) fn all_fields(mut object: Value, fields: Value) -> Value {
 }
 
 impl Input {
-    /// The topology of the mesh; found when it is first asked for, if the validator looked at a renumbered mesh.
-    pub fn topology(&self) -> &Topology {
-        self.topology.get_or_init(|| Topology::new(&self.mesh.faces, self.mesh.len()))
-    }
-
-    /// The mesh along a space-filling curve and the topology of that, where the file is scattered.
-    pub fn renumbered(&self) -> Option<(&Renumbered, &Topology)> {
-        self.renumbered.as_ref().map(|(mesh, topology)| (mesh, topology))
-    }
-
     /// When iterations on this mesh stop; the tolerance is one in its frame.
     ///
     /// # Errors
     /// A relative tolerance where all points coincide.
     pub fn stop(&self, flags: &StopFlags) -> Result<Stop> {
-        flags.rule(self.mesh.diagonal(), self.frame.scale()).map_err(|what| Error::mesh(&self.name, what))
+        flags.rule(self.surface.diagonal(), self.frame.scale()).map_err(|what| Error::mesh(&self.name, what))
     }
 
     /// The points as they were given, with their noise: in mesh units.
     pub fn given_points(&self) -> Cow<'_, [DVec3]> {
-        let mut points = Cow::Borrowed(self.mesh.positions.as_slice());
+        let mut points = Cow::Borrowed(self.surface.positions());
         if !self.frame.is_identity() {
             self.frame.leave(points.to_mut());
         }
@@ -255,7 +224,7 @@ impl Input {
 
     /// The largest coordinate of the given points, in mesh units.
     fn largest_coordinate(&self) -> f64 {
-        let (lo, hi) = bounding_box(&self.mesh.positions).unwrap_or_default();
+        let (lo, hi) = bounding_box(self.surface.positions()).unwrap_or_default();
         self.frame.back(lo).abs().max(self.frame.back(hi).abs()).max_element()
     }
 
@@ -270,7 +239,7 @@ impl Input {
                 "the points lie at {} ± {}: their last digit is {digit:.1e}, the tolerance {tolerance:.1e}; results are \
                  as near as these digits allow",
                 one_digit(largest),
-                one_digit(0.5 * self.frame.scale() * self.mesh.diagonal())
+                one_digit(0.5 * self.frame.scale() * self.surface.diagonal())
             )
         })
     }
@@ -291,8 +260,8 @@ impl Input {
         let head = json!({
             "mesh": self.name,
             "scheme": self.scheme.name(),
-            "vertices": self.mesh.len(),
-            "faces": self.mesh.faces.len(),
+            "vertices": self.surface.len(),
+            "faces": self.surface.faces().len(),
         });
         all_fields(head, fields)
     }
@@ -302,7 +271,7 @@ impl Input {
     /// # Errors
     /// As [`LimitSystem::new`], with the mesh's name.
     pub fn system(&self) -> Result<LimitSystem> {
-        LimitSystem::new(&self.mesh, self.topology(), self.scheme).map_err(|e| self.named(e))
+        LimitSystem::new(&self.surface, self.scheme).map_err(|e| self.named(e))
     }
 
     /// An error of a computation with the mesh's name.

@@ -52,7 +52,7 @@ impl Input {
         Subject {
             name: self.name.clone(),
             title: format!("{} under {}", self.label, self.scheme),
-            size: format!("{} vertices, {} faces", self.mesh.len(), self.mesh.faces.len()),
+            size: format!("{} vertices, {} faces", self.surface.len(), self.surface.faces().len()),
             unit: "mesh units",
             stem: self.stem(""),
             head: self.json(json!({})),
@@ -174,8 +174,8 @@ fn of_mesh(input: &Input, stop: &StopFlags, order: Order) -> Result<Problem> {
         stop: input.stop(stop)?,
         subject: input.subject(),
         system: input.system()?,
-        points: input.mesh.positions.clone(),
-        order: order.order(&input.mesh, &input.topology().incidence),
+        points: input.surface.positions().to_vec(),
+        order: order.order(input.surface.mesh(), input.surface.incidence()),
         scale: input.frame.scale(),
     })
 }

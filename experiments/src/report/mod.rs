@@ -34,7 +34,7 @@ pub use figure::{Figure, Panel};
 pub use number::readable;
 pub use plot::LinePlot;
 pub use png::{Animation, Image};
-pub use render::{ColourMap, ColourScale, Finish, Paint, Picture, Points, Stroke, Surface, Vectors, View};
+pub use render::{ColourMap, ColourScale, Finish, Paint, Picture, Points, ShadedMesh, Stroke, Vectors, View};
 pub use series::{Rule, Series, palette};
 pub use sparsity::SparsityPlot;
 pub use table::{Cell, Column, Table};

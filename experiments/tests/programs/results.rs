@@ -6,7 +6,7 @@ use glam::DVec3;
 use limitlab::mesh::curve::is_scattered;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::order::Order;
-use limitlab::mesh::{Mesh, Topology, io};
+use limitlab::mesh::{Mesh, Surface, io};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::Method;
 use nalgebra_sparse::CsrMatrix;
@@ -135,8 +135,8 @@ fn a_file_in_random_order_is_solved_and_written_in_its_own_order() {
     let folder = tempdir().unwrap();
     // Enough vertices that the program renumbers them.
     let mesh = noisy("irregular-poly:60000");
-    let topology = Topology::new(&mesh.faces, mesh.len());
-    let order = Order::Random(3).order(&mesh, &topology.incidence);
+    let surface = Surface::new(mesh.clone()).unwrap();
+    let order = Order::Random(3).order(&mesh, surface.incidence());
     let mesh = shuffle_faces(&permute_vertices(&mesh, &order), 3);
     assert!(is_scattered(&mesh.faces));
     io::write(&folder.path().join("p.ply"), &mesh, None).unwrap();

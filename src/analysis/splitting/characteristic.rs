@@ -86,9 +86,9 @@ impl Net {
         let (layout, n) = (self.scheme.layout(), self.valence);
         let mut positions: Vec<glam::DVec3> = self.points.iter().map(|p| p.extend(0.0)).collect();
         positions.push(glam::DVec3::NAN);
-        let mesh = Mesh::new(positions, layout.closed(n, self.rings));
+        let mesh = Mesh::new(positions.clone(), layout.closed(n, self.rings));
         let reach = self.scheme.factor() * self.rings - 1;
-        let refined = Round::new(self.scheme, &mesh, n, reach)?.apply(&mesh)?;
+        let refined = Round::new(self.scheme, mesh, n, reach)?.apply(&positions)?;
         // What depends on the vertex that closes the star is NaN: keep the rings within.
         let finite = refined.iter().take_while(|p| p.is_finite()).count();
         let rings = (0..=reach).rev().find(|&r| layout.len(n, r) <= finite);

@@ -46,17 +46,18 @@ impl SplittingMatrix {
         LocalScheme::require_valence(valence)?;
         let layout = scheme.layout();
         let size = layout.len(valence, rings);
-        let mut mesh = Mesh::new(vec![DVec3::ZERO; size + 1], layout.closed(valence, rings));
-        let round = Round::new(scheme, &mesh, valence, rings)?;
+        let mut points = vec![DVec3::ZERO; size + 1];
+        let mesh = Mesh::new(points.clone(), layout.closed(valence, rings));
+        let mut round = Round::new(scheme, mesh, valence, rings)?;
         let mut entries = DMatrix::zeros(size, size);
         for first in (0..size).step_by(3) {
             let columns = 3.min(size - first);
-            mesh.positions.fill(DVec3::ZERO);
-            mesh.positions[size] = DVec3::NAN;
+            points.fill(DVec3::ZERO);
+            points[size] = DVec3::NAN;
             for axis in 0..columns {
-                mesh.positions[first + axis][axis] = 1.0;
+                points[first + axis][axis] = 1.0;
             }
-            for (row, point) in round.apply(&mesh)?.into_iter().enumerate() {
+            for (row, point) in round.apply(&points)?.into_iter().enumerate() {
                 if !point.is_finite() {
                     return Err(Error::Computation(format!(
                         "the splitting matrix of {scheme} does not close on {rings} rings: take {} or more",

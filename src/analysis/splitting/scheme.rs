@@ -7,7 +7,7 @@ use nalgebra::Complex;
 
 use super::star::Layout;
 use crate::error::{Error, Result};
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::{Mesh, Surface};
 use crate::schemes::unified_sqrt3::{self, ALPHA_RANGE};
 use crate::schemes::{catmull_clark, doo_sabin, labsik_greiner, loop_scheme, sqrt3};
 
@@ -117,17 +117,17 @@ impl LocalScheme {
         }
     }
 
-    fn step(self, mesh: &Mesh, topology: &Topology) -> Result<Mesh> {
+    fn step(self, surface: &Surface) -> Result<Mesh> {
         match self {
-            LocalScheme::CatmullClark => catmull_clark::refine(mesh, topology),
-            LocalScheme::Loop => loop_scheme::refine(mesh, topology),
-            LocalScheme::DooSabin => doo_sabin::refine(mesh, topology),
-            LocalScheme::Sqrt3 { alpha: 0.0 } => sqrt3::refine(mesh, topology),
+            LocalScheme::CatmullClark => catmull_clark::refine(surface),
+            LocalScheme::Loop => loop_scheme::refine(surface),
+            LocalScheme::DooSabin => doo_sabin::refine(surface),
+            LocalScheme::Sqrt3 { alpha: 0.0 } => sqrt3::refine(surface),
             LocalScheme::Sqrt3 { alpha } => {
-                let (mesh, _) = unified_sqrt3::refine(mesh, topology, &vec![alpha; mesh.len()])?;
+                let (mesh, _) = unified_sqrt3::refine(surface, &vec![alpha; surface.len()])?;
                 Ok(mesh)
             }
-            LocalScheme::LabsikGreiner => labsik_greiner::refine(mesh, topology),
+            LocalScheme::LabsikGreiner => labsik_greiner::refine(surface),
         }
     }
 
@@ -242,10 +242,11 @@ impl fmt::Display for LocalScheme {
     }
 }
 
-/// One round of refinement of a star, prepared: the topologies do not depend on positions.
+/// One round of refinement of a star, prepared: topologies do not depend on positions.
 pub(super) struct Round {
     scheme: LocalScheme,
-    topologies: Vec<Topology>,
+    /// The star before each step.
+    surfaces: Vec<Surface>,
     /// The star's positions in the refined mesh, by their number in the star.
     pub(super) found: Vec<u32>,
 }
@@ -254,32 +255,32 @@ impl Round {
     /// Refines `mesh`, whose half-edge 0 leaves the middle (or lies on the middle face), and looks up the positions
     /// of `rings` rings in the result. For √3 the two steps turn the star clockwise by one sector; the walk starts
     /// one sector further on, which is R.
-    pub(super) fn new(scheme: LocalScheme, mesh: &Mesh, n: usize, rings: usize) -> Result<Self> {
+    pub(super) fn new(scheme: LocalScheme, mesh: Mesh, n: usize, rings: usize) -> Result<Self> {
         let steps = if scheme.turns() { 2 } else { 1 };
-        let mut refined = mesh.clone();
+        let mut refined = Surface::of_valid(mesh);
         let mut root = 0;
-        let mut topologies = Vec::with_capacity(steps);
+        let mut surfaces = Vec::with_capacity(steps);
         for _ in 0..steps {
-            let topology = Topology::new(&refined.faces, refined.len());
-            refined = scheme.step(&refined, &topology)?;
+            let next = Surface::of_valid(scheme.step(&refined)?);
             root = scheme.root_after_step(root);
-            topologies.push(topology);
+            surfaces.push(std::mem::replace(&mut refined, next));
         }
-        let topology = Topology::new(&refined.faces, refined.len());
         if steps == 2 {
-            let turned = topology.counter_clockwise(&refined.faces, root);
+            let turned = refined.topology().counter_clockwise(refined.faces(), root);
             root = turned.ok_or_else(|| Error::Computation("the star is open".into()))?;
         }
-        let found = scheme.layout().walk(&refined.faces, &topology, root, n, rings)?;
-        Ok(Round { scheme, topologies, found })
+        let found = scheme.layout().walk(&refined, root, n, rings)?;
+        Ok(Round { scheme, surfaces, found })
     }
 
-    /// The refined positions of the star, by their number in it.
-    pub(super) fn apply(&self, mesh: &Mesh) -> Result<Vec<glam::DVec3>> {
-        let mut refined = self.scheme.step(mesh, &self.topologies[0])?;
-        for topology in &self.topologies[1..] {
-            refined = self.scheme.step(&refined, topology)?;
+    /// The refined positions of the star, by their number in it, from those before.
+    pub(super) fn apply(&mut self, positions: &[glam::DVec3]) -> Result<Vec<glam::DVec3>> {
+        let mut points: Option<Vec<glam::DVec3>> = None;
+        for surface in &mut self.surfaces {
+            surface.positions_mut().copy_from_slice(points.as_deref().unwrap_or(positions));
+            points = Some(self.scheme.step(surface)?.positions);
         }
-        Ok(self.found.iter().map(|&v| refined.positions[v as usize]).collect())
+        let points = points.unwrap_or_default();
+        Ok(self.found.iter().map(|&v| points[v as usize]).collect())
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::error::{Error, Result};
 use crate::mesh::incidence::{next_in, prev_in};
-use crate::mesh::{Faces, Topology};
+use crate::mesh::{Faces, Surface, Topology};
 
 /// How the n sectors of a star are filled. A position is (sector, i, j): i steps along the sector's first axis,
 /// then j towards its second, which is the first axis of the next sector.
@@ -168,9 +168,9 @@ impl Layout {
     ///
     /// # Errors
     /// [`Error::Computation`] if the walk meets a boundary.
-    pub fn walk(self, faces: &Faces, topology: &Topology, root: u32, n: usize, rings: usize) -> Result<Vec<u32>> {
+    pub fn walk(self, surface: &Surface, root: u32, n: usize, rings: usize) -> Result<Vec<u32>> {
         let mut found = vec![0; self.len(n, rings)];
-        let walker = Walker { faces, topology };
+        let walker = Walker { faces: surface.faces(), topology: surface.topology() };
         self.try_walk(&walker, root, n, rings, &mut found).ok_or_else(|| {
             Error::Computation(format!("the star of valence {n} has fewer than {rings} rings before a boundary"))
         })?;
@@ -267,7 +267,10 @@ impl Walker<'_> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
+    use crate::mesh::{Incidence, Mesh};
 
     const LAYOUTS: [Layout; 3] = [Layout::Triangles, Layout::Quads, Layout::QuadsAboutFace];
 
@@ -279,10 +282,9 @@ mod tests {
                     // One ring more than is walked: the outermost is not regular.
                     let faces = layout.closed(n, rings + 1);
                     let vertices = layout.len(n, rings + 1) + 1;
-                    let topology = Topology::new(&faces, vertices);
-                    assert!(topology.is_closed(), "{layout:?} {n} {rings}");
-                    assert_eq!(topology.euler_characteristic(&faces), 2);
-                    let found = layout.walk(&faces, &topology, 0, n, rings).expect("closed");
+                    let surface = Surface::new(Mesh::new(vec![DVec3::ZERO; vertices], faces)).expect("closed");
+                    assert_eq!(surface.topology().euler_characteristic(surface.faces()), 2);
+                    let found = layout.walk(&surface, 0, n, rings).expect("closed");
                     let all: Vec<u32> = (0..layout.len(n, rings) as u32).collect();
                     assert_eq!(found, all, "{layout:?} {n} {rings}");
                 }
@@ -311,12 +313,12 @@ mod tests {
         for (layout, valence) in [(Layout::Triangles, 6), (Layout::Quads, 4), (Layout::QuadsAboutFace, 4)] {
             let (n, rings) = (5, 3);
             let faces = layout.closed(n, rings);
-            let topology = Topology::new(&faces, layout.len(n, rings) + 1);
+            let incidence = Incidence::new(&faces, layout.len(n, rings) + 1);
             for v in layout.centre()..layout.len(n, rings - 1) {
-                assert_eq!(topology.incidence.face_count(v), valence, "{layout:?} {v}");
+                assert_eq!(incidence.face_count(v), valence, "{layout:?} {v}");
             }
             if layout.centre() == 1 {
-                assert_eq!(topology.incidence.face_count(0), n);
+                assert_eq!(incidence.face_count(0), n);
             }
         }
     }

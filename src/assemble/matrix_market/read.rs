@@ -91,18 +91,18 @@ pub fn read_points(path: &Path) -> Result<Vec<DVec3>> {
 /// use limitlab::assemble::matrix_market::{read_system, write_points, write_symmetric, write_vector};
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::schemes::Scheme;
-/// use limitlab::mesh::{Topology, builtin};
+/// use limitlab::mesh::{Surface, builtin};
 /// use limitlab::output::write_file;
 ///
-/// let mesh = builtin::builtin("octahedron")?;
-/// let system = LimitSystem::new(&mesh, &Topology::new(&mesh.faces, mesh.len()), Scheme::Loop)?;
+/// let surface = Surface::new(builtin::builtin("octahedron")?)?;
+/// let system = LimitSystem::new(&surface, Scheme::Loop)?;
 /// let folder = std::env::temp_dir().join(format!("limitlab-doc-{}", std::process::id()));
 /// limitlab::output::create_dir(&folder)?;
 /// write_file(&folder.join("M.mtx"), |out| write_symmetric(&system.m, out))?;
 /// write_file(&folder.join("H.mtx"), |out| write_vector(&system.h, out))?;
-/// write_file(&folder.join("P.mtx"), |out| write_points(&mesh.positions, out))?;
+/// write_file(&folder.join("P.mtx"), |out| write_points(surface.positions(), out))?;
 /// let (read, points) = read_system(&folder)?;
-/// assert_eq!((read.a, points), (system.a, mesh.positions));
+/// assert_eq!((read.a, points.as_slice()), (system.a, surface.positions()));
 /// # std::fs::remove_dir_all(&folder).unwrap();
 /// # Ok::<(), limitlab::Error>(())
 /// ```

@@ -17,8 +17,8 @@ use super::LEVELS;
 use crate::Result;
 use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
+use crate::mesh::Surface;
 use crate::mesh::incidence::{next_in, prev_in};
-use crate::mesh::{Faces, Mesh, Topology};
 use crate::schemes::Refinement;
 
 /// How much of each energy the fairness holds.
@@ -52,8 +52,7 @@ impl Energies {
 #[derive(Clone, Debug)]
 pub struct Fairness {
     /// The mesh refined [`LEVELS`] times: the connectivity, and the positions of the plain surface.
-    pub fine: Mesh,
-    pub topology: Topology,
+    pub fine: Surface,
     /// Quadratic forms in the fine control points, on one pattern.
     pub thin_plate: Csr,
     pub membrane: Csr,
@@ -65,17 +64,15 @@ impl Fairness {
     ///
     /// # Errors
     /// As the refinement: a mesh that is not closed, or too large.
-    pub fn new(mesh: &Mesh) -> Result<Self> {
-        let fine = Refinement::CatmullClark.refine_n(mesh, LEVELS)?;
-        let topology = Topology::new(&fine.faces, fine.len());
-        let finer = Refinement::CatmullClark.refine(&fine, &topology)?;
-        let finer_topology = Topology::new(&finer.faces, finer.len());
-        let masks = StepMasks::new(&fine, &topology);
+    pub fn new(surface: &Surface) -> Result<Self> {
+        let fine = Refinement::CatmullClark.refined_n(surface, LEVELS)?;
+        let finer = Refinement::CatmullClark.refined(&fine)?;
+        let masks = StepMasks::new(&fine);
         let [thin_plate, membrane] = patch_grams();
         let mut triplets = Vec::new();
         let mut local = Vec::new();
-        for f in 0..fine.faces.len() {
-            if let Some(patch) = regular_patch(&fine.faces, &topology, f) {
+        for f in 0..fine.faces().len() {
+            if let Some(patch) = regular_patch(&fine, f) {
                 // Halving the parameters' sides: second derivatives ×4, their squares ×16, areas ×¼.
                 for (i, &row) in patch.iter().enumerate() {
                     for (j, &column) in patch.iter().enumerate() {
@@ -86,8 +83,8 @@ impl Fairness {
                 continue;
             }
             // A quarter of a fine face has the number of the corner that it lies at.
-            for quarter in fine.faces.range(f) {
-                let Some(patch) = regular_patch(&finer.faces, &finer_topology, quarter) else {
+            for quarter in fine.faces().range(f) {
+                let Some(patch) = regular_patch(&finer, quarter) else {
                     continue;
                 };
                 masks.pull_back(&patch, &mut local);
@@ -104,7 +101,7 @@ impl Fairness {
             }
         }
         let [thin_plate, membrane] = sum_triplets(fine.len(), &triplets);
-        Ok(Fairness { fine, topology, thin_plate, membrane })
+        Ok(Fairness { fine, thin_plate, membrane })
     }
 
     /// The energies of a surface, from its control points at the fine level.
@@ -127,7 +124,7 @@ impl Fairness {
     ///
     /// # Panics
     /// If the connectivity is another.
-    pub fn energies_of(&self, control: &Mesh) -> Result<Energies> {
+    pub fn energies_of(&self, control: &Surface) -> Result<Energies> {
         let fine = Refinement::CatmullClark.refine_n(control, LEVELS)?;
         Ok(self.energies(&fine.positions))
     }
@@ -183,7 +180,8 @@ const PLACES: [[usize; 4]; 4] =
     [[4 + 1, 1, 0, 4], [8 + 1, 8, 12, 12 + 1], [8 + 2, 12 + 2, 12 + 3, 8 + 3], [4 + 2, 4 + 3, 3, 2]];
 
 /// The 16 control points of face `f` if its patch is a bicubic spline: four corners of valence 4, quads all around.
-pub(super) fn regular_patch(faces: &Faces, topology: &Topology, f: usize) -> Option<[u32; 16]> {
+pub(super) fn regular_patch(surface: &Surface, f: usize) -> Option<[u32; 16]> {
+    let (faces, topology) = (surface.faces(), surface.topology());
     let corners = faces.corners();
     let range = faces.range(f);
     if range.len() != 4 {
@@ -211,23 +209,22 @@ pub(super) fn regular_patch(faces: &Faces, topology: &Topology, f: usize) -> Opt
 
 /// The Catmull-Clark step of a quad mesh as masks of single new vertices.
 struct StepMasks<'a> {
-    mesh: &'a Mesh,
-    topology: &'a Topology,
+    surface: &'a Surface,
     /// The first half-edge of every edge.
     edges: Vec<u32>,
 }
 
 impl<'a> StepMasks<'a> {
-    fn new(mesh: &'a Mesh, topology: &'a Topology) -> Self {
-        StepMasks { mesh, topology, edges: topology.edge_sides().collect() }
+    fn new(surface: &'a Surface) -> Self {
+        StepMasks { surface, edges: surface.topology().edge_sides().collect() }
     }
 
     /// Calls `add` with the old vertices and weights of new vertex `w`, numbered as the refinement numbers it.
     /// A vertex may come more than once.
     fn mask(&self, w: usize, add: &mut impl FnMut(u32, f64)) {
-        let (faces, incidence) = (&self.mesh.faces, &self.topology.incidence);
+        let (faces, incidence) = (self.surface.faces(), self.surface.incidence());
         let corners = faces.corners();
-        let (v, e) = (self.mesh.len(), self.edges.len());
+        let (v, e) = (self.surface.len(), self.edges.len());
         let mut face = |f: usize, weight: f64| {
             for &x in faces.face(f) {
                 add(x, weight / faces.face(f).len() as f64);
@@ -238,7 +235,7 @@ impl<'a> StepMasks<'a> {
         }
         if w >= v {
             let c = self.edges[w - v];
-            let sides = [Some(c), self.topology.twin(c)];
+            let sides = [Some(c), self.surface.topology().twin(c)];
             for c in sides.into_iter().flatten() {
                 face(incidence.face_of(c), 0.25);
             }
@@ -361,28 +358,28 @@ mod tests {
         for name in ["torus:4x5", "cube", "icosahedron", "irregular-poly:30", "star:7"] {
             let mut mesh = builtin::builtin(name).expect("a built-in mesh");
             noise::add_noise(&mut mesh, 0.1, 5);
-            let fairness = Fairness::new(&mesh).expect("closed");
-            let finer = Refinement::CatmullClark.refine_n(&mesh, LEVELS + 1).expect("closed");
-            let topology = Topology::new(&finer.faces, finer.len());
+            let surface = Surface::new(mesh).expect("closed");
+            let fairness = Fairness::new(&surface).expect("closed");
+            let finer = Refinement::CatmullClark.refined_n(&surface, LEVELS + 1).expect("closed");
             let grams = patch_grams();
             let mut expected = [0.0; 2];
             let mut patches = 0;
-            for f in 0..finer.faces.len() {
-                let Some(patch) = regular_patch(&finer.faces, &topology, f) else {
+            for f in 0..finer.faces().len() {
+                let Some(patch) = regular_patch(&finer, f) else {
                     continue;
                 };
                 patches += 1;
                 for (sum, gram) in expected.iter_mut().zip(&grams) {
                     for (a, row) in gram.iter().enumerate() {
-                        let p = finer.positions[patch[a] as usize];
+                        let p = finer.positions()[patch[a] as usize];
                         for (b, g) in row.iter().enumerate() {
-                            *sum += g * p.dot(finer.positions[patch[b] as usize]);
+                            *sum += g * p.dot(finer.positions()[patch[b] as usize]);
                         }
                     }
                 }
             }
-            let found = fairness.energies_of(&mesh).expect("closed");
-            assert!(patches > finer.faces.len() / 2);
+            let found = fairness.energies_of(&surface).expect("closed");
+            assert!(patches > finer.faces().len() / 2);
             assert!((found.thin_plate / (16.0 * expected[0]) - 1.0).abs() < 1e-11, "{name}");
             assert!((found.membrane / expected[1] - 1.0).abs() < 1e-11, "{name}");
         }

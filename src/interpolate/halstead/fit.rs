@@ -10,8 +10,8 @@ use crate::assemble::csr::Pattern;
 use crate::error::short;
 use crate::interpolate::normals::unit_normals;
 use crate::interpolate::zheng_cai::Constraints;
+use crate::mesh::Surface;
 use crate::mesh::incidence::{next_in, prev_in};
-use crate::mesh::{Faces, Mesh, Topology};
 use crate::parallel;
 use crate::schemes::catmull_clark::{limit_mask, tangent_constant};
 use crate::solvers::Errors;
@@ -23,7 +23,7 @@ use crate::{Error, Result};
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The control mesh two refinements below the given one; original vertices come first.
-    pub mesh: Mesh,
+    pub surface: Surface,
     pub energies: Energies,
     /// The distances of the limit points from the given ones, in mesh units, over the interpolated vertices.
     pub errors: Errors,
@@ -86,12 +86,12 @@ pub fn fit(fairness: &Fairness, points: &[DVec3], wishes: &Constraints, weights:
         None => by_points(fairness, &rings, points, &chosen, weights)?,
         Some(normals) => by_normals(fairness, &rings, points, &chosen, &normals, weights)?,
     };
-    let mesh = Mesh::new(x, fairness.fine.faces.clone());
+    let surface = fairness.fine.with_positions(x);
     let mut nothing = vec![(); chosen.len()];
     let totals = Rows::new(chosen.len()).pass_one(&mut nothing, |k, (), tally| {
         let v = chosen[k];
         let terms = rings.limits[v].iter();
-        let limit: DVec3 = terms.map(|&(j, w)| w * mesh.positions[j as usize]).sum();
+        let limit: DVec3 = terms.map(|&(j, w)| w * surface.positions()[j as usize]).sum();
         tally.error(points[v] - limit);
     });
     let size = points.iter().fold(0.0f64, |a, p| a.max(p.abs().max_element()));
@@ -106,7 +106,7 @@ pub fn fit(fairness: &Fairness, points: &[DVec3], wishes: &Constraints, weights:
             totals.errors.max
         )));
     }
-    Ok(Fit { energies: fairness.energies(&mesh.positions), mesh, errors: totals.errors })
+    Ok(Fit { energies: fairness.energies(surface.positions()), surface, errors: totals.errors })
 }
 
 /// Every component needs a point that holds it.
@@ -114,7 +114,7 @@ fn require_anchors(fairness: &Fairness, wishes: &Constraints, originals: usize) 
     if wishes.interpolated.is_none() {
         return Ok(());
     }
-    let (component, count) = fairness.topology.components(&fairness.fine.faces);
+    let (component, count) = fairness.fine.topology().components(fairness.fine.faces());
     let mut held = vec![false; count];
     for v in (0..originals).filter(|&v| wishes.is_interpolated(v)) {
         held[component[v] as usize] = true;
@@ -139,44 +139,45 @@ struct Rings {
 
 impl Rings {
     fn new(fairness: &Fairness, originals: usize) -> Self {
-        let (faces, topology) = (&fairness.fine.faces, &fairness.topology);
+        let fine = &fairness.fine;
         let mut star = Vec::new();
         let mut rings = Rings { limits: Vec::with_capacity(originals), tangents: Vec::with_capacity(originals) };
         for v in 0..originals {
-            topology.star(faces, v, &mut star);
-            rings.limits.push(limit_row(faces, topology, v, &star));
-            rings.tangents.push(tangent_rows(faces, topology, &star));
+            fine.topology().star(fine.faces(), v, &mut star);
+            rings.limits.push(limit_row(fine, v, &star));
+            rings.tangents.push(tangent_rows(fine, &star));
         }
         rings
     }
 }
 
 /// The edge neighbour and the opposite corner that a quad brings to the star of one of its corners.
-fn neighbors(faces: &Faces, topology: &Topology, c: u32) -> [u32; 2] {
-    let range = faces.range(topology.incidence.face_of(c));
+fn neighbors(surface: &Surface, c: u32) -> [u32; 2] {
+    let faces = surface.faces();
+    let range = faces.range(surface.incidence().face_of(c));
     let next = next_in(&range, c);
     debug_assert_eq!(next_in(&range, next_in(&range, next)), prev_in(&range, c));
     [next, next_in(&range, next)].map(|c| faces.corners()[c as usize])
 }
 
-fn limit_row(faces: &Faces, topology: &Topology, v: usize, star: &[u32]) -> Row {
+fn limit_row(surface: &Surface, v: usize, star: &[u32]) -> Row {
     let [own, edge, face] = limit_mask(star.len());
     let mut row = vec![(v as u32, own)];
     for &c in star {
-        let [e, f] = neighbors(faces, topology, c);
+        let [e, f] = neighbors(surface, c);
         row.extend([(e, edge), (f, face)]);
     }
     row
 }
 
-fn tangent_rows(faces: &Faces, topology: &Topology, star: &[u32]) -> [Row; 2] {
+fn tangent_rows(surface: &Surface, star: &[u32]) -> [Row; 2] {
     let n = star.len();
     let constant = tangent_constant(n);
     let angle = |j: usize| std::f64::consts::TAU * j as f64 / n as f64;
     [f64::cos, f64::sin].map(|harmonic| {
         let mut row = Vec::with_capacity(2 * n);
         for (j, &c) in star.iter().enumerate() {
-            let [e, f] = neighbors(faces, topology, c);
+            let [e, f] = neighbors(surface, c);
             let (here, next) = (harmonic(angle(j)), harmonic(angle(j + 1)));
             row.extend([(e, constant * here), (f, here + next)]);
         }

@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::energy::{Energies, Fairness};
 use crate::assemble::LimitSystem;
 use crate::interpolate::thall::normal_deviations;
-use crate::mesh::{Mesh, Topology};
+use crate::mesh::Surface;
 use crate::schemes::catmull_clark;
 use crate::solvers::{Errors, Setup, Solution, Stop, run_watched};
 use crate::{Error, Result};
@@ -35,8 +35,7 @@ pub struct Row {
 /// As [`run_watched`], and if `fairness` is not that of a mesh with the same faces or there is not one normal a
 /// vertex.
 pub fn follow(
-    mesh: &Mesh,
-    topology: &Topology,
+    surface: &Surface,
     system: &LimitSystem,
     fairness: &Fairness,
     normals: &[DVec3],
@@ -45,10 +44,10 @@ pub fn follow(
 ) -> Result<(Vec<Row>, Solution)> {
     let mut rows = Vec::new();
     let mut failure: Option<Error> = None;
-    let mut iterate = mesh.clone();
-    let solution = run_watched(system, &mesh.positions, setup, stop, &mut |step| {
-        iterate.positions.copy_from_slice(step.points);
-        match measure(&iterate, topology, fairness, normals) {
+    let mut iterate = surface.clone();
+    let solution = run_watched(system, surface.positions(), setup, stop, &mut |step| {
+        iterate.positions_mut().copy_from_slice(step.points);
+        match measure(&iterate, fairness, normals) {
             Ok((energies, deviation_max, deviation_mean)) => {
                 rows.push(Row {
                     iteration: step.iteration,
@@ -78,14 +77,9 @@ pub fn follow(
 ///
 /// # Panics
 /// As [`follow`].
-pub fn measure(
-    control: &Mesh,
-    topology: &Topology,
-    fairness: &Fairness,
-    normals: &[DVec3],
-) -> Result<(Energies, f64, f64)> {
-    let energies = fairness.energies_of(control)?;
-    let found = catmull_clark::limit_normals(control, topology)?;
+pub fn measure(surface: &Surface, fairness: &Fairness, normals: &[DVec3]) -> Result<(Energies, f64, f64)> {
+    let energies = fairness.energies_of(surface)?;
+    let found = catmull_clark::limit_normals(surface)?;
     let deviations = normal_deviations(&found, normals);
     let max = deviations.iter().copied().fold(0.0, f64::max);
     let mean = deviations.iter().sum::<f64>() / deviations.len() as f64;

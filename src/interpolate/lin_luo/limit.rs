@@ -11,8 +11,8 @@ use rayon::prelude::*;
 use super::surface::refine_n;
 use crate::analysis::splitting::Layout;
 use crate::interpolate::thall::angle;
-use crate::mesh::{Faces, Mesh, Topology};
-use crate::schemes::{Tangents, sqrt3};
+use crate::mesh::{Faces, Mesh, Surface};
+use crate::schemes::{Refinement, Tangents, sqrt3};
 use crate::{Error, Result};
 
 /// Rings about a vertex that determine the surface there.
@@ -44,34 +44,28 @@ pub struct Limits {
 /// that of the mesh refined twice, which separates the irregular vertices.
 ///
 /// # Errors
-/// As [`refine_n`]: above all an α outside [0, 2], with its vertex; a vertex of valence 2.
+/// As [`refine_n`]: above all an α outside [0, 2], with its vertex.
 ///
 /// # Panics
 /// If there is not one α a vertex.
 ///
 /// ```
 /// use limitlab::interpolate::lin_luo::limit::limits;
-/// use limitlab::mesh::builtin;
-/// let octahedron = builtin::builtin("octahedron")?;
+/// use limitlab::mesh::{Surface, builtin};
+/// let octahedron = Surface::new(builtin::builtin("octahedron")?)?;
 /// let found = limits(&octahedron, &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0])?;
-/// assert_eq!(found.positions[0], octahedron.positions[0]);
+/// assert_eq!(found.positions[0], octahedron.positions()[0]);
 /// assert!(found.positions[1].length() < 0.7);
-/// assert!(found.normals[1].distance(octahedron.positions[1]) < 0.3);
+/// assert!(found.normals[1].distance(octahedron.positions()[1]) < 0.3);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn limits(mesh: &Mesh, alpha: &[f64]) -> Result<Limits> {
-    let (fine, alpha) = refine_n(mesh, alpha, 2)?;
-    let topology = Topology::new(&fine.faces, fine.len());
-    let valence = |v: usize| topology.incidence.face_count(v);
-    if let Some(v) = (0..mesh.len()).find(|&v| valence(v) < 3) {
-        return Err(Error::Computation(format!(
-            "vertex {v} has valence {}: the limit of the unified √3 scheme is not known there; remove it",
-            valence(v)
-        )));
-    }
-    let largest = (0..mesh.len()).map(valence).max().unwrap_or(0);
+pub fn limits(surface: &Surface, alpha: &[f64]) -> Result<Limits> {
+    let (fine, alpha) = refine_n(surface, alpha, 2)?;
+    let count = surface.len();
+    let valence = |v: usize| fine.incidence().face_count(v);
+    let largest = (0..count).map(valence).max().unwrap_or(0);
     let mut present = vec![false; largest + 1];
-    for v in 0..mesh.len() {
+    for v in 0..count {
         present[valence(v)] = true;
     }
     let rounds: Vec<Option<Round>> =
@@ -81,10 +75,10 @@ pub fn limits(mesh: &Mesh, alpha: &[f64]) -> Result<Limits> {
         let Some(round) = &rounds[n] else {
             return Err(Error::Computation(format!("no star of valence {n}")));
         };
-        let root = topology.incidence.corners_at(v)[0];
-        let star = Layout::Triangles.walk(&fine.faces, &topology, root, n, RINGS)?;
-        let origin = fine.positions[v];
-        let points = star.iter().map(|&i| fine.positions[i as usize] - origin);
+        let root = fine.incidence().corners_at(v)[0];
+        let star = Layout::Triangles.walk(&fine, root, n, RINGS)?;
+        let origin = fine.positions()[v];
+        let points = star.iter().map(|&i| fine.positions()[i as usize] - origin);
         work.points.clear();
         work.points.extend(points);
         work.alpha.clear();
@@ -93,7 +87,7 @@ pub fn limits(mesh: &Mesh, alpha: &[f64]) -> Result<Limits> {
         Ok((origin + moved, normal))
     };
     let found: Vec<(DVec3, DVec3)> =
-        (0..mesh.len()).into_par_iter().map_init(Work::default, |work, v| at(v, work)).collect::<Result<_>>()?;
+        (0..count).into_par_iter().map_init(Work::default, |work, v| at(v, work)).collect::<Result<_>>()?;
     let (positions, normals) = found.into_iter().unzip();
     Ok(Limits { positions, normals })
 }
@@ -123,25 +117,23 @@ impl Round {
     fn new(n: usize) -> Result<Self> {
         let vertices = Layout::Triangles.len(n, RINGS) + 1;
         let faces = Layout::Triangles.closed(n, RINGS);
-        let mut mesh = Mesh::new(vec![DVec3::ZERO; vertices], faces);
+        let mut surface = Surface::new(Mesh::new(vec![DVec3::ZERO; vertices], faces))?;
         let mut level = || -> Result<Level> {
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            let relaxation = (0..mesh.len()).map(|v| {
-                let n = topology.incidence.face_count(v);
+            let relaxation = (0..surface.len()).map(|v| {
+                let n = surface.incidence().face_count(v);
                 let a = sqrt3::relaxation(n);
                 [a, a / n as f64]
             });
             let relaxation = relaxation.collect();
-            let next = sqrt3::refine(&mesh, &topology)?;
-            let faces = std::mem::replace(&mut mesh, next).faces;
+            let next = Refinement::Sqrt3.refined(&surface)?;
+            let faces = std::mem::replace(&mut surface, next).into_mesh().faces;
             Ok(Level { faces, relaxation })
         };
         let levels = [level()?, level()?];
         // The first half-edge stays the first, turned back by half a sector a step: one sector on it is where it was.
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        let root = topology.counter_clockwise(&mesh.faces, 0);
+        let root = surface.topology().counter_clockwise(surface.faces(), 0);
         let root = root.ok_or_else(|| Error::Computation("the star is open".into()))?;
-        let found = Layout::Triangles.walk(&mesh.faces, &topology, root, n, RINGS)?;
+        let found = Layout::Triangles.walk(&surface, root, n, RINGS)?;
         Ok(Round { levels, found })
     }
 

@@ -6,8 +6,8 @@ use glam::DVec3;
 
 use crate::Result;
 use crate::interpolate::thall::angle;
-use crate::mesh::{Mesh, Topology};
-use crate::schemes::{Refinement, unified_sqrt3};
+use crate::mesh::{Mesh, Surface};
+use crate::schemes::unified_sqrt3;
 
 /// α = 1, interpolated, at the vertices marked, and `elsewhere` at the others.
 pub fn choose(interpolated: &[bool], elsewhere: f64) -> Vec<f64> {
@@ -23,17 +23,17 @@ pub fn choose(interpolated: &[bool], elsewhere: f64) -> Vec<f64> {
 ///
 /// # Panics
 /// If there is not one α a vertex.
-pub fn refine_n(mesh: &Mesh, alpha: &[f64], levels: usize) -> Result<(Mesh, Vec<f64>)> {
-    let (mut mesh, mut alpha) = (mesh.clone(), alpha.to_vec());
-    let mut topology = Topology::new(&mesh.faces, mesh.len());
+pub fn refine_n(surface: &Surface, alpha: &[f64], levels: usize) -> Result<(Surface, Vec<f64>)> {
+    let (mut surface, mut alpha) = (surface.clone(), alpha.to_vec());
     for level in 1..=levels {
-        let (refined, parameters) = unified_sqrt3::refine(&mesh, &topology, &alpha)?;
-        if level < levels {
-            topology = Refinement::Sqrt3.refined_topology(&mesh, &topology, &refined);
-        }
-        (mesh, alpha) = (refined, parameters);
+        (surface, alpha) = if level < levels {
+            unified_sqrt3::refined(&surface, &alpha)?
+        } else {
+            let (last, parameters) = unified_sqrt3::refine(&surface, &alpha)?;
+            (Surface::of_valid(last), parameters)
+        };
     }
-    Ok((mesh, alpha))
+    Ok((surface, alpha))
 }
 
 /// The volume that a closed, outward oriented mesh encloses: Σ over triangles of p·(q × r)/6, faces of more corners
@@ -76,9 +76,10 @@ pub struct Popping {
 ///
 /// # Panics
 /// If there is not one α a vertex, or `levels` is 0.
-pub fn popping(mesh: &Mesh, alpha: &[f64], levels: usize) -> Result<Popping> {
+pub fn popping(surface: &Surface, alpha: &[f64], levels: usize) -> Result<Popping> {
     assert!(levels > 0, "at least one step");
-    let (fine, _) = refine_n(mesh, alpha, levels)?;
+    let (fine, _) = refine_n(surface, alpha, levels)?;
+    let (mesh, fine) = (surface.mesh(), fine.mesh());
     let diagonal = mesh.diagonal();
     let (mut mean, mut max) = (0.0, 0.0f64);
     for (p, q) in mesh.positions.iter().zip(&fine.positions) {
@@ -96,7 +97,7 @@ pub fn popping(mesh: &Mesh, alpha: &[f64], levels: usize) -> Result<Popping> {
     }
     let faces = mesh.faces.len() as f64;
     Ok(Popping {
-        volume_ratio: volume(&fine) / volume(mesh),
+        volume_ratio: volume(fine) / volume(mesh),
         vertex_mean: mean / mesh.len() as f64,
         vertex_max: max,
         center_mean: center_mean / faces,
@@ -110,7 +111,8 @@ pub fn popping(mesh: &Mesh, alpha: &[f64], levels: usize) -> Result<Popping> {
 ///
 /// # Panics
 /// If `topology` is not that of `mesh`, or a face is no triangle.
-pub fn largest_fold(mesh: &Mesh, topology: &Topology) -> f64 {
+pub fn largest_fold(surface: &Surface) -> f64 {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let normals: Vec<DVec3> = (mesh.faces.iter())
         .map(|face| {
             let [a, b, c] = [0, 1, 2].map(|k| mesh.positions[face[k] as usize]);

@@ -137,7 +137,7 @@ fn failed(method: &str, outcome: Outcome, why: impl std::fmt::Display) -> Failur
 mod tests {
     use super::*;
     use crate::assemble::LimitSystem;
-    use crate::mesh::{Topology, builtin};
+    use crate::mesh::{Surface, builtin};
     use crate::schemes::Scheme;
 
     /// The factors of λ times the identity.
@@ -155,8 +155,8 @@ mod tests {
     #[test]
     fn singular_begins_at_four_units_of_rounding_a_vertex() {
         for mesh in [builtin::cube(), builtin::torus(40, 30)] {
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            let system = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark).unwrap();
+            let surface = Surface::new(mesh.clone()).unwrap();
+            let system = LimitSystem::new(&surface, Scheme::CatmullClark).unwrap();
             let outcome =
                 |lambda: f64| Direct::new(&system, &mesh.positions, Multiple(lambda)).err().map(|f| f.outcome);
             let unit = mesh.len() as f64 * f64::EPSILON;

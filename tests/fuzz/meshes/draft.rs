@@ -6,7 +6,7 @@ use glam::DVec3;
 use limitlab::mesh::generate::dual;
 use limitlab::mesh::{Faces, Mesh};
 
-use super::super::surface::Surface;
+use super::super::surface::euler_if_closed;
 
 /// No further operation on drafts with more vertices.
 const MOST_VERTICES: usize = 200;
@@ -237,7 +237,7 @@ impl Draft {
 
     fn dual(&mut self) {
         let mesh = self.mesh();
-        if Surface::of(&mesh).is_closed() {
+        if euler_if_closed(&mesh).is_some() {
             let dual = dual(&mesh);
             self.vertices = dual.len();
             self.faces = dual.faces.iter().map(<[u32]>::to_vec).collect();

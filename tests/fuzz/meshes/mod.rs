@@ -11,12 +11,12 @@ use arbitrary::{Result, Unstructured};
 use glam::DVec3;
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::validate::{Boundary, validate};
-use limitlab::mesh::{Mesh, Topology};
+use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::Scheme;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::formats::writes_and_reads_back;
-use super::surface::Surface;
+use super::surface::euler_if_closed;
 use draft::Draft;
 
 /// A mesh, and what else a run is told.
@@ -66,27 +66,20 @@ impl Case {
 pub fn check(data: &[u8]) {
     let Ok(case) = Case::decode(&mut Unstructured::new(data)) else { return };
     let mesh = &case.mesh;
-    let surface = Surface::of(mesh);
+    let euler = euler_if_closed(mesh);
     let report = validate(mesh, None, Boundary::Refuse);
-    assert_eq!(report.is_valid(), surface.is_closed(), "{surface:?}: {}", report.summary_line());
-    match surface {
-        Surface::Defective => {}
-        Surface::Doubled => {
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            suitable(mesh).for_each(|scheme| systems::matrices_agree(mesh, &topology, scheme));
-        }
-        Surface::Closed { euler } => {
-            writes_and_reads_back(&Mesh { positions: case.given.clone(), ..mesh.clone() }, None);
-            let topology = report.into_topology("the mesh").unwrap();
-            refinement::keeps_surfaces(mesh, &topology, euler);
-            for scheme in suitable(mesh) {
-                systems::matrices_agree(mesh, &topology, scheme);
-                systems::solutions_agree(&case, &topology, scheme);
-            }
-            if case.refine && mesh.diagonal() > 0.0 {
-                refinement::large(&case, &topology);
-            }
-        }
+    assert_eq!(report.is_valid(), euler.is_some(), "{euler:?}: {}", report.summary_line());
+    let surface = Surface::new(mesh.clone()).ok();
+    assert_eq!(surface.is_some(), euler.is_some(), "{}", report.summary_line());
+    let Some((surface, euler)) = surface.zip(euler) else { return };
+    writes_and_reads_back(&Mesh { positions: case.given.clone(), ..mesh.clone() }, None);
+    refinement::keeps_surfaces(&surface, euler);
+    for scheme in suitable(mesh) {
+        systems::matrices_agree(&surface, scheme);
+        systems::solutions_agree(&case, &surface, scheme);
+    }
+    if case.refine && mesh.diagonal() > 0.0 {
+        refinement::large(&surface, euler, case.tolerance);
     }
 }
 

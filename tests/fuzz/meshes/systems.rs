@@ -3,12 +3,12 @@
 use glam::DVec3;
 use limitlab::assemble::{LimitSystem, Operator};
 use limitlab::interpolate::automatic::{Automatic, control_points};
+use limitlab::mesh::Surface;
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::curve::along_curve;
 use limitlab::mesh::fronts::{in_fronts, in_kinds};
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::order::{Numbering, Order};
-use limitlab::mesh::{Mesh, Topology};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::direct::SINGULAR;
 use limitlab::solvers::{Outcome, Setup, Solution, Stop, run};
@@ -25,13 +25,13 @@ const DENSE: usize = 64;
 const REGULAR: f64 = 1e-3;
 
 /// The explicit matrix = the matrix-free operator, in any order of its rows = the formulas.
-pub fn matrices_agree(mesh: &Mesh, topology: &Topology, scheme: Scheme) {
-    let n = mesh.len();
-    let plain = formulas::assemble(scheme, mesh);
+pub fn matrices_agree(surface: &Surface, scheme: Scheme) {
+    let n = surface.len();
+    let plain = formulas::assemble(scheme, surface.mesh());
     let h = &plain.h;
     let (a, m) = (plain.dense_a(), plain.dense_m());
-    let system = LimitSystem::new(mesh, topology, scheme).unwrap();
-    let operator = Operator::new(&mesh.faces, topology, scheme).unwrap();
+    let system = LimitSystem::new(surface, scheme).unwrap();
+    let operator = Operator::new(surface, scheme).unwrap();
     // Entries are sums over the faces at a vertex.
     let close = |x: f64, y: f64| (x - y).abs() <= tol::rounding(n);
     for i in 0..n {
@@ -50,19 +50,19 @@ pub fn matrices_agree(mesh: &Mesh, topology: &Topology, scheme: Scheme) {
     }
     let x = random_points(n, 1);
     let product = times(&a, &x);
-    for numbering in numberings(mesh, topology) {
+    for numbering in numberings(surface) {
         let mut seen = vec![false; n];
         numbering.order().iter().for_each(|&v| seen[v as usize] = true);
         assert!(seen.len() == n && seen.iter().all(|&seen| seen), "not a permutation");
-        let moved = Operator::in_order(&mesh.faces, topology, scheme, Some(&numbering)).unwrap();
+        let moved = Operator::in_order(surface, scheme, Some(&numbering)).unwrap();
         let there = numbering.there(&x);
         let rows: Vec<DVec3> = (0..n).map(|i| moved.row(i, &there)).collect();
         assert!(distance(&numbering.back(&rows), &product) <= tol::rounding(n), "{scheme}: rows in another order");
     }
 }
 
-fn numberings(mesh: &Mesh, topology: &Topology) -> Vec<Numbering> {
-    let (faces, incidence) = (&mesh.faces, &topology.incidence);
+fn numberings(surface: &Surface) -> Vec<Numbering> {
+    let (mesh, faces, incidence) = (surface.mesh(), surface.faces(), surface.incidence());
     let mut all = vec![in_fronts(faces, incidence), in_colours(faces, incidence)];
     all.extend(in_kinds(faces, incidence));
     all.extend(along_curve(mesh).map(|(_, numbering)| numbering));
@@ -112,15 +112,15 @@ impl Reference<'_> {
 
 /// `auto` on any number of threads = in any numbering = dense elimination, as far as the condition allows; singular is
 /// what has no inverse; no method claims what it has not reached.
-pub fn solutions_agree(case: &Case, topology: &Topology, scheme: Scheme) {
-    let mesh = &case.mesh;
+pub fn solutions_agree(case: &Case, surface: &Surface, scheme: Scheme) {
+    let mesh = surface.mesh();
     let n = mesh.len();
     let stop = Stop { tolerance: case.tolerance * mesh.diagonal(), max_iterations: 10_000 };
     if stop.tolerance == 0.0 {
         return;
     }
     let plain = formulas::assemble(scheme, mesh);
-    let system = LimitSystem::new(mesh, topology, scheme).unwrap();
+    let system = LimitSystem::new(surface, scheme).unwrap();
     let lambda_min = (n <= DENSE).then(|| plain.eigenvalues()[0]);
     let reference = Reference { scheme, points: &mesh.positions, stop, a: plain.dense_a(), system, lambda_min };
     if let Some(truth) = lambda_min {
@@ -128,9 +128,8 @@ pub fn solutions_agree(case: &Case, topology: &Topology, scheme: Scheme) {
         assert!(proven <= truth + tol::eigenvalues(n, 1.0), "{scheme}: {truth} is below the bound of {proven}");
     }
 
-    let (points, outcome) = automatic(mesh, Some(topology), scheme, &stop);
+    let (points, outcome) = automatic(surface, scheme, &stop);
     reference.check(outcome, &points, "auto");
-    assert!(automatic(mesh, None, scheme, &stop) == (points.clone(), outcome), "{scheme}: auto without a topology");
     if let Some(lambda_min) = lambda_min.filter(|&l| l >= REGULAR) {
         let slack = reference.rounding(&points) * (n as f64).sqrt() / lambda_min;
         assert!(
@@ -141,18 +140,18 @@ pub fn solutions_agree(case: &Case, topology: &Topology, scheme: Scheme) {
         let off = distance(&points, &eliminate(&reference.a, &mesh.positions));
         assert!(off <= near, "{scheme}: auto is off by {off:e}, not {near:e}");
 
-        let order = Order::Random(case.seed).order(mesh, &topology.incidence);
+        let order = Order::Random(case.seed).order(mesh, surface.incidence());
         let renumbered = shuffle_faces(&permute_vertices(mesh, &order), case.seed);
-        let (moved, _) = automatic(&renumbered, None, scheme, &stop);
+        let (moved, _) = automatic(&Surface::new(renumbered).unwrap(), scheme, &stop);
         let off = distance(&Numbering::new(order).back(&moved), &points);
         assert!(off <= 2.0 * near, "{scheme}: renumbered, auto is off by {off:e}, not {near:e}");
     }
     methods(&reference);
 }
 
-fn automatic(mesh: &Mesh, topology: Option<&Topology>, scheme: Scheme, stop: &Stop) -> (Vec<DVec3>, Outcome) {
+fn automatic(surface: &Surface, scheme: Scheme, stop: &Stop) -> (Vec<DVec3>, Outcome) {
     on_any_threads(|| {
-        let Automatic { points, report, .. } = control_points(mesh, topology, scheme, stop).unwrap();
+        let Automatic { points, report, .. } = control_points(surface, scheme, stop).unwrap();
         (points, report.outcome)
     })
 }
@@ -208,21 +207,21 @@ fn methods(reference: &Reference) {
 
 /// On a mesh of thousands of vertices: rows of the operator = rows of the explicit matrix, `auto` on any number of
 /// threads.
-pub fn large(mesh: &Mesh, topology: &Topology, scheme: Scheme, tolerance: f64) {
-    let stop = Stop { tolerance: tolerance * mesh.diagonal(), max_iterations: 1000 };
-    let system = LimitSystem::new(mesh, topology, scheme).unwrap();
-    let x = random_points(mesh.len(), 2);
+pub fn large(surface: &Surface, scheme: Scheme, tolerance: f64) {
+    let stop = Stop { tolerance: tolerance * surface.diagonal(), max_iterations: 1000 };
+    let system = LimitSystem::new(surface, scheme).unwrap();
+    let x = random_points(surface.len(), 2);
     let rows = on_any_threads(|| {
-        let operator = Operator::new(&mesh.faces, topology, scheme).unwrap();
+        let operator = Operator::new(surface, scheme).unwrap();
         (0..x.len()).map(|i| operator.row(i, &x)).collect::<Vec<DVec3>>()
     });
     let explicit: Vec<DVec3> = (0..x.len()).map(|i| system.a.row_times(i, &x)).collect();
     let off = distance(&rows, &explicit);
     assert!(off <= tol::rounding(256), "{scheme}: {off:e} between operator and matrix");
-    let (v, outcome) = automatic(mesh, Some(topology), scheme, &stop);
+    let (v, outcome) = automatic(surface, scheme, &stop);
     if outcome == Outcome::Converged {
         let reached: Vec<DVec3> = (0..v.len()).map(|i| system.a.row_times(i, &v)).collect();
-        let error = distance(&reached, &mesh.positions);
+        let error = distance(&reached, surface.positions());
         let size = v.iter().map(|p| p.length()).fold(0.0, f64::max);
         assert!(error <= stop.tolerance + tol::rounding(256) * size, "{scheme}: converged with an error of {error:e}");
     }

@@ -89,7 +89,7 @@ fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Contr
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
     let mut method = chosen.unwrap_or_else(|| automatic(solved));
     let start = Instant::now();
-    let order = arguments.order.order(&input.mesh, &input.topology().incidence);
+    let order = arguments.order.order(input.surface.mesh(), input.surface.incidence());
     let order = part.as_ref().map_or_else(|| order.clone(), |p| p.order(&order));
     let progress = Progress::toward("solving", arguments.common.quiet);
     let solve = |method: Method| -> Result<Solution> {
@@ -105,7 +105,7 @@ fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Contr
             progress.message(format!("{method}, iteration {iteration}: max error {error:.2e}"));
             ControlFlow::Continue(())
         };
-        let points = &input.mesh.positions;
+        let points = input.surface.positions();
         Ok(match &part {
             Some(part) => part.solve(&system, points, setup, &stop, watch),
             None => run_watched(&system, points, setup, &stop, watch),
@@ -140,11 +140,7 @@ fn no_progress(outcome: Outcome) -> bool {
 /// solution may exist all the same.
 fn fastest(arguments: &Arguments, input: &Input, wishes: &Wishes, stop: &Stop) -> Result<Option<Control>> {
     let progress = Progress::open("solving", arguments.common.quiet);
-    let found = match input.renumbered() {
-        Some((moved, topology)) => moved.control_points(Some(topology), input.scheme, stop),
-        None => control_points(&input.mesh, Some(input.topology()), input.scheme, stop),
-    }
-    .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
+    let found = control_points(&input.surface, input.scheme, stop).map_err(|e| input.named(e))?;
     drop(progress);
     if no_progress(found.report.outcome)
         && failed(arguments, input, wishes, &found.report, stop).unreachable().is_none()
@@ -160,7 +156,7 @@ fn fastest(arguments: &Arguments, input: &Input, wishes: &Wishes, stop: &Stop) -
         errors: found.report.last(),
         tolerance: stop.tolerance,
         seconds: Seconds {
-            assemble: input.check_seconds + found.curve_seconds + found.setup_seconds,
+            assemble: input.check_seconds + found.setup_seconds,
             solve: found.solve_seconds,
             ..Seconds::default()
         },
@@ -171,14 +167,13 @@ fn fastest(arguments: &Arguments, input: &Input, wishes: &Wishes, stop: &Stop) -
 fn by_colour(arguments: &Arguments, input: &Input, wishes: &Wishes, method: Method, stop: &Stop) -> Result<Control> {
     let start = Instant::now();
     let progress = Progress::open("solving", arguments.common.quiet);
-    let (mesh, topology) = (&input.mesh, input.topology());
-    let numbering = in_colours(&mesh.faces, &topology.incidence);
-    let operator = Operator::in_order(&mesh.faces, topology, input.scheme, Some(&numbering))
-        .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
+    let surface = &input.surface;
+    let numbering = in_colours(surface.faces(), surface.incidence());
+    let operator = Operator::in_order(surface, input.scheme, Some(&numbering)).map_err(|e| input.named(e))?;
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
     let start = Instant::now();
     let omega = if method == Method::Sor { SOR_OMEGA } else { 1.0 };
-    let points = numbering.there(&mesh.positions);
+    let points = numbering.there(surface.positions());
     let (control, report) = by_colours(&operator, &points, omega, stop);
     drop(progress);
     check(arguments, input, wishes, method, &report, stop)?;
@@ -196,31 +191,30 @@ fn by_colour(arguments: &Arguments, input: &Input, wishes: &Wishes, method: Meth
 /// Zheng & Cai's phase one by its own rule.
 fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
     let start = Instant::now();
-    let order = arguments.order.order(&input.mesh, &input.topology().incidence);
+    let order = arguments.order.order(input.surface.mesh(), input.surface.incidence());
     let phase = PhaseOne {
         sweep: Sweep::GaussSeidel(Some(&order)),
         max_iterations: arguments.shape.ite_max,
         eps: arguments.shape.eps,
     };
-    let (mesh, topology) = (&input.mesh, input.topology());
+    let surface = &input.surface;
     let marks = wishes.interpolated.as_deref();
-    let found = zheng_cai::auxiliary(mesh, topology, marks, &phase)?;
+    let found = zheng_cai::auxiliary(surface, marks, &phase)?;
     Ok(Control {
         method: "two-phase",
-        errors: limit_errors(input, marks, &found.mesh.positions)?,
-        points: found.mesh.positions,
+        errors: limit_errors(input, marks, found.surface.positions())?,
+        points: found.surface.into_mesh().positions,
         iterations: found.updates.len(),
         status: if found.passed { "converged" } else { "max-iterations" },
-        tolerance: arguments.shape.eps * mesh.diagonal(),
+        tolerance: arguments.shape.eps * surface.diagonal(),
         seconds: Seconds { assemble: input.check_seconds, solve: start.elapsed().as_secs_f64(), ..Seconds::default() },
     })
 }
 
 /// How far the limit points of control points are from those interpolated.
 fn limit_errors(input: &Input, marks: Option<&[bool]>, control: &[DVec3]) -> Result<Errors> {
-    let operator = Operator::new(&input.mesh.faces, input.topology(), input.scheme)
-        .map_err(|e| Error::mesh(&input.name, e.to_string()))?;
-    let points = &input.mesh.positions;
+    let operator = Operator::new(&input.surface, input.scheme).map_err(|e| input.named(e))?;
+    let points = input.surface.positions();
     let mut distances = vec![0.0; points.len()];
     Rows::new(points.len()).residual(&operator, points, control, &mut distances, |_, e, out, _| *out = e.length());
     let marked = distances.iter().enumerate().filter(|(v, _)| marks.is_none_or(|m| m[*v]));
@@ -236,7 +230,7 @@ fn failed(arguments: &Arguments, input: &Input, wishes: &Wishes, report: &Report
         Choice::Solver(method) => Some(method),
         _ => None,
     };
-    let system = (&input.mesh, input.topology(), input.scheme);
+    let system = (&input.surface, input.scheme);
     Failed::new(system, wishes.interpolated.as_deref(), asked, report, stop)
 }
 

@@ -216,7 +216,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         Choice::Keeping(scheme) => scheme,
         _ => input.scheme.refinement(),
     };
-    refinement.check_size(&input.mesh, arguments.shape.subdivide.into()).map_err(|e| input.named(e))?;
+    refinement.check_size(input.surface.mesh(), arguments.shape.subdivide.into()).map_err(|e| input.named(e))?;
     let wishes = Wishes::read(&arguments.shape, &input)?;
     let named = |e: Error| match e {
         Error::Computation(what) | Error::Mesh { what, .. } => Error::mesh(&input.name, what),
@@ -232,14 +232,14 @@ fn run(arguments: &Arguments) -> Result<()> {
         }
     };
     leave(&input.frame, &mut result);
-    require_finite(&input, &result.surface)?;
+    require_finite(&input, &result.made)?;
 
     let start = Instant::now();
-    let normals = result.surface.normals.as_deref();
+    let normals = result.made.normals.as_deref();
     if in_place {
         allow_replacing(&arguments.output)?;
     }
-    io::write(&arguments.output, &result.surface.mesh, normals)?;
+    io::write(&arguments.output, result.made.surface.mesh(), normals)?;
     result.seconds.write = start.elapsed().as_secs_f64();
     tell(arguments, &input, &wishes, &result)
 }

@@ -7,9 +7,8 @@ use limitlab::error::Error;
 use limitlab::interpolate::halstead::{self, Energies, Fairness, Weights, fit};
 use limitlab::interpolate::lin_luo;
 use limitlab::interpolate::normals::Rotation;
-use limitlab::interpolate::surface::{Request, Surface, surface};
+use limitlab::interpolate::surface::{Request, SurfaceMesh, surface};
 use limitlab::mesh::frame::Frame;
-use limitlab::mesh::{Mesh, Topology};
 use limitlab::schemes::Refinement;
 use limitlab::solvers::Errors;
 use limitlab_experiments::cli::Input;
@@ -20,7 +19,7 @@ use super::wishes::Wishes;
 
 pub struct Finished {
     pub method: &'static str,
-    pub surface: Surface,
+    pub made: SurfaceMesh,
     pub iterations: usize,
     pub status: &'static str,
     pub errors: Errors,
@@ -32,7 +31,6 @@ pub struct Finished {
 pub fn refine(arguments: &Arguments, input: &Input, wishes: &Wishes, control: Control) -> Result<Finished> {
     let start = Instant::now();
     let flags = &arguments.shape;
-    let mesh = Mesh::new(control.points, input.mesh.faces.clone());
     let request = Request {
         levels: flags.subdivide.into(),
         limit: flags.limit,
@@ -44,13 +42,14 @@ pub fn refine(arguments: &Arguments, input: &Input, wishes: &Wishes, control: Co
             levels: flags.normal_levels.into(),
         },
     };
-    let points = &input.mesh.positions;
-    let surface = surface(mesh, || input.topology(), input.scheme, points, &request)?;
+    let points = input.surface.positions();
+    let control_surface = input.surface.with_positions(control.points);
+    let made = surface(control_surface, input.scheme, points, &request)?;
     let mut seconds = control.seconds;
     seconds.subdivide = start.elapsed().as_secs_f64();
     Ok(Finished {
         method: control.method,
-        surface,
+        made,
         iterations: control.iterations,
         status: control.status,
         errors: control.errors,
@@ -63,12 +62,12 @@ pub fn refine(arguments: &Arguments, input: &Input, wishes: &Wishes, control: Co
 /// The fairest control mesh, and its surface.
 pub fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Finished> {
     let start = Instant::now();
-    let fairness = Fairness::new(&input.mesh)?;
+    let fairness = Fairness::new(&input.surface)?;
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
     let start = Instant::now();
     let flags = &arguments.shape;
     let weights = Weights { thin_plate: flags.thin_plate, membrane: flags.membrane };
-    let points = &input.mesh.positions;
+    let points = input.surface.positions();
     let found = fit(&fairness, points, &wishes.constraints(), weights)?;
     let solve = start.elapsed().as_secs_f64();
     let start = Instant::now();
@@ -78,10 +77,10 @@ pub fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<
         normals: flags.write_normals,
         ..Request::default()
     };
-    let surface = surface(found.mesh, || &fairness.topology, input.scheme, &[], &request)?;
+    let made = surface(found.surface, input.scheme, &[], &request)?;
     Ok(Finished {
         method: "halstead",
-        surface,
+        made,
         iterations: 1,
         status: "converged",
         errors: found.errors,
@@ -101,39 +100,34 @@ pub fn unified(arguments: &Arguments, input: &Input, alpha: &[f64]) -> Result<Fi
         ));
     }
     let start = Instant::now();
-    let (mut mesh, alpha) = lin_luo::surface::refine_n(&input.mesh, alpha, flags.subdivide.into())?;
+    let (mut surface, alpha) = lin_luo::surface::refine_n(&input.surface, alpha, flags.subdivide.into())?;
     let mut normals = None;
     if flags.limit || flags.write_normals {
-        let found = lin_luo::limit::limits(&mesh, &alpha)?;
+        let found = lin_luo::limit::limits(&surface, &alpha)?;
         normals = flags.write_normals.then_some(found.normals);
         if flags.limit {
-            mesh.positions = found.positions;
+            surface.positions_mut().copy_from_slice(&found.positions);
         }
     }
-    let surface = Surface { normals, ..Surface::plain(mesh) };
-    Ok(unsolved("lin-luo", input, surface, start))
+    let made = SurfaceMesh { normals, ..SurfaceMesh::plain(surface) };
+    Ok(unsolved("lin-luo", input, made, start))
 }
 
 /// The surface of a scheme that keeps its vertices.
 pub fn keeping(arguments: &Arguments, input: &Input, scheme: Refinement) -> Result<Finished> {
     let flags = &arguments.shape;
     let start = Instant::now();
-    let mesh = scheme.refine_n(&input.mesh, flags.subdivide.into())?;
-    let normals = if flags.write_normals {
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        Some(scheme.limit_normals(&mesh, &topology)?)
-    } else {
-        None
-    };
-    let surface = Surface { normals, ..Surface::plain(mesh) };
-    Ok(unsolved(scheme.name(), input, surface, start))
+    let surface = scheme.refined_n(&input.surface, flags.subdivide.into())?;
+    let normals = if flags.write_normals { Some(scheme.limit_normals(&surface)?) } else { None };
+    let made = SurfaceMesh { normals, ..SurfaceMesh::plain(surface) };
+    Ok(unsolved(scheme.name(), input, made, start))
 }
 
 /// A surface without a system: vertices that are interpolated stay, so their errors are 0.
-fn unsolved(method: &'static str, input: &Input, surface: Surface, start: Instant) -> Finished {
+fn unsolved(method: &'static str, input: &Input, made: SurfaceMesh, start: Instant) -> Finished {
     Finished {
         method,
-        surface,
+        made,
         iterations: 0,
         status: "converged",
         errors: Errors { max: 0.0, mean: 0.0 },
@@ -150,7 +144,7 @@ fn unsolved(method: &'static str, input: &Input, surface: Surface, start: Instan
 /// Takes what was computed in the frame of the input to mesh units.
 pub fn leave(frame: &Frame, finished: &mut Finished) {
     let unit = frame.scale();
-    frame.leave(&mut finished.surface.mesh.positions);
+    frame.leave(finished.made.surface.positions_mut());
     finished.errors = finished.errors * unit;
     finished.tolerance *= unit;
     if let Some(energies) = &mut finished.fairness {
@@ -161,15 +155,15 @@ pub fn leave(frame: &Frame, finished: &mut Finished) {
 }
 
 /// Nothing that is no number reaches a file.
-pub fn require_finite(input: &Input, surface: &Surface) -> Result<()> {
-    let normals = surface.normals.iter().flatten();
-    match surface.mesh.positions.iter().chain(normals).position(|p| !p.is_finite()) {
+pub fn require_finite(input: &Input, made: &SurfaceMesh) -> Result<()> {
+    let normals = made.normals.iter().flatten();
+    match made.surface.positions().iter().chain(normals).position(|p| !p.is_finite()) {
         None => Ok(()),
         Some(v) => Err(Error::mesh(
             &input.name,
             format!(
                 "vertex {} of the result is not finite: the points are too large for doubles; scale the mesh down",
-                v % surface.mesh.len()
+                v % made.surface.len()
             ),
         )),
     }

@@ -10,17 +10,17 @@ use super::wishes::Wishes;
 use super::{Arguments, Choice};
 
 pub fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished) -> Result<()> {
-    let Finished { surface, errors, seconds, .. } = result;
+    let Finished { made, errors, seconds, .. } = result;
     let common = &arguments.common;
-    if !surface.not_flattened.is_empty() {
+    if !made.not_flattened.is_empty() {
         common.remark(format_args!(
             "{}: the faces of {} vertices have no average normal and were moved, not flattened (first: vertex {})",
             input.name,
-            surface.not_flattened.len(),
-            surface.not_flattened[0]
+            made.not_flattened.len(),
+            made.not_flattened[0]
         ));
     }
-    let without = surface.normals.iter().flatten().filter(|n| **n == DVec3::ZERO).count();
+    let without = made.normals.iter().flatten().filter(|n| **n == DVec3::ZERO).count();
     if without > 0 {
         common.remark(format_args!(
             "{}: the surface has no normal at {without} vertices; (0, 0, 0) is written",
@@ -56,16 +56,16 @@ pub fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Fini
         "mean_error": number(errors.mean),
         "tolerance": number(result.tolerance),
         "output": arguments.output.display().to_string(),
-        "interpolated": wishes.interpolated.as_ref().map_or(input.mesh.len(), marked),
+        "interpolated": wishes.interpolated.as_ref().map_or(input.surface.len(), marked),
         "subdivide": arguments.shape.subdivide,
         "limit": arguments.shape.limit,
         "surface": {
-            "vertices": surface.mesh.len(),
-            "faces": surface.mesh.faces.len(),
+            "vertices": made.surface.len(),
+            "faces": made.surface.faces().len(),
         },
         "normals": wishes.normals.as_ref().map_or(Value::Null, |n| json!({
             "given": given(n),
-            "set": surface.normals_set,
+            "set": made.normals_set,
         })),
         "fairness": result.fairness.map_or(Value::Null, |e| json!({
             "thin_plate": number(e.thin_plate),

@@ -19,7 +19,7 @@ pub struct Wishes {
 
 impl Wishes {
     pub fn read(flags: &ShapeFlags, input: &Input) -> Result<Self> {
-        let n = input.mesh.len();
+        let n = input.surface.len();
         let marks = flags.vertices.as_deref();
         let interpolated = marks.map(|t| vertex_data::vertex_marks(t, n)).transpose().map_err(|e| match e {
             Error::Unknown(what) => Error::Unknown(format!("--vertices: {what}")),

@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
 use limitlab::Result;
 use limitlab::assemble::LimitSystem;
 use limitlab::error::Error;
 use limitlab::mesh::noise::add_noise;
-use limitlab::mesh::validate::{Boundary, validate};
-use limitlab::mesh::{Mesh, Topology, builtin, io};
+use limitlab::mesh::validate::{Boundary, Validation};
+use limitlab::mesh::{Surface, builtin, io};
 use limitlab::output::create_dir;
 use limitlab::schemes::Scheme;
 use limitlab_experiments::cli::{self, Printer, STAND_IN_NOISE};
@@ -44,8 +45,7 @@ pub struct Context {
 /// A mesh with its name for the tables.
 pub struct Subject {
     pub name: String,
-    pub mesh: Mesh,
-    pub topology: Topology,
+    pub surface: Surface,
 }
 
 impl Subject {
@@ -54,12 +54,17 @@ impl Subject {
     /// # Errors
     /// As [`LimitSystem::new`], with the mesh's name.
     pub fn system(&self, scheme: Scheme) -> Result<LimitSystem> {
-        LimitSystem::new(&self.mesh, &self.topology, scheme).map_err(|e| Error::mesh(&self.name, e.to_string()))
+        LimitSystem::new(&self.surface, scheme).map_err(|e| Error::mesh(&self.name, e.to_string()))
+    }
+
+    /// Its name and points.
+    pub fn points(&self) -> (&str, &[DVec3]) {
+        (&self.name, self.surface.positions())
     }
 
     /// Whether the scheme is defined on the mesh's faces.
     pub fn suits(&self, scheme: Scheme) -> bool {
-        scheme.first_unsuitable_face(&self.mesh.faces).is_none()
+        scheme.first_unsuitable_face(self.surface.faces()).is_none()
     }
 }
 
@@ -134,9 +139,10 @@ impl Context {
             return Err(Error::Computation(format!("{file} is a real model: run with --meshes DIR")));
         };
         let loaded = io::read(&folder.join(file))?;
-        let topology = validate(&loaded.mesh, None, boundary).into_topology(&loaded.name)?;
+        let refuse = |report: Box<Validation>| Error::mesh(&loaded.name, report.summary_line());
+        let surface = Surface::examined(loaded.mesh, None, boundary).map_err(refuse)?;
         let name = Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Subject { name, mesh: loaded.mesh, topology })
+        Ok(Subject { name, surface })
     }
 
     /// A built-in mesh with the noise of stand-ins.
@@ -146,8 +152,8 @@ impl Context {
     pub fn stand_in(&self, name: &str) -> Result<Subject> {
         let mut mesh = builtin::builtin(name)?;
         add_noise(&mut mesh, STAND_IN_NOISE.amplitude, STAND_IN_NOISE.seed);
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        Ok(Subject { name: name.to_owned(), mesh, topology })
+        let surface = Surface::new(mesh)?;
+        Ok(Subject { name: name.to_owned(), surface })
     }
 
     /// All valid closed models in order of their names, or the stand-ins `otherwise`; none with more than `most`
@@ -160,7 +166,7 @@ impl Context {
             return otherwise
                 .iter()
                 .map(|name| self.stand_in(name))
-                .filter(|s| s.as_ref().is_ok_and(|s| s.mesh.len() <= most) || s.is_err())
+                .filter(|s| s.as_ref().is_ok_and(|s| s.surface.len() <= most) || s.is_err())
                 .collect();
         };
         let closed = folder.join("closed");
@@ -174,7 +180,7 @@ impl Context {
         let mut subjects = Vec::new();
         for file in files {
             let subject = self.model(&file, Boundary::Refuse)?;
-            if subject.mesh.len() <= most {
+            if subject.surface.len() <= most {
                 subjects.push(subject);
             }
         }

@@ -6,9 +6,9 @@ use limitlab::Result;
 use limitlab::analysis::lines::{Preconditioner, Regularity, count};
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::automatic::control_points;
-use limitlab::mesh::noise::add_noise;
+use limitlab::mesh::noise::move_vertices;
 use limitlab::mesh::validate::Boundary;
-use limitlab::mesh::{Mesh, Topology, builtin};
+use limitlab::mesh::{Surface, builtin};
 use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::Stop;
 use limitlab_experiments::cli::STAND_IN_NOISE;
@@ -122,34 +122,37 @@ fn run(context: &mut Context) -> Result<()> {
     ));
     let sources: &[(&str, usize)] = if context.real() { &MODELS } else { &STAND_INS };
     for &(name, levels) in sources {
-        let mesh = if context.real() { context.model(name, Boundary::Refuse)?.mesh } else { builtin::builtin(name)? };
+        let surface = if context.real() {
+            context.model(name, Boundary::Refuse)?.surface
+        } else {
+            Surface::new(builtin::builtin(name)?)?
+        };
         // Every refinement makes four vertices of one, but for a few.
-        if !context.quick || mesh.len() << (2 * levels) <= QUICK {
-            table.push(row(name, mesh, levels)?);
+        if !context.quick || surface.len() << (2 * levels) <= QUICK {
+            table.push(row(name, &surface, levels)?);
         }
     }
     context.table(table)
 }
 
-fn row(name: &str, mesh: Mesh, levels: usize) -> Result<Vec<Cell>> {
-    let mut mesh = Refinement::CatmullClark.refine_n(&mesh, levels)?;
-    add_noise(&mut mesh, STAND_IN_NOISE.amplitude, STAND_IN_NOISE.seed);
-    let topology = Topology::new(&mesh.faces, mesh.len());
-    let system = LimitSystem::new(&mesh, &topology, Scheme::CatmullClark)?;
-    let stop = Stop { tolerance: TOLERANCE * mesh.diagonal(), max_iterations: LIMIT };
-    let points = &mesh.positions;
-    let regularity = Regularity::new(&mesh.faces, &topology);
+fn row(name: &str, coarse: &Surface, levels: usize) -> Result<Vec<Cell>> {
+    let mut surface = Refinement::CatmullClark.refined_n(coarse, levels)?;
+    move_vertices(&mut surface, STAND_IN_NOISE.amplitude, STAND_IN_NOISE.seed);
+    let system = LimitSystem::new(&surface, Scheme::CatmullClark)?;
+    let stop = Stop { tolerance: TOLERANCE * surface.diagonal(), max_iterations: LIMIT };
+    let points = surface.positions();
+    let regularity = Regularity::new(&surface);
     let preconditioner = Preconditioner::new(&system, &regularity)?;
     let scaled = |r: &[DVec3]| r.iter().zip(&system.h).map(|(r, h)| *r * *h).collect();
     let plain = count(&system, points, &stop, scaled)?;
     let lines = count(&system, points, &stop, |r| preconditioner.apply(r))?;
-    let auto = control_points(&mesh, Some(&topology), Scheme::CatmullClark, &stop)?;
+    let auto = control_points(&surface, Scheme::CatmullClark, &stop)?;
     let iterations = auto.report.iterations;
     let irregular = 1.0 - regularity.share();
     Ok(vec![
         name.trim_start_matches("closed/").trim_end_matches(".off").into(),
         levels.to_string().into(),
-        mesh.len().to_string().into(),
+        surface.len().to_string().into(),
         regularity.share().into(),
         regularity.mean_chain().into(),
         plain.kappa.into(),

@@ -122,11 +122,11 @@ fn column_name(method: Method, variant: &str) -> String {
 fn one(context: &Context, subject: &Subject, scheme: Scheme, tables: &mut [Table]) -> Result<()> {
     let system = subject.system(scheme)?;
     let spectrum = spectrum(&system)?;
-    let size = subject.mesh.diagonal();
+    let size = subject.surface.diagonal();
     let stop = Stop { tolerance: TOLERANCES[2] * size, max_iterations: LIMIT };
     let mut rows: Vec<Vec<Cell>> = TOLERANCES
         .iter()
-        .map(|_| vec![subject.name.as_str().into(), scheme.name().into(), subject.mesh.len().to_string().into()])
+        .map(|_| vec![subject.name.as_str().into(), scheme.name().into(), subject.surface.len().to_string().into()])
         .collect();
     let mut series = Vec::new();
     let lines = entries(&system, &spectrum, &Method::ALL, None, "file")?;
@@ -138,7 +138,7 @@ fn one(context: &Context, subject: &Subject, scheme: Scheme, tables: &mut [Table
             rows.iter_mut().for_each(|row| row.push(Cell::Empty));
             continue;
         };
-        let report = solve(&system, &subject.mesh.positions, line.setup, &stop).report;
+        let report = solve(&system, subject.surface.positions(), line.setup, &stop).report;
         let errors: Vec<f64> = report.history.iter().map(|e| e.max / size).collect();
         for (row, tolerance) in rows.iter_mut().zip(TOLERANCES) {
             row.push(match errors.iter().position(|&e| e <= tolerance) {

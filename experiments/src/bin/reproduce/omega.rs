@@ -76,9 +76,9 @@ fn run(context: &mut Context) -> Result<()> {
 fn one(context: &mut Context, subject: &Subject, scheme: Scheme, summary: &mut Table) -> Result<()> {
     let system = subject.system(scheme)?;
     let grids: Vec<(Method, Vec<f64>)> = METHODS.iter().map(|&m| (m, study::default_grid(m))).collect();
-    let size = subject.mesh.diagonal();
+    let size = subject.surface.diagonal();
     let stop = Stop { tolerance: TOLERANCE * size, max_iterations: LIMIT };
-    let found = sweep(&system, &subject.mesh.positions, &grids, None, &stop, rounding_floor(size), &|_| {})?;
+    let found = sweep(&system, subject.surface.positions(), &grids, None, &stop, rounding_floor(size), &|_| {})?;
     for &method in &METHODS {
         let thresholds = found.thresholds.iter().find(|t| t.method == method);
         let best = found.best(method);
@@ -101,8 +101,8 @@ fn one(context: &mut Context, subject: &Subject, scheme: Scheme, summary: &mut T
     let title = format!("{} under {scheme}", subject.name);
     let about = format!(
         "{} vertices, {} faces; start V = P; tolerance 10⁻¹⁰ of the bounding box's diagonal.",
-        subject.mesh.len(),
-        subject.mesh.faces.len()
+        subject.surface.len(),
+        subject.surface.faces().len()
     );
     let table = study::table(stem.clone(), format!("ω sweep on {title}"), about, &found);
     context.table(table)?;

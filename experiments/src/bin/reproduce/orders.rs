@@ -64,8 +64,8 @@ fn run(context: &mut Context) -> Result<()> {
     for (subject, schemes) in &mut subjects {
         for &scheme in *schemes {
             let system = subject.system(scheme)?;
-            let stop = Stop { tolerance: TOLERANCE * subject.mesh.diagonal(), max_iterations: 10_000 };
-            let rows = order_study(&subject.mesh, &subject.topology, &system, &OMEGAS, RANDOM, &stop)?;
+            let stop = Stop { tolerance: TOLERANCE * subject.surface.diagonal(), max_iterations: 10_000 };
+            let rows = order_study(&subject.surface, &system, &OMEGAS, RANDOM, &stop)?;
             push(&mut table, &subject.name, scheme, &rows);
         }
     }

@@ -161,9 +161,9 @@ fn row(
     let system = match reading {
         Reading::Loop | Reading::LoopOpen => subject.system(Scheme::Loop)?,
         Reading::CatmullClark => subject.system(Scheme::CatmullClark)?,
-        Reading::TwoStepsBack => LimitSystem::with_masks(&subject.mesh, &subject.topology, &TwoStepsBack)?,
+        Reading::TwoStepsBack => LimitSystem::with_masks(&subject.surface, &TwoStepsBack)?,
     };
-    let run = passes(&system, &subject.mesh.positions, TOLERANCE, LIMIT);
+    let run = passes(&system, subject.surface.positions(), TOLERANCE, LIMIT);
     let near = |measured: f64, printed: f64| (measured - printed).abs() <= AGREEMENT * printed;
     let verdict = match printed {
         None => "not the paper's model",
@@ -181,7 +181,7 @@ fn row(
         model.into(),
         subject.name.as_str().into(),
         reading.name().into(),
-        subject.mesh.len().to_string().into(),
+        subject.surface.len().to_string().into(),
         printed.map(|p| p.0).into(),
         run.passes.into(),
         run.updates.into(),

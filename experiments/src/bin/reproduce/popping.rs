@@ -51,7 +51,7 @@ fn run(context: &mut Context) -> Result<()> {
         let mut curve = Vec::new();
         for eighths in EIGHTHS {
             let alpha = eighths as f64 / 8.0;
-            let found = popping(&subject.mesh, &vec![alpha; subject.mesh.len()], LEVELS)?;
+            let found = popping(&subject.surface, &vec![alpha; subject.surface.len()], LEVELS)?;
             curve.push((alpha, found.volume_ratio));
             table.push(vec![
                 subject.name.as_str().into(),

@@ -3,7 +3,6 @@
 use limitlab::Result;
 use limitlab::interpolate::halstead::{Fairness, Weights, fit, follow};
 use limitlab::interpolate::zheng_cai::Constraints;
-use limitlab::mesh::Topology;
 use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::Scheme;
 use limitlab::schemes::catmull_clark::limit_normals;
@@ -60,17 +59,16 @@ fn run(context: &mut Context) -> Result<()> {
         return Ok(());
     }
     let system = subject.system(Scheme::CatmullClark)?;
-    let fairness = Fairness::new(&subject.mesh)?;
+    let fairness = Fairness::new(&subject.surface)?;
     let all = Constraints::default();
-    let fairest = fit(&fairness, &subject.mesh.positions, &all, Weights::default())?;
-    let topology = Topology::new(&fairest.mesh.faces, fairest.mesh.len());
-    let mut normals = limit_normals(&fairest.mesh, &topology)?;
-    normals.truncate(subject.mesh.len());
-    let size = subject.mesh.diagonal();
+    let fairest = fit(&fairness, subject.surface.positions(), &all, Weights::default())?;
+    let mut normals = limit_normals(&fairest.surface)?;
+    normals.truncate(subject.surface.len());
+    let size = subject.surface.diagonal();
     let stop = Stop { tolerance: TOLERANCE * size, max_iterations: 1000 };
     let (mut energies, mut deviations) = (Vec::new(), Vec::new());
     for (name, setup) in METHODS {
-        let (rows, _) = follow(&subject.mesh, &subject.topology, &system, &fairness, &normals, setup, &stop)?;
+        let (rows, _) = follow(&subject.surface, &system, &fairness, &normals, setup, &stop)?;
         let last = rows.len().saturating_sub(1);
         for row in &rows {
             if !SHOWN.contains(&row.iteration) && row.iteration != last {

@@ -33,7 +33,7 @@ fn run(context: &mut Context) -> Result<()> {
     table.note("Bandwidth: the largest |i − j| of an entry, vertices numbered in the order.");
     let mut panels = Vec::new();
     for order in ORDERS {
-        let place = inverse(&order.order(&subject.mesh, &subject.topology.incidence));
+        let place = inverse(&order.order(subject.surface.mesh(), subject.surface.incidence()));
         let pattern = system.a.pattern();
         let entries = || {
             (0..system.len()).flat_map(|i| {

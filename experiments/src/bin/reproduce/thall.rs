@@ -60,15 +60,15 @@ fn run(context: &mut Context) -> Result<()> {
     for subject in context.subjects(&STAND_INS, most)? {
         let system = subject.system(Scheme::CatmullClark)?;
         let jacobi = spectrum(&system)?.jacobi;
-        let size = subject.mesh.diagonal();
+        let size = subject.surface.diagonal();
         let stop = Stop { tolerance: TOLERANCES[1] * size, max_iterations: LIMIT };
         for (name, omega) in [("ω = ½", THALL_OMEGA), ("best ω", jacobi.optimal_omega())] {
-            let solution = solve(&system, &subject.mesh.positions, Setup::Jacobi { omega }, &stop);
+            let solution = solve(&system, subject.surface.positions(), Setup::Jacobi { omega }, &stop);
             let errors: Vec<f64> = solution.report.history.iter().map(|e| e.max / size).collect();
             let mut row = vec![
                 subject.name.as_str().into(),
                 name.into(),
-                subject.mesh.len().to_string().into(),
+                subject.surface.len().to_string().into(),
                 omega.into(),
                 jacobi.radius(omega).into(),
             ];

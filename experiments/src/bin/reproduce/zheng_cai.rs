@@ -86,8 +86,8 @@ fn run(context: &mut Context) -> Result<()> {
     );
     for (subject, printed) in subjects {
         let system = subject.system(Scheme::ZhengCai)?;
-        let points = &subject.mesh.positions;
-        let size = subject.mesh.diagonal();
+        let points = subject.surface.positions();
+        let size = subject.surface.diagonal();
         let (updates, error) = updates(&system, points, size);
         let sweeps = updates.len();
         let mut row =
@@ -137,12 +137,12 @@ fn timing(
     subject: &Subject,
     system: &LimitSystem,
 ) -> Result<Vec<limitlab_experiments::report::Cell>> {
-    let points = &subject.mesh.positions;
-    let threshold = THRESHOLD * subject.mesh.diagonal();
+    let points = subject.surface.positions();
+    let threshold = THRESHOLD * subject.surface.diagonal();
     // The loop of the paper: sweep, largest update, threshold.
     let start = Instant::now();
-    let mut x = points.clone();
-    let mut before = points.clone();
+    let mut x = points.to_vec();
+    let mut before = points.to_vec();
     loop {
         sweep(system, points, 1.0, 0..points.len(), &mut x);
         if largest_update(&before, &x) <= threshold {
@@ -155,7 +155,7 @@ fn timing(
     let nasri = subject.system(Scheme::Nasri)?;
     let most = if context.quick { DENSE_QUICK } else { DENSE };
     let dense = (nasri.len() <= most).then(|| dense_seconds(&nasri, points));
-    let stop = Stop { tolerance: 1e-10 * subject.mesh.diagonal(), max_iterations: 10 };
+    let stop = Stop { tolerance: 1e-10 * subject.surface.diagonal(), max_iterations: 10 };
     let direct = |setup: Setup| {
         let solution = solve(&nasri, points, setup, &stop);
         solution.setup_seconds + solution.solve_seconds

@@ -8,7 +8,7 @@ use limitlab::analysis::interval::interval;
 use limitlab::analysis::spectrum::Operator as Which;
 use limitlab::assemble::Operator;
 use limitlab::mesh::fronts::in_fronts;
-use limitlab::mesh::{Mesh, Topology};
+use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::local::{Editor, decay};
 use limitlab::solvers::{Stop, mixed};
@@ -46,13 +46,13 @@ pub fn edits_table(tol: f64) -> Table {
 }
 
 /// Edits of one mesh, for 1, 10, 100, … points, up to a tenth of all.
-pub fn edits(name: &str, mesh: &Mesh, scheme: Scheme, tol: f64, table: &mut Table) -> Result<Operator> {
-    let n = mesh.len();
-    let topology = Topology::new(&mesh.faces, n);
-    let fronts = in_fronts(&mesh.faces, &topology.incidence);
-    let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&fronts))?;
-    let points = fronts.there(&mesh.positions);
-    let length = mesh.diagonal();
+pub fn edits(name: &str, mesh: Mesh, scheme: Scheme, tol: f64, table: &mut Table) -> Result<Operator> {
+    let surface = Surface::new(mesh)?;
+    let n = surface.len();
+    let fronts = in_fronts(surface.faces(), surface.incidence());
+    let operator = Operator::in_order(&surface, scheme, Some(&fronts))?;
+    let points = fronts.there(surface.positions());
+    let length = surface.diagonal();
     let stop = Stop { tolerance: tol * length, max_iterations: 10_000 };
     let (control, _) = mixed::solve(&operator, &points, &stop);
     let mut editor = Editor::new(&operator, points, control);

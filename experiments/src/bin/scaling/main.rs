@@ -19,14 +19,13 @@ use serde_json::json;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::{LimitSystem, Operator};
 use limitlab::error::{Error, Result};
-use limitlab::interpolate::automatic::{control_points, renumbered};
+use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::order::{Numbering, Order};
-use limitlab::mesh::validate::{Boundary, validate};
-use limitlab::mesh::{Faces, Incidence, Mesh, Topology, builtin::builtin, io};
+use limitlab::mesh::{Faces, Incidence, Mesh, Surface, builtin::builtin, io};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::gauss_seidel::{by_colours, in_waves};
 use limitlab::solvers::{Method, Report, Setup, Stop, run};
@@ -172,7 +171,7 @@ fn local_edits(arguments: &Arguments, printer: &mut Printer) -> Result<()> {
         for &n in &sizes {
             let name = family(scheme, n);
             let mesh = noisy(&name)?;
-            let operator = edits::edits(&name, &mesh, scheme, arguments.tol, &mut table)?;
+            let operator = edits::edits(&name, mesh, scheme, arguments.tol, &mut table)?;
             if n == last {
                 largest.push((format!("{name}, {scheme}"), operator));
             }
@@ -268,8 +267,7 @@ struct Outcome {
 /// Where the interval of Chebyshev iterations starts, by a small mesh.
 fn estimate(scheme: Scheme) -> Result<f64> {
     let small = noisy(&family(scheme, ESTIMATE))?;
-    let topology = Topology::new(&small.faces, small.len());
-    let system = LimitSystem::new(&small, &topology, scheme)?;
+    let system = LimitSystem::new(&Surface::new(small)?, scheme)?;
     Ok(0.98 * spectrum(&system)?.a.min)
 }
 
@@ -284,8 +282,7 @@ fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut 
         for random in [false, true] {
             let scattered;
             let mesh = if random {
-                let topology = Topology::new(&good.faces, good.len());
-                let order = Order::Random(7).order(&good, &topology.incidence);
+                let order = Order::Random(7).order(&good, &Incidence::new(&good.faces, good.len()));
                 scattered = shuffle_faces(&permute_vertices(&good, &order), 7);
                 &scattered
             } else {
@@ -390,6 +387,7 @@ fn timed(
         io::write(&paths[0], mesh, None)?;
     }
     let once = || {
+        let mesh = mesh.clone();
         let start = Instant::now();
         let outcome = match way {
             Way::Files => Some(file_to_file(&paths, scheme, arguments.tol)?),
@@ -423,21 +421,11 @@ fn timed(
 
 /// From the points in one file to the control points in another.
 fn file_to_file([from, to]: &[PathBuf; 2], scheme: Scheme, tol: f64) -> Result<Outcome> {
-    let mesh = io::read(from)?.mesh;
-    let name = from.display().to_string();
-    let stop = Stop { tolerance: tol * mesh.diagonal(), max_iterations: 10_000 };
-    let found = match renumbered(&mesh) {
-        Some(moved) => {
-            let report = validate(&moved.mesh, None, Boundary::Refuse);
-            moved.control_points(Some(&report.into_topology(&name)?), scheme, &stop)?
-        }
-        None => {
-            let topology = validate(&mesh, None, Boundary::Refuse).into_topology(&name)?;
-            control_points(&mesh, Some(&topology), scheme, &stop)?
-        }
-    };
+    let surface = Surface::new(io::read(from)?.mesh)?;
+    let stop = Stop { tolerance: tol * surface.diagonal(), max_iterations: 10_000 };
+    let found = control_points(&surface, scheme, &stop)?;
     let (iterations, status) = (found.report.iterations, found.report.outcome.name());
-    io::write(to, &Mesh::new(found.points, mesh.faces), None)?;
+    io::write(to, &Mesh::new(found.points, surface.into_mesh().faces), None)?;
     Ok(Outcome { iterations, status, solve_seconds: found.solve_seconds })
 }
 
@@ -445,8 +433,7 @@ type Number = fn(&Faces, &Incidence) -> Numbering;
 type Sweeps = fn(&Operator, &[DVec3], f64, &Stop) -> (Vec<DVec3>, Report);
 
 /// One run from faces in memory to control points; `None` if the way does not suit the mesh.
-fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<Option<Outcome>> {
-    let points = &mesh.positions;
+fn go(mesh: Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<Option<Outcome>> {
     let stop = Stop { tolerance: tol * mesh.diagonal(), max_iterations: 10_000 };
     let start = |seconds: &mut f64, since: Instant| *seconds = since.elapsed().as_secs_f64();
     let mut solve_seconds = 0.0;
@@ -454,7 +441,7 @@ fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<
         // Not from faces in memory.
         Way::Files => return Ok(None),
         Way::Auto => {
-            let found = control_points(mesh, None, scheme, &stop)?;
+            let found = control_points(&Surface::new(mesh)?, scheme, &stop)?;
             Outcome {
                 iterations: found.report.iterations,
                 status: found.report.outcome.name(),
@@ -462,42 +449,42 @@ fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<
             }
         }
         Way::Plain => {
-            let Some(plain) = baseline::Plain::new(mesh, scheme) else {
+            let Some(plain) = baseline::Plain::new(&mesh, scheme) else {
                 return Ok(None);
             };
             let since = Instant::now();
             let (_, iterations, converged) =
-                plain.chebyshev(points, (estimate, 1.0), stop.tolerance, stop.max_iterations);
+                plain.chebyshev(&mesh.positions, (estimate, 1.0), stop.tolerance, stop.max_iterations);
             start(&mut solve_seconds, since);
             Outcome { iterations, status: if converged { "converged" } else { "max-iterations" }, solve_seconds }
         }
         Way::Waves | Way::Colours => {
-            let topology = Topology::new(&mesh.faces, mesh.len());
+            let surface = Surface::new(mesh)?;
             let (number, sweeps): (Number, Sweeps) = match way {
                 Way::Waves => (in_fronts, in_waves),
                 _ => (in_colours, by_colours),
             };
-            let numbering = number(&mesh.faces, &topology.incidence);
-            let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&numbering))?;
+            let numbering = number(surface.faces(), surface.incidence());
+            let operator = Operator::in_order(&surface, scheme, Some(&numbering))?;
             let since = Instant::now();
-            let moved = numbering.there(points);
+            let moved = numbering.there(surface.positions());
             let (control, report) = sweeps(&operator, &moved, 1.0, &stop);
             numbering.back(&control);
             start(&mut solve_seconds, since);
             Outcome { iterations: report.iterations, status: report.outcome.name(), solve_seconds }
         }
         Way::Free(method) => {
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            let operator = Operator::new(&mesh.faces, &topology, scheme)?;
+            let surface = Surface::new(mesh)?;
+            let operator = Operator::new(&surface, scheme)?;
             let since = Instant::now();
             let setup = if method == Method::Cg { Setup::Cg } else { Setup::Chebyshev { spectrum: (estimate, 1.0) } };
-            let report = run(&operator, points, setup, &stop).report;
+            let report = run(&operator, surface.positions(), setup, &stop).report;
             start(&mut solve_seconds, since);
             Outcome { iterations: report.iterations, status: report.outcome.name(), solve_seconds }
         }
         Way::Stored(method) => {
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            let system = LimitSystem::new(mesh, &topology, scheme)?;
+            let surface = Surface::new(mesh)?;
+            let system = LimitSystem::new(&surface, scheme)?;
             let setup = match method {
                 Method::Chebyshev => Setup::Chebyshev { spectrum: (estimate, 1.0) },
                 Method::GaussSeidel => Setup::Sor { omega: 1.0, order: None },
@@ -506,7 +493,7 @@ fn go(mesh: &Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<
                 _ => Setup::Cholesky,
             };
             let since = Instant::now();
-            let solution = run(&system, points, setup, &stop);
+            let solution = run(&system, surface.positions(), setup, &stop);
             start(&mut solve_seconds, since);
             Outcome { iterations: solution.report.iterations, status: solution.report.outcome.name(), solve_seconds }
         }

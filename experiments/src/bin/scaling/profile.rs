@@ -7,7 +7,7 @@ use limitlab::Result;
 use limitlab::assemble::{LimitSystem, Operator};
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::fronts::in_fronts;
-use limitlab::mesh::{Mesh, Topology};
+use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
 use limitlab::solvers::coloured::Coloured;
@@ -61,11 +61,11 @@ fn kernels(mesh: &Mesh, scheme: Scheme, table: &mut Table) -> Result<f64> {
     let threads = rayon::current_num_threads().to_string();
     let n = mesh.len() as f64;
     let points = &mesh.positions;
-    let topology = Topology::new(&mesh.faces, mesh.len());
-    let explicit = LimitSystem::new(mesh, &topology, scheme)?;
-    let free = Operator::new(&mesh.faces, &topology, scheme)?;
-    let fronts = in_fronts(&mesh.faces, &topology.incidence);
-    let front = Operator::in_order(&mesh.faces, &topology, scheme, Some(&fronts))?;
+    let surface = Surface::new(mesh.clone())?;
+    let explicit = LimitSystem::new(&surface, scheme)?;
+    let free = Operator::new(&surface, scheme)?;
+    let fronts = in_fronts(&mesh.faces, surface.incidence());
+    let front = Operator::in_order(&surface, scheme, Some(&fronts))?;
     let moved = fronts.there(points);
     let bandwidth = triad();
     let entries = explicit.m.values().len() as f64 / n;
@@ -140,8 +140,8 @@ fn kernels(mesh: &Mesh, scheme: Scheme, table: &mut Table) -> Result<f64> {
     };
     sweeps("Gauss-Seidel, front order, one by one", &front, &moved, &|k, p, x| alone.relax(1.0, k, p, x));
     sweeps("Gauss-Seidel, front order, in waves", &front, &moved, &|k, p, x| grouped.relax(1.0, k, p, x));
-    let colours = in_colours(&mesh.faces, &topology.incidence);
-    let operator = Operator::in_order(&mesh.faces, &topology, scheme, Some(&colours))?;
+    let colours = in_colours(&mesh.faces, surface.incidence());
+    let operator = Operator::in_order(&surface, scheme, Some(&colours))?;
     let coloured = Coloured::new(&operator);
     sweeps("Gauss-Seidel, by colours", &operator, &colours.there(points), &|k, p, x| coloured.relax(1.0, k, p, x));
     Ok(bandwidth)

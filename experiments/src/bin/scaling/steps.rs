@@ -9,8 +9,8 @@ use limitlab::error::Error;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::validate::{Boundary, validate};
-use limitlab::mesh::{Mesh, Topology, io};
-use limitlab::schemes::{Refinement, Scheme, sqrt3, unified_sqrt3};
+use limitlab::mesh::{Mesh, Surface, Topology, io};
+use limitlab::schemes::{Refinement, Scheme, unified_sqrt3};
 use limitlab_experiments::cli::Printer;
 use limitlab_experiments::report::{Cell, Column, Table};
 
@@ -50,8 +50,8 @@ pub fn steps(n: usize, folder: &Path, printer: &mut Printer) -> Result<()> {
     let mut threads = vec![1, rayon::current_num_threads()];
     threads.dedup();
     for (name, good) in [("quad", quads), ("tri", triangles), ("poly", polygons)] {
-        let topology = Topology::new(&good.faces, good.len());
-        let order = Order::Random(7).order(&good, &topology.incidence);
+        let surface = Surface::new(good.clone())?;
+        let order = Order::Random(7).order(&good, surface.incidence());
         let random = shuffle_faces(&permute_vertices(&good, &order), 7);
         for (order, mesh) in [("good", &good), ("random", &random)] {
             for &threads in &threads {
@@ -80,32 +80,22 @@ impl Rows<'_> {
     fn measure(&mut self, folder: &Path) -> Result<()> {
         let mesh = self.mesh;
         self.plain("topology", "", || Ok(Topology::new(&mesh.faces, mesh.len())))?;
-        self.plain("validation", "", || validate(mesh, None, Boundary::Refuse).into_topology("mesh"))?;
+        self.validated("validation", "", Ok)?;
+        self.plain("report on defects", "", || Ok(validate(mesh, None, Boundary::Refuse)))?;
         let triangles = mesh.faces.uniform_size() == Some(3);
         for scheme in Scheme::ALL {
             if scheme.needs_triangles() == triangles {
-                self.plain("assembly", scheme.name(), || {
-                    let topology = Topology::new(&mesh.faces, mesh.len());
-                    LimitSystem::new(mesh, &topology, scheme)
-                })?;
+                self.validated("assembly", scheme.name(), |surface| LimitSystem::new(&surface, scheme))?;
             }
         }
         for scheme in Refinement::ALL {
             if scheme.needs_triangles() == triangles {
-                self.refinement(scheme.name(), |mesh, topology| {
-                    let fine = scheme.refine(mesh, topology)?;
-                    let topology = scheme.refined_topology(mesh, topology, &fine);
-                    Ok((fine, topology))
-                })?;
+                self.refinement(scheme.name(), |surface| scheme.refined(surface))?;
             }
         }
         if triangles {
             let alpha = vec![0.5; mesh.len()];
-            self.refinement("unified-sqrt3", |mesh, topology| {
-                let (fine, _) = unified_sqrt3::refine(mesh, topology, &alpha)?;
-                let topology = sqrt3::refined_topology(mesh, topology, &fine);
-                Ok((fine, topology))
-            })?;
+            self.refinement("unified-sqrt3", |surface| Ok(unified_sqrt3::refined(surface, &alpha)?.0))?;
         }
         if self.keys[1] == "good" && mesh.faces.uniform_size().is_some() {
             for ending in ["off", "obj", "ply"] {
@@ -116,29 +106,37 @@ impl Rows<'_> {
     }
 
     fn plain<T>(&mut self, step: &str, scheme: &str, work: impl Fn() -> Result<T>) -> Result<()> {
-        let (seconds, _) = fastest(work)?;
+        let (seconds, _) = fastest(|| (), |()| work())?;
         self.push(step, scheme, self.mesh.len(), seconds, None);
         Ok(())
     }
 
-    fn refinement(&mut self, scheme: &str, step: impl Fn(&Mesh, &Topology) -> Result<(Mesh, Topology)>) -> Result<()> {
+    /// With validation, and topology where it is needed.
+    fn validated<T>(&mut self, step: &str, scheme: &str, work: impl Fn(Surface) -> Result<T>) -> Result<()> {
+        let (seconds, _) = fastest(|| self.mesh.clone(), |mesh| work(Surface::new(mesh)?))?;
+        self.push(step, scheme, self.mesh.len(), seconds, None);
+        Ok(())
+    }
+
+    fn refinement(&mut self, scheme: &str, step: impl Fn(&Surface) -> Result<Surface>) -> Result<()> {
         let mesh = self.mesh;
-        let topology = validate(mesh, None, Boundary::Refuse).into_topology("mesh")?;
-        let (seconds, (fine, _)) = fastest(|| step(mesh, &topology))?;
+        let surface = Surface::new(mesh.clone())?;
+        surface.topology();
+        let (seconds, fine) = fastest(|| (), |()| step(&surface))?;
         self.push("refinement", scheme, fine.len(), seconds, None);
         drop(fine);
-        let (seconds, (fine, _)) = fastest(|| step(mesh, &Topology::new(&mesh.faces, mesh.len())))?;
+        let (seconds, fine) = fastest(|| mesh.clone(), |mesh| step(&Surface::new(mesh)?))?;
         self.push("refinement, from faces", scheme, fine.len(), seconds, None);
         Ok(())
     }
 
     fn files(&mut self, path: &Path, ending: &str) -> Result<()> {
-        let (seconds, ()) = fastest(|| io::write(path, self.mesh, None))?;
+        let (seconds, ()) = fastest(|| (), |()| io::write(path, self.mesh, None))?;
         let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len() as f64;
         let n = self.mesh.len();
         let step = format!("write {ending}");
         self.push(&step, "", n, seconds, Some(bytes / seconds));
-        let (seconds, _) = fastest(|| io::read(path))?;
+        let (seconds, _) = fastest(|| (), |()| io::read(path))?;
         let step = format!("read {ending}");
         self.push(&step, "", n, seconds, Some(bytes / seconds));
         std::fs::remove_file(path).map_err(|e| Error::io(path, "remove", e))
@@ -162,11 +160,12 @@ impl Rows<'_> {
     }
 }
 
-/// The fastest of some runs and the last result, whose destruction is not counted.
-fn fastest<T>(work: impl Fn() -> Result<T>) -> Result<(f64, T)> {
+/// The fastest of some runs and the last result, whose destruction is not counted, nor is what they start from.
+fn fastest<P, T>(prepare: impl Fn() -> P, work: impl Fn(P) -> Result<T>) -> Result<(f64, T)> {
     let timed = || {
+        let prepared = prepare();
         let start = Instant::now();
-        let result = work()?;
+        let result = work(prepared)?;
         Ok((start.elapsed().as_secs_f64(), result))
     };
     let (mut best, mut result) = timed()?;

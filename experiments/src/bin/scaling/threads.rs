@@ -5,9 +5,9 @@ use std::time::Instant;
 use limitlab::Result;
 use limitlab::assemble::Operator;
 use limitlab::error::Error;
+use limitlab::mesh::Surface;
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::fronts::in_fronts;
-use limitlab::mesh::{Mesh, Topology};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::Method;
 use limitlab::solvers::coloured::Coloured;
@@ -66,7 +66,7 @@ pub fn gains(arguments: &Arguments, all: usize, printer: &mut Printer) -> Result
     ));
     for scheme in [Scheme::CatmullClark, Scheme::Loop] {
         let name = family(scheme, arguments.gains);
-        let mesh = noisy(&name)?;
+        let surface = Surface::new(noisy(&name)?)?;
         let before = [on_threads(1, triad)?, on_threads(all, triad)?];
         let mut seconds = Vec::new();
         let estimate = estimate(scheme)?;
@@ -78,8 +78,9 @@ pub fn gains(arguments: &Arguments, all: usize, printer: &mut Printer) -> Result
             for _ in 0..runs {
                 for (k, count) in [1, all].into_iter().enumerate() {
                     let parts = on_threads(count, || {
+                        let mesh = surface.mesh().clone();
                         let start = Instant::now();
-                        let outcome = go(&mesh, scheme, way, estimate, arguments.tol)?;
+                        let outcome = go(mesh, scheme, way, estimate, arguments.tol)?;
                         let whole = start.elapsed().as_secs_f64();
                         let solve = outcome.map_or(f64::NAN, |o| o.solve_seconds);
                         Ok::<_, Error>([whole, whole - solve, solve])
@@ -91,7 +92,7 @@ pub fn gains(arguments: &Arguments, all: usize, printer: &mut Printer) -> Result
             }
         }
         for (k, count) in [1, all].into_iter().enumerate() {
-            let single = on_threads(count, || kernels(&mesh, scheme, runs))??;
+            let single = on_threads(count, || kernels(&surface, scheme, runs))??;
             for (name, time) in single {
                 match seconds.iter_mut().find(|row| row.0 == name) {
                     Some(row) => row.2[k] = time,
@@ -125,7 +126,7 @@ pub fn gains(arguments: &Arguments, all: usize, printer: &mut Printer) -> Result
 }
 
 /// The building blocks, each with its seconds: products and sweeps in double precision, the operator.
-fn kernels(mesh: &Mesh, scheme: Scheme, runs: usize) -> Result<Vec<(&'static str, f64)>> {
+fn kernels(surface: &Surface, scheme: Scheme, runs: usize) -> Result<Vec<(&'static str, f64)>> {
     let fastest = |work: &mut dyn FnMut()| {
         (0..runs).fold(f64::INFINITY, |best, _| {
             let start = Instant::now();
@@ -133,18 +134,16 @@ fn kernels(mesh: &Mesh, scheme: Scheme, runs: usize) -> Result<Vec<(&'static str
             best.min(start.elapsed().as_secs_f64())
         })
     };
-    let faces = &mesh.faces;
-    let topology = Topology::new(faces, mesh.len());
-    let [fronts, colours] = [in_fronts, in_colours].map(|number| number(faces, &topology.incidence));
-    let build = |numbering| Operator::in_order(faces, &topology, scheme, Some(numbering));
+    let [fronts, colours] = [in_fronts, in_colours].map(|number| number(surface.faces(), surface.incidence()));
+    let build = |numbering| Operator::in_order(surface, scheme, Some(numbering));
     let mut built = Ok(());
     let operator = fastest(&mut || built = build(&fronts).map(drop));
     built?;
     let (front, coloured) = (build(&fronts)?, build(&colours)?);
-    let points = fronts.there(&mesh.positions);
+    let points = fronts.there(surface.positions());
     let mut image = points.clone();
-    let mut nothing = vec![(); mesh.len()];
-    let mut rows = Rows::new(mesh.len());
+    let mut nothing = vec![(); surface.len()];
+    let mut rows = Rows::new(surface.len());
     let product = fastest(&mut || {
         for _ in 0..ITERATIONS {
             rows.product(&front, &points, &mut image, &mut nothing, |_, ax, y, (), _| *y = ax);
@@ -152,7 +151,7 @@ fn kernels(mesh: &Mesh, scheme: Scheme, runs: usize) -> Result<Vec<(&'static str
     });
     let waves = Wavefront::new(&front);
     let in_waves = fastest(&mut || waves.relax(1.0, ITERATIONS, &points, &mut image));
-    let points = colours.there(&mesh.positions);
+    let points = colours.there(surface.positions());
     let sweeps = Coloured::new(&coloured);
     let by_colours = fastest(&mut || sweeps.relax(1.0, ITERATIONS, &points, &mut image));
     let one = |seconds: f64| seconds / ITERATIONS as f64;

@@ -13,10 +13,10 @@
 //!
 //! ```
 //! use limitlab::mesh::builtin::builtin;
-//! use limitlab_experiments::report::{Figure, Picture, Surface, View};
+//! use limitlab_experiments::report::{Figure, Picture, ShadedMesh, View};
 //!
 //! let mesh = builtin("torus:16x8")?;
-//! let picture = Picture::new("a torus", View::named("oblique")?).surface(Surface::flat(mesh).edges(0.4));
+//! let picture = Picture::new("a torus", View::named("oblique")?).surface(ShadedMesh::flat(mesh).edges(0.4));
 //! let image = Figure::row([picture]).render()?;
 //! assert_eq!((image.width, image.height), (900, 960));
 //! # Ok::<(), limitlab::Error>(())
@@ -86,7 +86,7 @@ pub struct Stroke {
 /// both do not), larger faces about their centroid, which is right where all of the face is seen from there. A quad
 /// painted with scalars is cut about its centroid too, so that no diagonal shows.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Surface {
+pub struct ShadedMesh {
     pub mesh: Mesh,
     pub shading: Shading,
     /// None shows edges only, and hides nothing.
@@ -103,10 +103,10 @@ pub const SURFACE_COLOUR: Colour = Colour(168, 190, 214);
 
 const EDGE_COLOUR: Colour = Colour(30, 30, 40);
 
-impl Surface {
+impl ShadedMesh {
     /// Faces with one normal each.
     pub fn flat(mesh: Mesh) -> Self {
-        Surface {
+        ShadedMesh {
             mesh,
             shading: Shading::Flat,
             paint: Some(Paint::Colour(SURFACE_COLOUR)),
@@ -118,17 +118,17 @@ impl Surface {
 
     /// Normals that are averaged at the vertices.
     pub fn smooth(mesh: Mesh) -> Self {
-        Surface { shading: Shading::Smooth, ..Surface::flat(mesh) }
+        ShadedMesh { shading: Shading::Smooth, ..ShadedMesh::flat(mesh) }
     }
 
     /// Given normals, such as those of a limit surface.
     pub fn with_normals(mesh: Mesh, normals: Vec<DVec3>) -> Self {
-        Surface { shading: Shading::Normals(normals), ..Surface::flat(mesh) }
+        ShadedMesh { shading: Shading::Normals(normals), ..ShadedMesh::flat(mesh) }
     }
 
     /// Edges alone, that nothing of this mesh hides.
     pub fn wireframe(mesh: Mesh, width: f64) -> Self {
-        Surface { paint: None, ..Surface::flat(mesh).edges(width) }
+        ShadedMesh { paint: None, ..ShadedMesh::flat(mesh).edges(width) }
     }
 
     /// The same surface with dark edges of this width, in points.
@@ -186,7 +186,7 @@ pub struct Picture {
     /// What the camera frames; everything in the picture unless told. With the same points, pictures of one size
     /// show the same scale and place.
     pub framed: Option<Vec<DVec3>>,
-    pub surfaces: Vec<Surface>,
+    pub surfaces: Vec<ShadedMesh>,
     pub points: Vec<Points>,
     pub vectors: Vec<Vectors>,
     /// Drawn beside the picture.
@@ -208,7 +208,7 @@ impl Picture {
     }
 
     /// The same picture with one more surface.
-    pub fn surface(mut self, surface: Surface) -> Self {
+    pub fn surface(mut self, surface: ShadedMesh) -> Self {
         self.surfaces.push(surface);
         self
     }

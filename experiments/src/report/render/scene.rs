@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::camera::Camera;
-use super::{Finish, Paint, Picture, Points, Shading, Stroke, Surface, Vectors};
+use super::{Finish, Paint, Picture, Points, ShadedMesh, Shading, Stroke, Vectors};
 use crate::report::canvas::Colour;
 use limitlab::mesh::{Faces, Mesh, Topology};
 use limitlab::{Error, Result};
@@ -140,7 +140,7 @@ impl Scene {
         Ok(scene)
     }
 
-    fn add_surface(&mut self, surface: &Surface, camera: &Camera, pixels: f64) -> Result<()> {
+    fn add_surface(&mut self, surface: &ShadedMesh, camera: &Camera, pixels: f64) -> Result<()> {
         let mesh = &surface.mesh;
         let projected = (mesh.positions.par_iter().enumerate())
             .map(|(v, &p)| project(camera, p, &|| format!("vertex {v}")))
@@ -300,7 +300,7 @@ fn snap(p: &DVec4) -> Vertex {
 }
 
 /// What is wrong with a surface, if anything.
-fn check(surface: &Surface) -> std::result::Result<(), String> {
+fn check(surface: &ShadedMesh) -> std::result::Result<(), String> {
     let Mesh { positions, faces } = &surface.mesh;
     if let Some(v) = positions.iter().position(|p| !p.is_finite()) {
         return Err(format!("vertex {v} is not finite: {}", positions[v]));
@@ -395,7 +395,7 @@ const HEAD_RADIUS: f64 = 1.7;
 const HEAD_LENGTH: f64 = 4.5;
 
 /// Arrows as small meshes: a tube and a cone each.
-fn arrows(vectors: &Vectors, camera: &Camera, pixels: f64) -> Result<Vec<Surface>> {
+fn arrows(vectors: &Vectors, camera: &Camera, pixels: f64) -> Result<Vec<ShadedMesh>> {
     assert!(vectors.tails.len() == vectors.vectors.len(), "one vector for each tail");
     let (mut tubes, mut cones) = (Mesh::new(Vec::new(), Faces::default()), Mesh::new(Vec::new(), Faces::default()));
     for (i, (&tail, &vector)) in vectors.tails.iter().zip(&vectors.vectors).enumerate() {
@@ -427,5 +427,5 @@ fn arrows(vectors: &Vectors, camera: &Camera, pixels: f64) -> Result<Vec<Surface
         let base_of_cone: Vec<u32> = (0..sides).rev().map(|k| cone + k).collect();
         cones.faces.push(&base_of_cone);
     }
-    Ok(vec![Surface::smooth(tubes).colour(vectors.colour), Surface::flat(cones).colour(vectors.colour)])
+    Ok(vec![ShadedMesh::smooth(tubes).colour(vectors.colour), ShadedMesh::flat(cones).colour(vectors.colour)])
 }

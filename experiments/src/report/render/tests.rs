@@ -46,7 +46,7 @@ fn a_triangle_covers_the_pixels_whose_centres_it_holds() {
     // the hypotenuse belong to the triangle to its right. On screen the hypotenuse is the right side.
     let lower = mesh(&[[0., 0., 0.], [4., 0., 0.], [0., 4., 0.]], &[&[0, 1, 2]]);
     let upper = mesh(&[[4., 4., 0.], [0., 4., 0.], [4., 0., 0.]], &[&[0, 1, 2]]);
-    let count = |mesh: &Mesh| covered(&drawn(&picture().surface(Surface::flat(mesh.clone()))));
+    let count = |mesh: &Mesh| covered(&drawn(&picture().surface(ShadedMesh::flat(mesh.clone()))));
     let (a, b) = (count(&lower), count(&upper));
     assert_eq!((a.len(), b.len()), (6, 10), "{a:?}");
     for i in 0..4 {
@@ -69,7 +69,7 @@ fn a_fan_leaves_no_gap_and_no_overlap() {
     let mut times = vec![0; 100 * 100];
     for k in 0..40 {
         let one = mesh(&[hub, corner(k), corner(k + 1)], &[&[0, 1, 2]]);
-        for (x, y) in covered(&drawn(&picture().surface(Surface::flat(one)))) {
+        for (x, y) in covered(&drawn(&picture().surface(ShadedMesh::flat(one)))) {
             times[(y * 100 + x) as usize] += 1;
         }
     }
@@ -92,8 +92,8 @@ fn square(z: f64) -> Mesh {
 
 #[test]
 fn the_nearest_is_seen_whatever_the_order() {
-    let near = Surface::flat(square(1.0)).colour(RED);
-    let far = Surface::flat(square(-1.0)).colour(BLUE);
+    let near = ShadedMesh::flat(square(1.0)).colour(RED);
+    let far = ShadedMesh::flat(square(-1.0)).colour(BLUE);
     for surfaces in [[near.clone(), far.clone()], [far, near]] {
         let [a, b] = surfaces;
         let image = drawn(&picture().surface(a).surface(b));
@@ -109,8 +109,9 @@ fn planes_that_cross_change_places_where_they_meet() {
     for p in &mut tilted.positions {
         p.z = p.x / 2.0;
     }
-    let image =
-        drawn(&picture().surface(Surface::flat(square(0.0)).colour(BLUE)).surface(Surface::flat(tilted).colour(RED)));
+    let image = drawn(
+        &picture().surface(ShadedMesh::flat(square(0.0)).colour(BLUE)).surface(ShadedMesh::flat(tilted).colour(RED)),
+    );
     for (x, y) in covered(&image) {
         assert_eq!(is_reddish(image.pixel(x, y)), x >= 50, "({x}, {y})");
     }
@@ -122,7 +123,7 @@ fn planes_that_cross_change_places_where_they_meet() {
         p.z = p.x / 2.0;
     }
     let image =
-        drawn(&view.surface(Surface::flat(square(0.0)).colour(BLUE)).surface(Surface::flat(tilted).colour(RED)));
+        drawn(&view.surface(ShadedMesh::flat(square(0.0)).colour(BLUE)).surface(ShadedMesh::flat(tilted).colour(RED)));
     for (x, y) in covered(&image) {
         assert_eq!(is_reddish(image.pixel(x, y)), x >= 50, "({x}, {y})");
     }
@@ -132,12 +133,12 @@ fn planes_that_cross_change_places_where_they_meet() {
 fn clockwise_faces_show_their_back() {
     let mut turned = square(0.0);
     turned.faces = Faces::from_lists([[3, 2, 1, 0]]);
-    let two_sided = |mesh: Mesh| Surface { back: Some(BLUE), ..Surface::flat(mesh).colour(RED) };
+    let two_sided = |mesh: Mesh| ShadedMesh { back: Some(BLUE), ..ShadedMesh::flat(mesh).colour(RED) };
     let front = drawn(&picture().surface(two_sided(square(0.0))));
     let back = drawn(&picture().surface(two_sided(turned.clone())));
     assert!(is_reddish(front.pixel(50, 50)) && !is_reddish(back.pixel(50, 50)));
     // Without a colour of its own a back side looks as the front: light comes from the eye's side.
-    let plain = drawn(&picture().surface(Surface::flat(turned).colour(RED)));
+    let plain = drawn(&picture().surface(ShadedMesh::flat(turned).colour(RED)));
     assert_eq!(plain.pixel(50, 50), front.pixel(50, 50));
 }
 
@@ -147,7 +148,7 @@ fn concave_quads_are_cut_inside() {
     let points = [[0., 10., 0.], [-10., -10., 0.], [0., -2., 0.], [10., -10., 0.]];
     for turn in 0..4_u32 {
         let face: Vec<u32> = (0..4).map(|k| (k + turn) % 4).collect();
-        let image = drawn(&picture().surface(Surface::flat(mesh(&points, &[&face]))));
+        let image = drawn(&picture().surface(ShadedMesh::flat(mesh(&points, &[&face]))));
         assert_eq!(image.pixel(50, 56), WHITE, "outside");
         assert_ne!(image.pixel(50, 48), WHITE, "inside");
         // Shoelace: |Σ x_i y_{i+1} − x_{i+1} y_i|/2 = 120.
@@ -163,8 +164,8 @@ fn edges_in_front_are_drawn_and_those_behind_are_hidden() {
     // An upright line through the middle, as the edge between two triangles, before and behind a square.
     let line = |z: f64| mesh(&[[0., -5., z], [0., 5., z], [0., 5., z]], &[&[0, 1, 2]]);
     let with = |z: f64| {
-        let wire = Surface::wireframe(line(z), 1.0);
-        drawn(&picture().surface(Surface::flat(square(0.0)).colour(RED)).surface(wire))
+        let wire = ShadedMesh::wireframe(line(z), 1.0);
+        drawn(&picture().surface(ShadedMesh::flat(square(0.0)).colour(RED)).surface(wire))
     };
     // One pixel wide and ten long, with round ends.
     let seen = black(&with(3.0));
@@ -188,9 +189,9 @@ fn a_box_hides_its_three_far_edges() {
         .copied()
         .min_by(|a, b| a.dot(view.toward_eye).total_cmp(&b.dot(view.toward_eye)))
         .unwrap();
-    let scene = |surface: Surface| Scene::new(&Picture::new("", view).surface(surface), (300, 300), 1.0).unwrap();
-    let solid = raster::draw(&scene(Surface::flat(cube.clone()).edges(2.0)), 300, 300);
-    let wires = raster::draw(&scene(Surface::wireframe(cube.clone(), 2.0)), 300, 300);
+    let scene = |surface: ShadedMesh| Scene::new(&Picture::new("", view).surface(surface), (300, 300), 1.0).unwrap();
+    let solid = raster::draw(&scene(ShadedMesh::flat(cube.clone()).edges(2.0)), 300, 300);
+    let wires = raster::draw(&scene(ShadedMesh::wireframe(cube.clone(), 2.0)), 300, 300);
     let camera = camera::Camera::framing(&view, &cube.positions, (300, 300)).unwrap();
     let EdgeMiddles { near, far } = edge_middles(&cube, hidden);
     assert_eq!((near.len(), far.len()), (9, 3));
@@ -226,7 +227,7 @@ fn edge_middles(mesh: &Mesh, hidden: DVec3) -> EdgeMiddles {
 fn balls_are_discs_half_sunk_in_a_surface() {
     let balls = |z: f64| Points { positions: vec![DVec3::new(0.0, 0.0, z)], radius: 6.0, colour: BLUE };
     let blue = |z: f64| {
-        let image = drawn(&picture().surface(Surface::flat(square(0.0)).colour(RED)).points(balls(z)));
+        let image = drawn(&picture().surface(ShadedMesh::flat(square(0.0)).colour(RED)).points(balls(z)));
         covered(&image).into_iter().filter(|&(x, y)| !is_reddish(image.pixel(x, y))).count()
     };
     // Area 36π = 113; sunk to the depth z, the circle of radius √(36 − z²) is left.
@@ -259,7 +260,7 @@ fn scalars_run_through_the_map() {
     // A strip whose number is its x, from 0 to 1 over 80 pixels.
     let strip = mesh(&[[-40., -5., 0.], [40., -5., 0.], [40., 5., 0.], [-40., 5., 0.]], &[&[0, 1, 2, 3]]);
     let scale = ColourScale::linear("x", (0.0, 1.0));
-    let image = drawn(&picture().surface(Surface::flat(strip).scalars(vec![0.0, 1.0, 1.0, 0.0], scale)));
+    let image = drawn(&picture().surface(ShadedMesh::flat(strip).scalars(vec![0.0, 1.0, 1.0, 0.0], scale)));
     // Light is the same all along: the ratio to the map's colour is too.
     for (x, t) in [(10, 0.00625), (30, 0.25625), (50, 0.50625), (70, 0.75625), (89, 0.99375)] {
         let Colour(r, g, b) = ColourMap::Sequential.colour(t);
@@ -279,7 +280,7 @@ fn the_colour_bar_ends_with_the_ends_of_the_map() {
         (ColourScale::logarithmic("error", (1e-6, 1.0)), [[68, 1, 84], [253, 231, 37]]),
         (ColourScale::signed("mode", 2.0), [[59, 76, 192], [180, 4, 38]]),
     ] {
-        let picture = picture().surface(Surface::flat(square(0.0))).colour_bar(scale);
+        let picture = picture().surface(ShadedMesh::flat(square(0.0))).colour_bar(scale);
         let image = Figure::row([picture]).render().unwrap();
         // Down the column with the most colours of the map's upper end.
         let near = |pixel: [u8; 3], wanted: [u8; 3]| pixel.iter().zip(wanted).all(|(&a, b)| a.abs_diff(b) <= 6);
@@ -297,7 +298,7 @@ fn the_colour_bar_ends_with_the_ends_of_the_map() {
 fn the_same_picture_gives_the_same_bytes_on_any_number_of_threads() {
     let mesh = builtin("irregular-poly:300").unwrap();
     let picture = Picture::new("a mesh", View::named("oblique").unwrap().perspective(30.0))
-        .surface(Surface::smooth(mesh.clone()).edges(0.4))
+        .surface(ShadedMesh::smooth(mesh.clone()).edges(0.4))
         .points(Points { positions: mesh.positions, radius: 1.0, colour: RED });
     let bytes = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -314,7 +315,7 @@ fn the_same_picture_gives_the_same_bytes_on_any_number_of_threads() {
 fn bands_join_without_a_seam() {
     // The diagonal of a square that fills rows of two bands, on the surface itself.
     let halves = mesh(&[[-40., -40., 0.], [40., -40., 0.], [40., 40., 0.], [-40., 40., 0.]], &[&[0, 1, 2], &[0, 2, 3]]);
-    let image = drawn(&picture().surface(Surface::flat(halves).colour(RED).edges(3.0)));
+    let image = drawn(&picture().surface(ShadedMesh::flat(halves).colour(RED).edges(3.0)));
     for y in 16..84 {
         let is_line = |x: &u32| !is_reddish(image.pixel(*x, y));
         let row: Vec<u32> = (13..87).filter(is_line).collect();
@@ -334,21 +335,21 @@ fn what_cannot_be_drawn_says_so() {
     let view = View::named("front").unwrap();
     let mut broken = square(0.0);
     broken.positions[2].y = f64::NAN;
-    let said = message(Picture::new("", view).surface(Surface::flat(broken)));
+    let said = message(Picture::new("", view).surface(ShadedMesh::flat(broken)));
     assert!(said.contains("surface 0, vertex 2 is not finite"), "{said}");
     let missing = mesh(&[[0.; 3], [1.; 3]], &[&[0, 1, 7]]);
-    let said = message(Picture::new("", view).surface(Surface::flat(missing)));
+    let said = message(Picture::new("", view).surface(ShadedMesh::flat(missing)));
     assert!(said.contains("face 0 names a vertex that is not there"), "{said}");
     let normals = vec![DVec3::Z, DVec3::Z, DVec3::Z, DVec3::INFINITY];
-    let said = message(Picture::new("", view).surface(Surface::with_normals(square(0.0), normals)));
+    let said = message(Picture::new("", view).surface(ShadedMesh::with_normals(square(0.0), normals)));
     assert!(said.contains("the normal of vertex 3"), "{said}");
     let scale = ColourScale::linear("x", (0.0, 1.0));
     let scalars = vec![0.0, f64::NAN, 0.0, 0.0];
-    let said = message(Picture::new("", view).surface(Surface::flat(square(0.0)).scalars(scalars, scale)));
+    let said = message(Picture::new("", view).surface(ShadedMesh::flat(square(0.0)).scalars(scalars, scale)));
     assert!(said.contains("the number of vertex 1"), "{said}");
     assert!(message(Picture::new("", view)).contains("no points"));
     // Behind the eye, where not all is framed.
-    let behind = Surface::flat(square(1000.0));
+    let behind = ShadedMesh::flat(square(1000.0));
     let said = message(picture_in_perspective().surface(behind));
     assert!(said.contains("vertex 0 at") && said.contains("behind the eye"), "{said}");
 }
@@ -363,19 +364,20 @@ fn picture_in_perspective() -> Picture {
 fn degenerate_faces_are_no_trouble() {
     // Coincident and collinear corners cover nothing, with or without normals of their own.
     let flat = mesh(&[[0.; 3], [10., 0., 0.], [20., 0., 0.]], &[&[0, 1, 2], &[0, 0, 1]]);
-    for surface in [Surface::flat(flat.clone()), Surface::smooth(flat)] {
+    for surface in [ShadedMesh::flat(flat.clone()), ShadedMesh::smooth(flat)] {
         assert_eq!(covered(&drawn(&picture().surface(surface))), []);
     }
     // Zero normals fall back on the face's.
-    let none = drawn(&picture().surface(Surface::with_normals(square(0.0), vec![DVec3::ZERO; 4])));
-    assert_eq!(none, drawn(&picture().surface(Surface::flat(square(0.0)))));
+    let none = drawn(&picture().surface(ShadedMesh::with_normals(square(0.0), vec![DVec3::ZERO; 4])));
+    assert_eq!(none, drawn(&picture().surface(ShadedMesh::flat(square(0.0)))));
 }
 
 #[test]
 fn zero_has_the_colour_of_the_least_on_a_logarithmic_scale() {
     let scale = ColourScale::logarithmic("error", (1e-6, 1.0));
     assert_eq!(scale.scale, Scale::Log);
-    let at = |value: f64| drawn(&picture().surface(Surface::flat(square(0.0)).scalars(vec![value; 4], scale.clone())));
+    let at =
+        |value: f64| drawn(&picture().surface(ShadedMesh::flat(square(0.0)).scalars(vec![value; 4], scale.clone())));
     assert_eq!(at(0.0), at(1e-6));
     assert_eq!(at(-1.0), at(1e-9));
     assert_ne!(at(1e-3), at(1e-6));
@@ -385,7 +387,7 @@ fn zero_has_the_colour_of_the_least_on_a_logarithmic_scale() {
 fn a_sphere_is_round_and_lit_from_the_upper_left() {
     let sphere = builtin("icosphere:4").unwrap();
     let normals = sphere.positions.clone();
-    let picture = Picture::new("", View::named("front").unwrap()).surface(Surface::with_normals(sphere, normals));
+    let picture = Picture::new("", View::named("front").unwrap()).surface(ShadedMesh::with_normals(sphere, normals));
     let image = raster::draw(&Scene::new(&picture, (200, 200), 1.0).unwrap(), 200, 200);
     let area = covered(&image).len() as f64;
     let expected = std::f64::consts::PI * 94.0_f64.powi(2);
@@ -400,7 +402,7 @@ fn paint_by_face_shows_each_face_in_its_colour() {
         &[[-10., -10., 0.], [0., -10., 0.], [0., 10., 0.], [-10., 10., 0.], [10., -10., 0.], [10., 10., 0.]],
         &[&[0, 1, 2, 3], &[1, 4, 5, 2]],
     );
-    let surface = Surface { paint: Some(Paint::Faces(vec![RED, BLUE])), ..Surface::flat(two) };
+    let surface = ShadedMesh { paint: Some(Paint::Faces(vec![RED, BLUE])), ..ShadedMesh::flat(two) };
     let image = drawn(&picture().surface(surface));
     assert!(is_reddish(image.pixel(45, 50)) && !is_reddish(image.pixel(55, 50)));
 }

@@ -13,7 +13,7 @@ use limitlab::Result;
 use limitlab::analysis::dense;
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
 use limitlab::assemble::LimitSystem;
-use limitlab::mesh::{Mesh, Topology, builtin, generate};
+use limitlab::mesh::{Mesh, Surface, builtin, generate};
 use limitlab::solvers::{Outcome, Setup, Solution, Stop, run, run_watched};
 
 use crate::context::{Context, Subject};
@@ -82,8 +82,8 @@ fn small(name: &str, make: fn(u64) -> Mesh) -> Vec<Subject> {
 }
 
 pub fn subject(name: impl Into<String>, mesh: Mesh) -> Subject {
-    let topology = Topology::new(&mesh.faces, mesh.len());
-    Subject { name: name.into(), mesh, topology }
+    let surface = Surface::new(mesh).expect("a valid mesh");
+    Subject { name: name.into(), surface }
 }
 
 /// A built-in mesh without noise.
@@ -186,16 +186,16 @@ pub fn iterates(system: &LimitSystem, points: &[DVec3], setup: Setup, count: usi
 
 /// Iterations from V = P to `tolerance` of the bounding box's diagonal; `None` if it was not reached.
 pub fn iterations(system: &LimitSystem, subject: &Subject, setup: Setup, tolerance: f64) -> Option<usize> {
-    let stop = Stop { tolerance: tolerance * subject.mesh.diagonal(), max_iterations: 20_000 };
-    let report = run(system, &subject.mesh.positions, setup, &stop).report;
+    let stop = Stop { tolerance: tolerance * subject.surface.diagonal(), max_iterations: 20_000 };
+    let report = run(system, subject.surface.positions(), setup, &stop).report;
     (report.outcome == Outcome::Converged).then_some(report.iterations)
 }
 
 /// max_i ‖p_i − (A v)_i‖ after each iteration, relative to the bounding box's diagonal; entry 0 is the start.
 pub fn history(system: &LimitSystem, subject: &Subject, setup: Setup, count: usize) -> Vec<f64> {
     let stop = Stop { tolerance: 0.0, max_iterations: count };
-    let report = run(system, &subject.mesh.positions, setup, &stop).report;
-    let size = subject.mesh.diagonal();
+    let report = run(system, subject.surface.positions(), setup, &stop).report;
+    let size = subject.surface.diagonal();
     report.history.iter().map(|e| e.max / size).collect()
 }
 
@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn the_quad_star_has_its_valence_at_the_apex() {
         let star = subject("", quad_star(9));
-        assert_eq!(star.topology.incidence.face_count(9), 9);
-        assert_eq!(star.mesh.faces.uniform_size(), Some(4));
+        assert_eq!(star.surface.incidence().face_count(9), 9);
+        assert_eq!(star.surface.faces().uniform_size(), Some(4));
     }
 }

@@ -10,7 +10,7 @@ use limitlab::analysis::splitting::{
 };
 use limitlab::interpolate::lin_luo::curve::{self, Ends, fixed_point_radius, jump_norm, jumps};
 use limitlab::interpolate::lin_luo::surface::{choose, largest_fold, popping, refine_n, volume};
-use limitlab::mesh::{Mesh, Topology};
+use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::{Refinement, labsik_greiner, sqrt3, unified_sqrt3};
 
 use super::Claim;
@@ -207,9 +207,10 @@ fn sqrt3_step(_: &Lab) -> Result<Finding> {
             limit = largest([limit, (w - wanted).abs()]);
         }
     }
-    let (mesh, topology) = star(9)?;
-    let fine = sqrt3::refine(&mesh, &topology)?;
-    let relaxed = displaced(&mesh, |_, p, d| p + d);
+    let surface = star(9)?;
+    let mesh = surface.mesh();
+    let fine = sqrt3::refine(&surface)?;
+    let relaxed = displaced(mesh, |_, p, d| p + d);
     let centers: Vec<DVec3> =
         mesh.faces.iter().map(|f| f.iter().map(|&v| mesh.positions[v as usize]).sum::<DVec3>() / 3.0).collect();
     Ok(Finding::reproduced(vec![
@@ -230,11 +231,9 @@ fn sqrt3_step(_: &Lab) -> Result<Finding> {
 }
 
 /// Random points on star:K, which has the valences 4, 6 and K.
-fn star(k: usize) -> Result<(Mesh, Topology)> {
-    let subject = exact(&format!("star:{k}"))?;
-    let mut mesh = subject.mesh;
-    mesh.positions = random_points(mesh.len(), k as u64);
-    Ok((mesh, subject.topology))
+fn star(k: usize) -> Result<Surface> {
+    let star = exact(&format!("star:{k}"))?.surface;
+    Ok(star.with_positions(random_points(star.len(), k as u64)))
 }
 
 /// `f(vertex, position, Δ)` at every vertex, Δ = a_n (mean of the neighbours − position), from the faces alone.
@@ -269,17 +268,18 @@ fn interpolatory(_: &Lab) -> Result<Finding> {
     let mut mask = 0.0f64;
     let mut kept = 0.0f64;
     for k in [3, 4, 5, 7, 12] {
-        let (mesh, topology) = star(k)?;
-        let (fine, _) = unified_sqrt3::refine(&mesh, &topology, &vec![1.0; mesh.len()])?;
-        let parts = displaced(&mesh, |_, p, d| (p - d) / 3.0);
+        let surface = star(k)?;
+        let mesh = surface.mesh();
+        let (fine, _) = unified_sqrt3::refine(&surface, &vec![1.0; mesh.len()])?;
+        let parts = displaced(mesh, |_, p, d| (p - d) / 3.0);
         let wanted: Vec<DVec3> = mesh.faces.iter().map(|f| f.iter().map(|&v| parts[v as usize]).sum()).collect();
         mask = largest([mask, distance(&fine.positions[mesh.len()..], &wanted)]);
         kept = largest([kept, distance(&fine.positions[..mesh.len()], &mesh.positions)]);
     }
     let fold = |name: &str, levels: usize| -> Result<f64> {
-        let mesh = exact(name)?.mesh;
-        let (fine, _) = refine_n(&mesh, &vec![1.0; mesh.len()], levels)?;
-        Ok(largest_fold(&fine, &Topology::new(&fine.faces, fine.len())))
+        let surface = exact(name)?.surface;
+        let (fine, _) = refine_n(&surface, &vec![1.0; surface.len()], levels)?;
+        Ok(largest_fold(&fine))
     };
     Ok(Finding::refuted(vec![
         Evidence::below(
@@ -308,20 +308,21 @@ fn interpolatory(_: &Lab) -> Result<Finding> {
 }
 
 fn blend(_: &Lab) -> Result<Finding> {
-    let (mesh, topology) = star(7)?;
+    let surface = star(7)?;
+    let mesh = surface.mesh();
     let alpha: Vec<f64> = (0..mesh.len()).map(|v| (v % 11) as f64 / 5.0).collect();
-    let (fine, parameters) = unified_sqrt3::refine(&mesh, &topology, &alpha)?;
+    let (fine, parameters) = unified_sqrt3::refine(&surface, &alpha)?;
     // Eq. 10 and the form under Eq. 11, in which no Δ occurs: the sign of Δ inside decides.
     let formed = |sign: f64| {
-        let parts = displaced(&mesh, |v, p, d| (p + sign * alpha[v] * d) / 3.0);
+        let parts = displaced(mesh, |v, p, d| (p + sign * alpha[v] * d) / 3.0);
         let new: Vec<DVec3> = mesh.faces.iter().map(|f| f.iter().map(|&v| parts[v as usize]).sum()).collect();
-        let old = displaced(&mesh, |v, p, d| p - sign * (1.0 - alpha[v]) * d);
+        let old = displaced(mesh, |v, p, d| p - sign * (1.0 - alpha[v]) * d);
         [old, new].concat()
     };
-    let expanded = expanded(&mesh, &alpha);
+    let expanded = expanded(mesh, &alpha);
     let means = mesh.faces.iter().map(|f| f.iter().map(|&v| alpha[v as usize]).sum::<f64>() / 3.0);
-    let ends = |value: f64| unified_sqrt3::refine(&mesh, &topology, &vec![value; mesh.len()]);
-    let kobbelt = sqrt3::refine(&mesh, &topology)?;
+    let ends = |value: f64| unified_sqrt3::refine(&surface, &vec![value; mesh.len()]);
+    let kobbelt = sqrt3::refine(&surface)?;
     Ok(Finding::corrected(
         "largest distance of Eq. 9 and 11 from their expanded forms, with Δ = new − old (print), old − new (right)",
         distance(&formed(1.0), &expanded),
@@ -391,8 +392,8 @@ fn less_popping(lab: &Lab) -> Result<Finding> {
     let (mut at_0, mut at_1) = (Vec::new(), Vec::new());
     for subject in &subjects {
         let ratio = |alpha: f64| -> Result<f64> {
-            let alphas = vec![alpha; subject.mesh.len()];
-            Ok(popping(&subject.mesh, &alphas, 5)?.volume_ratio)
+            let alphas = vec![alpha; subject.surface.len()];
+            Ok(popping(&subject.surface, &alphas, 5)?.volume_ratio)
         };
         let (low, high) = (ratio(0.0)?, ratio(1.0)?);
         at_0.push(low);
@@ -418,12 +419,12 @@ fn less_popping(lab: &Lab) -> Result<Finding> {
 
 fn chosen_vertices(_: &Lab) -> Result<Finding> {
     let subject = exact("irregular-tri:100")?;
-    let n = subject.mesh.len();
+    let n = subject.surface.len();
     let marks: Vec<bool> = (0..n).map(|v| v % 4 == 0).collect();
-    let (fine, _) = refine_n(&subject.mesh, &choose(&marks, 0.0), 4)?;
+    let (fine, _) = refine_n(&subject.surface, &choose(&marks, 0.0), 4)?;
     let moved = |marked: bool| {
         let of = (0..n).filter(|&v| marks[v] == marked);
-        of.map(|v| fine.positions[v].distance(subject.mesh.positions[v])).collect::<Vec<_>>()
+        of.map(|v| fine.positions()[v].distance(subject.surface.positions()[v])).collect::<Vec<_>>()
     };
     Ok(Finding::reproduced(vec![
         Evidence::equal(
@@ -538,13 +539,10 @@ fn explicit_mask(_: &Lab) -> Result<Finding> {
         Evidence::above("λ_1 less the largest other modulus, least over these valences", margin, 0.0),
     ]);
     for name in ["tetrahedron", "octahedron", "icosahedron", "star:8"] {
-        let mesh = exact(name)?.mesh;
-        let shape = |fine: &Mesh| {
-            let topology = Topology::new(&fine.faces, fine.len());
-            (volume(fine) / volume(&mesh), largest_fold(fine, &topology))
-        };
-        let theirs = shape(&Refinement::LabsikGreiner.refine_n(&mesh, 8)?);
-        let ours = shape(&refine_n(&mesh, &vec![1.0; mesh.len()], 8)?.0);
+        let surface = exact(name)?.surface;
+        let shape = |fine: &Surface| (volume(fine.mesh()) / volume(surface.mesh()), largest_fold(fine));
+        let theirs = shape(&Refinement::LabsikGreiner.refined_n(&surface, 8)?);
+        let ours = shape(&refine_n(&surface, &vec![1.0; surface.len()], 8)?.0);
         for (scheme, (volume, fold)) in [("Labsik-Greiner", theirs), ("Lin-Luo", ours)] {
             finding = finding.also([
                 Evidence::shown(format!("volume over the mesh's, {name}, {scheme}"), volume),
@@ -609,8 +607,9 @@ fn senses(_: &Lab) -> Result<Finding> {
         let (even, _) = split(&curve::refine(&points, &[alpha; 10], Ends::Closed).0);
         distance(&even, &points)
     };
-    let (mesh, topology) = star(7)?;
-    let (fine, _) = unified_sqrt3::refine(&mesh, &topology, &vec![1.0; mesh.len()])?;
+    let surface = star(7)?;
+    let mesh = surface.mesh();
+    let (fine, _) = unified_sqrt3::refine(&surface, &vec![1.0; mesh.len()])?;
     Ok(Finding::corrected(
         "largest move of a control point of the curve, with α = 1 interpolating as for surfaces (print), α = 0 (right)",
         curve_moves(1.0),

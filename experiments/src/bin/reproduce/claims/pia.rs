@@ -146,7 +146,7 @@ fn table_1(lab: &Lab) -> Result<Finding> {
     let mut evidence = Vec::new();
     for (name, file, printed, errors) in lines {
         let subject = lab.context.model(file, Boundary::AsInterior)?;
-        let run = passes(&subject.system(Scheme::Loop)?, &subject.mesh.positions, TOLERANCE, 1000);
+        let run = passes(&subject.system(Scheme::Loop)?, subject.surface.positions(), TOLERANCE, 1000);
         evidence.push(Evidence::equal(format!("{name}: passes of the loop"), run.passes, printed as f64));
         evidence.push(Evidence::at_most(
             format!("{name}: relative departure of the printed errors"),
@@ -169,11 +169,11 @@ fn mushroom(lab: &Lab) -> Result<Finding> {
     let printed = (0.000813821, 0.000235506);
     let subject = lab.context.model("closed/geomview_mushroom_226v.off", Boundary::Refuse)?;
     let system = subject.system(Scheme::CatmullClark)?;
-    let points = &subject.mesh.positions;
+    let points = subject.surface.positions();
     let surface = passes(&system, points, TOLERANCE, 1000);
-    let masks = LimitSystem::with_masks(&subject.mesh, &subject.topology, &TwoStepsBack)?;
+    let masks = LimitSystem::with_masks(&subject.surface, &TwoStepsBack)?;
     let reading = passes(&masks, points, TOLERANCE, 1000);
-    let triangles = subject.mesh.faces.iter().filter(|f| f.len() == 3).count();
+    let triangles = subject.surface.faces().iter().filter(|f| f.len() == 3).count();
     Ok(Finding::corrected(
         "relative departure of the printed errors, on the Catmull-Clark surface (print), with the face point two \
          corners back (right)",
@@ -226,7 +226,7 @@ fn properties(lab: &Lab) -> Result<Finding> {
             let entries: Vec<(usize, f64)> = system.a.row(i).collect();
             row.sum = largest([row.sum, (entries.iter().map(|e| e.1).sum::<f64>() - 1.0).abs()]);
             row.least = smallest([row.least, smallest(entries.iter().map(|e| e.1))]);
-            row.misses += entries.len().abs_diff(subject.topology.incidence.face_count(i) + 1);
+            row.misses += entries.len().abs_diff(subject.surface.incidence().face_count(i) + 1);
             let others = || entries.iter().filter(|e| e.0 != i).map(|e| e.1);
             row.spread = largest([row.spread, largest(others()) - smallest(others())]);
             for (j, m) in system.m.row(i) {
@@ -285,14 +285,13 @@ fn loop_convergence(lab: &Lab) -> Result<Finding> {
 fn algorithm(_: &Lab) -> Result<Finding> {
     let subject = exact("irregular-tri:233")?;
     let limits = |points: Vec<DVec3>| -> Result<Vec<DVec3>> {
-        let mesh = limitlab::mesh::Mesh::new(points, subject.mesh.faces.clone());
-        Refinement::Loop.limit_positions(&mesh, &subject.topology)
+        Refinement::Loop.limit_positions(&subject.surface.with_positions(points))
     };
-    let given = &subject.mesh.positions;
+    let given = subject.surface.positions();
     const PASSES: usize = 100;
     // e = V − V^k moves every vertex to its own place: nothing ever changes.
-    let prose = given.clone();
-    let (mut box_points, mut reset, mut never) = (given.clone(), TOLERANCE + 1.0, TOLERANCE + 1.0);
+    let prose = given.to_vec();
+    let (mut box_points, mut reset, mut never) = (given.to_vec(), TOLERANCE + 1.0, TOLERANCE + 1.0);
     let (mut passes_reset, mut passes_never) = (0usize, 0usize);
     for _ in 0..PASSES {
         let now = limits(box_points.clone())?;

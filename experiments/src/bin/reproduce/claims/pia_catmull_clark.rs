@@ -24,10 +24,10 @@ pub fn catmull_clark_matrix(_: &Lab) -> Result<Finding> {
         // Edge by edge and face by face, as the paper counts them.
         let mut wanted = vec![HashMap::<usize, f64>::new(); n];
         for (v, row) in wanted.iter_mut().enumerate() {
-            let valence = subject.topology.incidence.face_count(v) as f64;
+            let valence = subject.surface.incidence().face_count(v) as f64;
             row.insert(v, valence * valence);
         }
-        for face in subject.mesh.faces.iter() {
+        for face in subject.surface.faces().iter() {
             for k in 0..4 {
                 let [v, next, opposite] = [0, 1, 2].map(|s| face[(k + s) % 4] as usize);
                 // Each edge has two faces, and each brings half of the 4 to either end.
@@ -76,11 +76,7 @@ pub fn when_singular(lab: &Lab) -> Result<Finding> {
     let judge = |subject: &crate::context::Subject| -> Result<(usize, usize, f64)> {
         let all = limitlab::analysis::dense::eigenvalues(&subject.system(Scheme::CatmullClark)?)?.a;
         let kernel = all.iter().filter(|l| l.abs() < ZERO).count();
-        Ok((
-            kernel,
-            Singularity::detect(&subject.mesh, &subject.topology, Scheme::CatmullClark).kernel_dimension(),
-            all[0],
-        ))
+        Ok((kernel, Singularity::detect(&subject.surface, Scheme::CatmullClark).kernel_dimension(), all[0]))
     };
     let mut rows = each(lab.polygons(), judge)?;
     for name in special {
@@ -118,7 +114,7 @@ pub fn quadratic_form(_: &Lab) -> Result<Finding> {
         let x: Vec<f64> = random_points(system.len(), seed).iter().map(|p| p.x).collect();
         let form: f64 = (0..system.len()).map(|i| x[i] * system.m.row_times(i, &x)).sum();
         let (mut sums, mut squares, mut own) = (0.0, 0.0, 0.0);
-        for face in subject.mesh.faces.iter() {
+        for face in subject.surface.faces().iter() {
             let sum: f64 = face.iter().map(|&v| x[v as usize]).sum();
             sums += sum;
             squares += sum * sum;
@@ -130,7 +126,7 @@ pub fn quadratic_form(_: &Lab) -> Result<Finding> {
             }
         }
         for (v, x) in x.iter().enumerate() {
-            let n = subject.topology.incidence.face_count(v) as f64;
+            let n = subject.surface.incidence().face_count(v) as f64;
             own += (n * n - 3.0 * n) * x * x;
         }
         printed = largest([printed, ((sums + own) / form - 1.0).abs()]);
@@ -155,7 +151,7 @@ pub fn arbitrary_meshes(lab: &Lab) -> Result<Finding> {
         let x: Vec<f64> = random_points(system.len(), 5).iter().map(|p| p.x).collect();
         let form: f64 = (0..system.len()).map(|i| x[i] * system.m.row_times(i, &x)).sum();
         let mut squares = 0.0;
-        for face in subject.mesh.faces.iter() {
+        for face in subject.surface.faces().iter() {
             let sum: f64 = face.iter().map(|&v| x[v as usize]).sum();
             squares += 4.0 / face.len() as f64 * sum * sum;
             for (k, &v) in face.iter().enumerate() {
@@ -164,7 +160,7 @@ pub fn arbitrary_meshes(lab: &Lab) -> Result<Finding> {
             }
         }
         for (v, x) in x.iter().enumerate() {
-            let n = subject.topology.incidence.face_count(v) as f64;
+            let n = subject.surface.incidence().face_count(v) as f64;
             squares += (n * n - 3.0 * n) * x * x;
         }
         let bound = ends.min - system.bounds.lambda_min;

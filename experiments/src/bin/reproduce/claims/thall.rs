@@ -9,7 +9,7 @@ use limitlab::Result;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
 use limitlab::interpolate::thall::{Inverse, LocalIteration};
-use limitlab::mesh::{Mesh, Topology};
+use limitlab::mesh::Surface;
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
 use limitlab::solvers::{Outcome, Setup, Stop, solve};
 
@@ -195,11 +195,10 @@ fn limit_mask(_: &Lab) -> Result<Finding> {
     // Another way: subdivision does not move limit points.
     let mut kept = 0.0f64;
     for n in 3..=20 {
-        let mut star = quad_star(n);
-        star.positions = random_points(star.len(), n as u64);
-        let limits = |mesh: &Mesh| catmull_clark::limit_positions(mesh, &Topology::new(&mesh.faces, mesh.len()));
-        let before = limits(&star)?;
-        let after = limits(&Refinement::CatmullClark.refine_n(&star, 3)?)?;
+        let star = Surface::new(quad_star(n))?;
+        let star = star.with_positions(random_points(star.len(), n as u64));
+        let before = catmull_clark::limit_positions(&star)?;
+        let after = catmull_clark::limit_positions(&Refinement::CatmullClark.refined_n(&star, 3)?)?;
         kept = largest([kept, distance(&before, &after[..before.len()])]);
     }
     Ok(Finding::reproduced(vec![
@@ -216,22 +215,21 @@ fn inverse_mask(_: &Lab) -> Result<Finding> {
     let mut worst = 0.0f64;
     for n in [3, 4, 5, 7, 12, 20] {
         let star = subject("", quad_star(n));
-        let points = random_points(star.mesh.len(), 1);
+        let points = random_points(star.surface.len(), 1);
         let wanted = random_points(1, 2)[0];
         // Eq. 2 at the apex, written out.
         let (mut edges, mut opposite) = (DVec3::ZERO, DVec3::ZERO);
-        for &c in star.topology.incidence.corners_at(n) {
-            let face = star.mesh.faces.face(star.topology.incidence.face_of(c));
+        for &c in star.surface.incidence().corners_at(n) {
+            let face = star.surface.faces().face(star.surface.incidence().face_of(c));
             let place = face.iter().position(|&v| v as usize == n).unwrap_or(0);
             edges += points[face[(place + 1) % 4] as usize];
             opposite += points[face[(place + 2) % 4] as usize];
         }
         let sum = 4.0 * edges + opposite;
         let x = n as f64;
-        let mut moved = star.mesh.clone();
-        moved.positions = points;
-        moved.positions[n] = (x + 5.0) / x * (wanted - sum / (x * (x + 5.0)));
-        let limits = catmull_clark::limit_positions(&moved, &star.topology)?;
+        let mut moved = star.surface.with_positions(points);
+        moved.positions_mut()[n] = (x + 5.0) / x * (wanted - sum / (x * (x + 5.0)));
+        let limits = catmull_clark::limit_positions(&moved)?;
         worst = largest([worst, limits[n].distance(wanted)]);
     }
     Ok(Finding::reproduced(vec![Evidence::at_most(
@@ -243,7 +241,7 @@ fn inverse_mask(_: &Lab) -> Result<Finding> {
 
 /// The first `count` iterates by local masks.
 fn local_iterates(subject: &Subject, inverse: Inverse, count: usize) -> Vec<Vec<DVec3>> {
-    let mut method = LocalIteration::new(&subject.mesh, &subject.topology, inverse);
+    let mut method = LocalIteration::new(&subject.surface, inverse);
     let stop = Stop { tolerance: 0.0, max_iterations: count };
     let mut found = Vec::new();
     solve(&mut method, &stop, &mut |step| {
@@ -260,10 +258,10 @@ fn matrix_form(lab: &Lab) -> Result<Finding> {
     let compare = |name: &str, inverse: Inverse| -> Result<f64> {
         let subject = lab.context.stand_in(name)?;
         let system = subject.system(CC)?;
-        let matrix = iterates(&system, &subject.mesh.positions, Setup::THALL, COUNT);
+        let matrix = iterates(&system, subject.surface.positions(), Setup::THALL, COUNT);
         let local = local_iterates(&subject, inverse, COUNT);
         let pairs = matrix.iter().zip(&local);
-        let size = subject.mesh.diagonal();
+        let size = subject.surface.diagonal();
         Ok(largest(pairs.map(|(a, b)| distance(a, b) / size)))
     };
     let exact = |name: &str| -> Result<Evidence> {
@@ -402,7 +400,7 @@ fn dominance(lab: &Lab) -> Result<Finding> {
     for (name, class) in classes {
         let counts = each(lab.subjects()?, |subject| {
             let system = subject.system(CC)?;
-            let of_class = |i: &usize| class.contains(&subject.topology.incidence.face_count(*i));
+            let of_class = |i: &usize| class.contains(&subject.surface.incidence().face_count(*i));
             let rows: Vec<usize> = (0..system.len()).filter(of_class).collect();
             let dominant = rows.iter().filter(|&&i| excess(&system, i) > ROUNDING).count();
             Ok((dominant, rows.len()))

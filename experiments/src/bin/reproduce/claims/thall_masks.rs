@@ -7,7 +7,6 @@ use limitlab::Result;
 use limitlab::analysis::splitting::spectrum::distance_to_space;
 use limitlab::analysis::splitting::thall::{Entry, ThallTables, formula_mask};
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix, thall_tables};
-use limitlab::mesh::Topology;
 use limitlab::schemes::Scheme;
 use limitlab::schemes::catmull_clark::{refine, refine_in_place};
 use limitlab::solvers::{Outcome, Setup};
@@ -277,9 +276,9 @@ fn tables_2_and_3(_: &Lab) -> Result<Finding> {
 
 fn in_place(lab: &Lab) -> Result<Finding> {
     let rows = each(&lab.polygons()[..60], |subject| {
-        let usual = refine(&subject.mesh, &subject.topology)?;
-        let own = refine_in_place(subject.mesh.clone(), &subject.topology)?;
-        Ok(distance(&usual.positions, &own.positions) / subject.mesh.diagonal())
+        let usual = refine(&subject.surface)?;
+        let own = refine_in_place(subject.surface.clone())?;
+        Ok(distance(&usual.positions, &own.positions) / subject.surface.diagonal())
     })?;
     // The middle line with −v/n² as printed and −v/n, against Eq. 21, on random stars.
     let (mut printed, mut right) = (0.0f64, 0.0f64);
@@ -399,22 +398,19 @@ fn creases(_: &Lab) -> Result<Finding> {
 fn not_sor(lab: &Lab) -> Result<Finding> {
     let subject = lab.context.stand_in("irregular-quad:200")?;
     let system = subject.system(Scheme::CatmullClark)?;
-    let points = &subject.mesh.positions;
+    let points = subject.surface.positions();
     let sor = Setup::Sor { omega: 0.5, order: None };
     let by_sor = &iterates(&system, points, sor, 1)[0];
     let jacobi = &iterates(&system, points, Setup::THALL, 1)[0];
     // Eq. 3 at every vertex by the limit mask alone, all neighbours old.
-    let limits = limitlab::schemes::catmull_clark::limit_positions(
-        &subject.mesh,
-        &Topology::new(&subject.mesh.faces, subject.mesh.len()),
-    )?;
+    let limits = limitlab::schemes::catmull_clark::limit_positions(&subject.surface)?;
     let by_eq_3: Vec<DVec3> = (0..points.len())
         .map(|v| {
-            let n = subject.topology.incidence.face_count(v) as f64;
+            let n = subject.surface.incidence().face_count(v) as f64;
             points[v] + 0.5 * (n + 5.0) / n * (points[v] - limits[v])
         })
         .collect();
-    let size = subject.mesh.diagonal();
+    let size = subject.surface.diagonal();
     Ok(Finding::corrected(
         "distance over L of the first iterate of Eq. 3 from SOR with ω = ½ (print), from damped Jacobi (right), irregular-quad:200",
         distance(&by_eq_3, by_sor) / size,

@@ -8,7 +8,7 @@ use limitlab::interpolate::normals::{Rotation, rotate_rings};
 use limitlab::interpolate::thall::{
     AttributeRule, MedialAtom, medial_shifts, normal_deviations, refine_attributes, scaled_distances,
 };
-use limitlab::mesh::{Mesh, Topology};
+use limitlab::mesh::Surface;
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
 use limitlab::solvers::{Setup, Stop, run};
 
@@ -33,13 +33,13 @@ pub fn regularisation(lab: &Lab) -> Result<Finding> {
         centroids = largest([centroids, mean.distance((near + fourth) / 4.0)]);
     }
     let rows = each(&lab.polygons()[..60], |subject| {
-        let (mesh, topology) = (&subject.mesh, &subject.topology);
-        let fine = Refinement::CatmullClark.refine(mesh, topology)?;
-        let at = Topology::new(&fine.faces, fine.len());
-        let limits = catmull_clark::limit_positions(mesh, topology)?;
-        let from_quads = catmull_clark::limit_positions(&fine, &at)?;
-        let normals = catmull_clark::limit_normals(mesh, topology)?;
-        let normals_from_quads = catmull_clark::limit_normals(&fine, &at)?;
+        let surface = &subject.surface;
+        let mesh = surface.mesh();
+        let fine = Refinement::CatmullClark.refined(surface)?;
+        let limits = catmull_clark::limit_positions(surface)?;
+        let from_quads = catmull_clark::limit_positions(&fine)?;
+        let normals = catmull_clark::limit_normals(surface)?;
+        let normals_from_quads = catmull_clark::limit_normals(&fine)?;
         let angles = normal_deviations(&normals_from_quads[..mesh.len()], &normals);
         let defined = angles.iter().zip(&normals).filter(|(_, n)| **n != DVec3::ZERO);
         Ok((distance(&limits, &from_quads[..mesh.len()]) / mesh.diagonal(), largest(defined.map(|(a, _)| *a))))
@@ -57,14 +57,12 @@ pub fn regularisation(lab: &Lab) -> Result<Finding> {
 
 pub fn quads_after_one_split(lab: &Lab) -> Result<Finding> {
     let rows = each(&lab.polygons()[..60], |subject| {
-        let extraordinary = |mesh: &Mesh| {
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            (0..mesh.len()).filter(|&v| topology.incidence.face_count(v) != 4).count()
-        };
-        let others = |mesh: &Mesh| mesh.faces.iter().filter(|f| f.len() != 4).count();
-        let once = Refinement::CatmullClark.refine_n(&subject.mesh, 1)?;
-        let twice = Refinement::CatmullClark.refine_n(&once, 1)?;
-        let expected = extraordinary(&subject.mesh) + others(&subject.mesh);
+        let extraordinary =
+            |surface: &Surface| (0..surface.len()).filter(|&v| surface.incidence().face_count(v) != 4).count();
+        let others = |surface: &Surface| surface.faces().iter().filter(|f| f.len() != 4).count();
+        let once = Refinement::CatmullClark.refined(&subject.surface)?;
+        let twice = Refinement::CatmullClark.refined(&once)?;
+        let expected = extraordinary(&subject.surface) + others(&subject.surface);
         Ok([
             others(&once) + others(&twice),
             extraordinary(&once).abs_diff(expected),
@@ -86,16 +84,17 @@ pub fn quads_after_one_split(lab: &Lab) -> Result<Finding> {
 pub fn metrics(_: &Lab) -> Result<Finding> {
     // On the unit sphere the given normals are the points, and every medial atom is the ball itself.
     let subject = exact("irregular-tri:300")?;
-    let (mesh, topology) = (&subject.mesh, &subject.topology);
+    let surface = &subject.surface;
+    let mesh = surface.mesh();
     let given: Vec<DVec3> = mesh.positions.iter().map(|p| p.normalize()).collect();
     let system = subject.system(CC)?;
     let stop = Stop { tolerance: 0.0, max_iterations: 100 };
     let control = run(&system, &mesh.positions, Setup::THALL, &stop).points;
-    let control = Mesh::new(control, mesh.faces.clone());
-    let limits = catmull_clark::limit_positions(&control, topology)?;
-    let normals = catmull_clark::limit_normals(&control, topology)?;
+    let control = surface.with_positions(control);
+    let limits = catmull_clark::limit_positions(&control)?;
+    let normals = catmull_clark::limit_normals(&control)?;
     let radius = vec![0.1; mesh.len()];
-    let start = catmull_clark::limit_positions(mesh, topology)?;
+    let start = catmull_clark::limit_positions(surface)?;
     let angles = normal_deviations(&normals, &given);
     let ball = MedialAtom::fit(mesh.positions.iter().copied().zip(given.iter().copied()));
     let shifts = medial_shifts(&mesh.faces, (&limits, &normals), (&mesh.positions, &given));
@@ -122,13 +121,12 @@ pub fn metrics(_: &Lab) -> Result<Finding> {
 
 pub fn disjoint_rings(lab: &Lab) -> Result<Finding> {
     /// Vertices that lie in the 1-rings of more than one of the first `original` vertices.
-    fn shared(mesh: &Mesh, original: usize) -> usize {
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        let mut owner = vec![usize::MAX; mesh.len()];
-        let mut shared = vec![false; mesh.len()];
+    fn shared(surface: &Surface, original: usize) -> usize {
+        let mut owner = vec![usize::MAX; surface.len()];
+        let mut shared = vec![false; surface.len()];
         for v in 0..original {
-            for &c in topology.incidence.corners_at(v) {
-                for &w in mesh.faces.face(topology.incidence.face_of(c)) {
+            for &c in surface.incidence().corners_at(v) {
+                for &w in surface.faces().face(surface.incidence().face_of(c)) {
                     let w = w as usize;
                     shared[w] |= owner[w] != usize::MAX && owner[w] != v;
                     owner[w] = v;
@@ -138,9 +136,9 @@ pub fn disjoint_rings(lab: &Lab) -> Result<Finding> {
         shared.iter().filter(|&&s| s).count()
     }
     let rows = each(&lab.polygons()[..60], |subject| {
-        let n = subject.mesh.len();
-        let once = Refinement::CatmullClark.refine_n(&subject.mesh, 1)?;
-        let twice = Refinement::CatmullClark.refine_n(&once, 1)?;
+        let n = subject.surface.len();
+        let once = Refinement::CatmullClark.refined(&subject.surface)?;
+        let twice = Refinement::CatmullClark.refined(&once)?;
         Ok([shared(&once, n), shared(&twice, n)])
     })?;
     let total = |k: usize| rows.iter().map(|r| r[k]).sum::<usize>();
@@ -152,18 +150,18 @@ pub fn disjoint_rings(lab: &Lab) -> Result<Finding> {
 
 pub fn rotated_rings(_: &Lab) -> Result<Finding> {
     let subject = exact("irregular-poly:200")?;
-    let (mesh, topology) = (&subject.mesh, &subject.topology);
-    let limits = catmull_clark::limit_positions(mesh, topology)?;
-    let wanted: Vec<DVec3> = catmull_clark::limit_normals(mesh, topology)?
+    let surface = &subject.surface;
+    let mesh = surface.mesh();
+    let limits = catmull_clark::limit_positions(surface)?;
+    let wanted: Vec<DVec3> = catmull_clark::limit_normals(surface)?
         .into_iter()
         .zip(random_points(mesh.len(), 1))
         .map(|(n, axis)| DQuat::from_axis_angle(axis.normalize(), 0.4) * n)
         .collect();
     let given: Vec<Option<DVec3>> = wanted.iter().copied().map(Some).collect();
-    let turned = rotate_rings(mesh, Refinement::CatmullClark, &given, Rotation::default())?;
-    let at = Topology::new(&turned.mesh.faces, turned.mesh.len());
-    let after = catmull_clark::limit_positions(&turned.mesh, &at)?;
-    let normals = catmull_clark::limit_normals(&turned.mesh, &at)?;
+    let turned = rotate_rings(surface, Refinement::CatmullClark, &given, Rotation::default())?;
+    let after = catmull_clark::limit_positions(&turned.surface)?;
+    let normals = catmull_clark::limit_normals(&turned.surface)?;
     Ok(Finding::reproduced(vec![
         Evidence::at_most(
             "largest angle between wanted and found normals, turned by up to 0.4, irregular-poly:200",
@@ -181,23 +179,21 @@ pub fn rotated_rings(_: &Lab) -> Result<Finding> {
 
 pub fn attributes(_: &Lab) -> Result<Finding> {
     let subject = exact("irregular-poly:200")?;
-    let n = subject.mesh.len();
+    let n = subject.surface.len();
     let values = random_points(n, 1);
     let after = |rule: AttributeRule| -> Result<f64> {
-        let mut mesh = subject.mesh.clone();
+        let mut surface = subject.surface.clone();
         let mut now = values.clone();
         for _ in 0..3 {
-            let topology = Topology::new(&mesh.faces, mesh.len());
-            now = refine_attributes(&mesh, &topology, now, rule)?;
-            mesh = Refinement::CatmullClark.refine(&mesh, &topology)?;
+            now = refine_attributes(&surface, now, rule)?;
+            surface = Refinement::CatmullClark.refined(&surface)?;
         }
         Ok(distance(&now[..n], &values))
     };
-    let system = LimitSystem::new(&subject.mesh, &subject.topology, CC)?;
+    let system = LimitSystem::new(&subject.surface, CC)?;
     let stop = Stop { tolerance: 1e-10, max_iterations: 1 };
     let control = run(&system, &values, Setup::Cholesky, &stop).points;
-    let control = Mesh::new(control, subject.mesh.faces.clone());
-    let limits = catmull_clark::limit_positions(&control, &subject.topology)?;
+    let limits = catmull_clark::limit_positions(&subject.surface.with_positions(control))?;
     Ok(Finding::reproduced(vec![
         Evidence::equal(
             "largest change of a random value at an original vertex, three midpoint splits, irregular-poly:200",

@@ -11,8 +11,8 @@ use limitlab::analysis::radius::sweep_radius;
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::subset::Restriction;
 use limitlab::interpolate::zheng_cai::{Constraints, PhaseOne, interpolate};
+use limitlab::mesh::Surface;
 use limitlab::mesh::order::Order;
-use limitlab::mesh::{Mesh, Topology};
 use limitlab::schemes::doo_sabin::Rule;
 use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::gauss_seidel::sweep;
@@ -260,20 +260,21 @@ fn weights(_: &Lab) -> Result<Finding> {
 
 fn after_one_step(lab: &Lab) -> Result<Finding> {
     let rows = each(&lab.polygons()[..60], |subject| {
-        let (mesh, topology) = (&subject.mesh, &subject.topology);
-        let others = |mesh: &Mesh| mesh.faces.iter().filter(|f| f.len() != 4).count();
-        let valence = |topology: &Topology, v: usize| topology.incidence.face_count(v);
-        let expected = others(mesh) + (0..mesh.len()).filter(|&v| valence(topology, v) != 4).count();
+        let surface = &subject.surface;
+        let others = |surface: &Surface| surface.faces().iter().filter(|f| f.len() != 4).count();
+        let of_other_valence =
+            |surface: &Surface| (0..surface.len()).filter(|&v| surface.incidence().face_count(v) != 4).count();
+        let expected = others(surface) + of_other_valence(surface);
         let (mut not_four, mut changed, mut moved) = (0, 0, 0.0f64);
-        let mut now = mesh.clone();
+        let mut now = surface.clone();
         for _ in 0..3 {
-            let fine = Refinement::DooSabin.refine_n(&now, 1)?;
-            let at = Topology::new(&fine.faces, fine.len());
-            not_four += (0..fine.len()).filter(|&v| valence(&at, v) != 4).count();
+            let fine = Refinement::DooSabin.refined(&now)?;
+            not_four += of_other_valence(&fine);
             changed += others(&fine).abs_diff(expected);
             // Type-F faces come first, in the order of the old faces.
-            let step = (0..now.faces.len()).map(|f| faces::centroid(&now, f).distance(faces::centroid(&fine, f)));
-            moved = largest([moved, largest(step) / mesh.diagonal()]);
+            let center = |surface: &Surface, f: usize| faces::centroid(surface.mesh(), f);
+            let step = (0..now.faces().len()).map(|f| center(&now, f).distance(center(&fine, f)));
+            moved = largest([moved, largest(step) / surface.diagonal()]);
             now = fine;
         }
         Ok((not_four, changed, moved))
@@ -300,11 +301,15 @@ fn after_one_step(lab: &Lab) -> Result<Finding> {
 fn row_sums(lab: &Lab) -> Result<Finding> {
     let rows = each(lab.polygons(), |subject| {
         let system = subject.system(Scheme::ZhengCai)?;
-        let incidence = &subject.topology.incidence;
+        let incidence = subject.surface.incidence();
         let (mut worst, mut gap) = (0.0f64, f64::INFINITY);
         for v in 0..system.len() {
-            let sizes =
-                || incidence.corners_at(v).iter().map(|&c| subject.mesh.faces.range(incidence.face_of(c)).len() as f64);
+            let sizes = || {
+                incidence
+                    .corners_at(v)
+                    .iter()
+                    .map(|&c| subject.surface.faces().range(incidence.face_of(c)).len() as f64)
+            };
             let m = incidence.face_count(v) as f64;
             let others: f64 = system.m.row(v).filter(|(j, _)| *j != v).map(|(_, z)| z).sum();
             let diagonal = system.m.get(v, v);
@@ -382,8 +387,8 @@ fn order(lab: &Lab) -> Result<Finding> {
         let subject = lab.context.stand_in(name)?;
         for scheme in OF_THE_PAPERS.into_iter().filter(|&s| subject.suits(s)) {
             let system = subject.system(scheme)?;
-            let stop = Stop { tolerance: 1e-10 * subject.mesh.diagonal(), max_iterations: 10_000 };
-            let rows = order_study(&subject.mesh, &subject.topology, &system, &[1.0], 5, &stop)?;
+            let stop = Stop { tolerance: 1e-10 * subject.surface.diagonal(), max_iterations: 10_000 };
+            let rows = order_study(&subject.surface, &system, &[1.0], 5, &stop)?;
             // The greedy method has no radius, and its updates are no sweeps.
             let swept = || rows.iter().filter(|r| r.rho.is_some());
             let radii = || swept().filter_map(|r| r.rho);
@@ -438,21 +443,22 @@ fn nasri_non_singular(lab: &Lab) -> Result<Finding> {
 
 fn subset(lab: &Lab) -> Result<Finding> {
     let rows = each(lab.polygons(), |subject| {
-        let marks: Vec<bool> = (0..subject.mesh.len()).map(|v| v % 3 == 0).collect();
+        let marks: Vec<bool> = (0..subject.surface.len()).map(|v| v % 3 == 0).collect();
         let constraints = Constraints { interpolated: Some(&marks), ..Constraints::default() };
         let phase = PhaseOne { max_iterations: 500, eps: 1e-12, ..PhaseOne::default() };
-        let done = interpolate(&subject.mesh, &subject.topology, &constraints, &phase)?;
+        let done = interpolate(&subject.surface, &constraints, &phase)?;
         let system = subject.system(Scheme::ZhengCai)?;
         let part = ends(&Restriction::new(&system, &marks)?.system)?;
         let free = (0..marks.len()).filter(|&v| !marks[v]);
-        let moved = free.map(|v| done.auxiliary.mesh.positions[v].distance(subject.mesh.positions[v]));
+        let moved = free.map(|v| done.auxiliary.surface.positions()[v].distance(subject.surface.positions()[v]));
         let held = (0..marks.len()).filter(|&v| marks[v]);
         let off = held.map(|v| {
-            faces::centroid(&done.first.mesh, done.first.first_vertex_face + v).distance(subject.mesh.positions[v])
+            faces::centroid(done.first.surface.mesh(), done.first.first_vertex_face + v)
+                .distance(subject.surface.positions()[v])
         });
         Ok((
             largest(moved.chain([0.0])),
-            largest(off) / subject.mesh.diagonal(),
+            largest(off) / subject.surface.diagonal(),
             part.min,
             usize::from(!done.auxiliary.passed),
         ))

@@ -5,7 +5,8 @@ use glam::DVec3;
 use limitlab::Result;
 use limitlab::interpolate::thall::normal_deviations;
 use limitlab::interpolate::zheng_cai::{Auxiliary, Constraints, FirstRefinement, PhaseOne, auxiliary};
-use limitlab::mesh::{Mesh, Topology};
+use limitlab::mesh::{Mesh, Surface};
+use limitlab::schemes::Refinement;
 use limitlab::schemes::doo_sabin::{Rule, face_normals, refine_by};
 
 use super::finding::{Evidence, Finding};
@@ -28,10 +29,10 @@ struct Corrected {
 
 fn corrected(subject: &Subject, sweeps: usize, constraints: &Constraints) -> Result<Corrected> {
     let phase = PhaseOne { max_iterations: sweeps, eps: 0.0, ..PhaseOne::default() };
-    let (mesh, topology) = (&subject.mesh, &subject.topology);
-    let auxiliary = auxiliary(mesh, topology, constraints.interpolated, &phase)?;
-    let before = refine_by(Rule::ZhengCai, &auxiliary.mesh, topology)?;
-    let after = FirstRefinement::new(&auxiliary.mesh, topology, Rule::ZhengCai, &mesh.positions, constraints)?;
+    let surface = &subject.surface;
+    let auxiliary = auxiliary(surface, constraints.interpolated, &phase)?;
+    let before = refine_by(Rule::ZhengCai, &auxiliary.surface)?;
+    let after = FirstRefinement::new(&auxiliary.surface, Rule::ZhengCai, surface.positions(), constraints)?;
     Ok(Corrected { auxiliary, before, after })
 }
 
@@ -59,11 +60,11 @@ pub(super) fn perturbation(lab: &Lab) -> Result<Finding> {
     let subject = lab.context.stand_in(POLYGONS)?;
     let done = corrected(&subject, 2, &Constraints::default())?;
     let first = done.after.first_vertex_face;
-    let size = subject.mesh.diagonal();
+    let size = subject.surface.diagonal();
     let (mut off, mut flat, mut across) = (0.0f64, 0.0f64, 0.0f64);
-    for v in 0..subject.mesh.len() {
-        let (old, new) = (ring(&done.before, first, v), ring(&done.after.mesh, first, v));
-        let (n, point) = (average_normal(&old), subject.mesh.positions[v]);
+    for v in 0..subject.surface.len() {
+        let (old, new) = (ring(&done.before, first, v), ring(done.after.surface.mesh(), first, v));
+        let (n, point) = (average_normal(&old), subject.surface.positions()[v]);
         off = largest([off, mean(&new).distance(point) / size]);
         flat = largest([flat, largest(new.iter().map(|w| (w - point).dot(n).abs() / size))]);
         // Smallest change: orthogonal to all changes that keep centroid and plane.
@@ -93,17 +94,17 @@ pub(super) fn pseudo_code(lab: &Lab) -> Result<Finding> {
     let subject = lab.context.stand_in(POLYGONS)?;
     let done = corrected(&subject, 2, &Constraints::default())?;
     let first = done.after.first_vertex_face;
-    let size = subject.mesh.diagonal();
+    let size = subject.surface.diagonal();
     let (mut printed, mut right) = (0.0f64, 0.0f64);
-    for v in 0..subject.mesh.len() {
+    for v in 0..subject.surface.len() {
         let old = ring(&done.before, first, v);
         let (n, center) = (average_normal(&old), mean(&old));
-        let target = subject.mesh.positions[v];
+        let target = subject.surface.positions()[v];
         let moved = |to: DVec3| {
             let new: Vec<DVec3> = old.iter().map(|w| *w + (center - *w).dot(n) * n + (to - center)).collect();
             mean(&new).distance(target) / size
         };
-        printed = largest([printed, moved(done.auxiliary.mesh.positions[v])]);
+        printed = largest([printed, moved(done.auxiliary.surface.positions()[v])]);
         right = largest([right, moved(target)]);
     }
     Ok(Finding::corrected(
@@ -117,10 +118,10 @@ pub(super) fn pseudo_code(lab: &Lab) -> Result<Finding> {
 
 pub(super) fn exact_interpolation(lab: &Lab) -> Result<Finding> {
     let subject = lab.context.stand_in(POLYGONS)?;
-    let size = subject.mesh.diagonal();
+    let size = subject.surface.diagonal();
     let done = corrected(&subject, 1, &Constraints::default())?;
     let off = |mesh: &Mesh| {
-        let points = subject.mesh.positions.iter().enumerate();
+        let points = subject.surface.positions().iter().enumerate();
         largest(points.map(|(v, p)| centroid(mesh, done.after.first_vertex_face + v).distance(*p) / size))
     };
     Ok(Finding::reproduced(vec![
@@ -129,8 +130,8 @@ pub(super) fn exact_interpolation(lab: &Lab) -> Result<Finding> {
             off(&done.before),
             1e-3,
         ),
-        Evidence::at_most("the same corrected, at level 1", off(&done.after.mesh), ROUNDING),
-        Evidence::at_most("the same at level 4", off(&done.after.surface(4)?), ROUNDING),
+        Evidence::at_most("the same corrected, at level 1", off(done.after.surface.mesh()), ROUNDING),
+        Evidence::at_most("the same at level 4", off(&done.after.at_level(4)?), ROUNDING),
     ]))
 }
 
@@ -138,8 +139,8 @@ pub(super) fn exact_interpolation(lab: &Lab) -> Result<Finding> {
 fn tilted_normals(subject: &Subject, sign: f64) -> Result<Vec<Option<DVec3>>> {
     let done = corrected(subject, 5, &Constraints::default())?;
     let first = done.after.first_vertex_face;
-    let random = random_points(subject.mesh.len(), 7);
-    Ok((0..subject.mesh.len())
+    let random = random_points(subject.surface.len(), 7);
+    Ok((0..subject.surface.len())
         .map(|v| Some(sign * (average_normal(&ring(&done.before, first, v)) + 0.5 * random[v])))
         .collect())
 }
@@ -154,7 +155,7 @@ pub(super) fn given_normals(lab: &Lab) -> Result<Finding> {
     };
     let (plus, wanted) = refined(1.0)?;
     let (minus, _) = refined(-1.0)?;
-    let fine = plus.surface(3)?;
+    let fine = plus.at_level(3)?;
     let first = plus.first_vertex_face;
     let normals = face_normals(&fine);
     let found: Vec<DVec3> = (0..wanted.len())
@@ -171,7 +172,7 @@ pub(super) fn given_normals(lab: &Lab) -> Result<Finding> {
         ),
         Evidence::at_most(
             "largest difference over L of the meshes for n and −n",
-            super::lab::distance(&plus.mesh.positions, &minus.mesh.positions) / subject.mesh.diagonal(),
+            super::lab::distance(plus.surface.positions(), minus.surface.positions()) / subject.surface.diagonal(),
             1e-15,
         ),
     ]))
@@ -179,21 +180,21 @@ pub(super) fn given_normals(lab: &Lab) -> Result<Finding> {
 
 pub(super) fn shape_handles(lab: &Lab) -> Result<Finding> {
     let subject = lab.context.stand_in(POLYGONS)?;
-    let n = subject.mesh.len();
+    let n = subject.surface.len();
     let handles: Vec<f64> = (0..n).map(|v| [0.4, 1.0, 2.5][v % 3]).collect();
     let plain = corrected(&subject, 5, &Constraints::default())?.after;
     let constraints = Constraints { handles: Some(&handles), ..Constraints::default() };
     let scaled = corrected(&subject, 5, &constraints)?.after;
-    let size = subject.mesh.diagonal();
+    let size = subject.surface.diagonal();
     let first = plain.first_vertex_face;
     let (mut form, mut off) = (0.0f64, 0.0f64);
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for (v, &handle) in handles.iter().enumerate() {
-        let (a, b) = (ring(&plain.mesh, first, v), ring(&scaled.mesh, first, v));
+        let (a, b) = (ring(plain.surface.mesh(), first, v), ring(scaled.surface.mesh(), first, v));
         let d = mean(&a);
         let wrong = a.iter().zip(&b).map(|(a, b)| (*b - (d + handle * (*a - d))).length() / size);
         form = largest([form, largest(wrong)]);
-        off = largest([off, mean(&b).distance(subject.mesh.positions[v]) / size]);
+        off = largest([off, mean(&b).distance(subject.surface.positions()[v]) / size]);
         before.push(average_normal(&a));
         after.push(average_normal(&b));
     }
@@ -216,24 +217,24 @@ pub(super) fn tangent_plane(lab: &Lab) -> Result<Finding> {
     let subject = lab.context.stand_in("irregular-poly:60")?;
     let done = corrected(&subject, 5, &Constraints::default())?.after;
     let first = done.first_vertex_face;
-    let at_start = face_normals(&done.mesh);
-    let n = subject.mesh.len();
+    let at_start = face_normals(done.surface.mesh());
+    let n = subject.surface.len();
     // The largest angle between a type-V face's plane and the faces beside it.
-    let beside = |mesh: &Mesh| {
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        let normals = face_normals(mesh);
+    let beside = |surface: &Surface| {
+        let normals = face_normals(surface.mesh());
         let mut worst = Vec::new();
         for v in 0..n {
-            let range = mesh.faces.range(first + v);
-            let across = range.filter_map(|c| topology.twin(c as u32));
-            let pairs = across.map(|t| normals[topology.incidence.face_of(t)]);
+            let range = surface.faces().range(first + v);
+            let across = range.filter_map(|c| surface.topology().twin(c as u32));
+            let pairs = across.map(|t| normals[surface.incidence().face_of(t)]);
             let angles: Vec<f64> = pairs.map(|m| normal_deviations(&[m], &[normals[first + v]])[0]).collect();
             worst.push(largest(angles));
         }
         median(worst)
     };
-    let (second, sixth) = (done.surface(2)?, done.surface(6)?);
-    let kept = face_normals(&sixth);
+    let level = |levels: usize| Refinement::DooSabin.refined_n(&done.surface, levels);
+    let (second, sixth) = (level(1)?, level(5)?);
+    let kept = face_normals(sixth.mesh());
     Ok(Finding::reproduced(vec![
         Evidence::at_most(
             "largest angle between the planes of a type-V face at levels 1 and 6, irregular-poly:60",
@@ -250,8 +251,8 @@ pub(super) fn tangent_plane(lab: &Lab) -> Result<Finding> {
 
 pub(super) fn separated_faces(lab: &Lab) -> Result<Finding> {
     let rows = each(lab.polygons(), |subject| {
-        let fine = refine_by(Rule::ZhengCai, &subject.mesh, &subject.topology)?;
-        let first = subject.mesh.faces.len() + subject.topology.edges();
+        let fine = refine_by(Rule::ZhengCai, &subject.surface)?;
+        let first = subject.surface.faces().len() + subject.surface.topology().edges();
         let mut uses = vec![0usize; fine.len()];
         for f in first..fine.faces.len() {
             for &v in fine.faces.face(f) {
@@ -280,7 +281,7 @@ pub(super) fn normal_in_plane(lab: &Lab) -> Result<Finding> {
         ring.iter().zip(next).map(|(a, b)| (a - center).cross(b - center)).sum::<DVec3>().dot(n).abs()
     };
     let refined = |given: DVec3| {
-        let mut normals = vec![None; subject.mesh.len()];
+        let mut normals = vec![None; subject.surface.len()];
         normals[0] = Some(given);
         let constraints = Constraints { normals: Some(&normals), ..Constraints::default() };
         corrected(&subject, 5, &constraints)
@@ -288,7 +289,7 @@ pub(super) fn normal_in_plane(lab: &Lab) -> Result<Finding> {
     const TILT: f64 = 1e-3;
     let given = (side + TILT * normal).normalize();
     let tilted = refined(given)?.after;
-    let ratio = area(&ring(&tilted.mesh, first, 0), given) / area(&flat, normal);
+    let ratio = area(&ring(tilted.surface.mesh(), first, 0), given) / area(&flat, normal);
     Ok(Finding::settled(vec![
         Evidence::at_most(
             "area of a type-V face whose given normal is tilted by 0.001 from its plane, over that of the average normal",
@@ -304,11 +305,11 @@ pub(super) fn middle_line(lab: &Lab) -> Result<Finding> {
     let subject = lab.context.stand_in(POLYGONS)?;
     let done = corrected(&subject, 2, &Constraints::default())?;
     let first = done.after.first_vertex_face;
-    let size = subject.mesh.diagonal();
+    let size = subject.surface.diagonal();
     let (mut printed, mut right) = (0.0f64, 0.0f64);
-    for v in 0..subject.mesh.len() {
+    for v in 0..subject.surface.len() {
         let old = ring(&done.before, first, v);
-        let (n, d) = (average_normal(&old), subject.mesh.positions[v]);
+        let (n, d) = (average_normal(&old), subject.surface.positions()[v]);
         let center = mean(&old);
         // Eq. 16 with D = I: λ − (λ·n)n = 2[(W_c − I) − ((W_c − I)·n)n].
         let along = 2.0 * ((center - d) - (center - d).dot(n) * n);

@@ -24,8 +24,8 @@ pub fn sweeps(lab: &Lab) -> Result<Finding> {
     }
     let subject = lab.context.model("closed/psb_m1630_hat_562v.off", Boundary::Refuse)?;
     let phase = PhaseOne { max_iterations: 100, ..PhaseOne::default() };
-    let found = auxiliary(&subject.mesh, &subject.topology, None, &phase)?;
-    let size = subject.mesh.diagonal();
+    let found = auxiliary(&subject.surface, None, &phase)?;
+    let size = subject.surface.diagonal();
     let updates = (1..)
         .zip(&found.updates)
         .map(|(k, u)| Evidence::shown(format!("largest update of sweep {k} over L"), u / size));
@@ -69,12 +69,12 @@ fn seconds<T>(repeats: usize, mut work: impl FnMut() -> T) -> f64 {
 
 pub fn speed(lab: &Lab) -> Result<Finding> {
     let subject = model_562(lab)?;
-    let points = &subject.mesh.positions;
+    let points = subject.surface.positions();
     let nasri = subject.system(Scheme::Nasri)?;
     let phase = PhaseOne::default();
-    let own = seconds(5, || auxiliary(&subject.mesh, &subject.topology, None, &phase).map(|a| a.updates.len()));
+    let own = seconds(5, || auxiliary(&subject.surface, None, &phase).map(|a| a.updates.len()));
     let dense = seconds(3, || gaussian_elimination(&nasri, points));
-    let stop = Stop { tolerance: 1e-10 * subject.mesh.diagonal(), max_iterations: 1 };
+    let stop = Stop { tolerance: 1e-10 * subject.surface.diagonal(), max_iterations: 1 };
     let direct = |setup| seconds(3, || run(&nasri, points, setup, &stop));
     let ratio = |seconds: f64| Value::Time(seconds / own);
     Ok(Finding::reproduced(vec![
@@ -90,9 +90,9 @@ pub fn size(lab: &Lab) -> Result<Finding> {
     const MEMORY: f64 = 512.0 * 1024.0 * 1024.0;
     let subject = model_11540(lab)?;
     let nasri = subject.system(Scheme::Nasri)?;
-    let size = subject.mesh.diagonal();
+    let size = subject.surface.diagonal();
     let stop = Stop { tolerance: 1e-10 * size, max_iterations: 1 };
-    let solution = run(&nasri, &subject.mesh.positions, Setup::Cholesky, &stop);
+    let solution = run(&nasri, subject.surface.positions(), Setup::Cholesky, &stop);
     // A double and a 32-bit row number for every entry of the factor.
     let sparse = solution.fill.map_or(f64::NAN, |fill| 12.0 * fill as f64);
     let n = nasri.len() as f64;
@@ -116,7 +116,7 @@ pub fn linear_time(_: &Lab) -> Result<Finding> {
         let subject = exact(&format!("irregular-poly:{n}"))?;
         entries.push(entries_per_vertex(&subject.system(Scheme::ZhengCai)?));
         let phase = PhaseOne { max_iterations: 5, eps: 0.0, sweep: Sweep::GaussSeidel(None) };
-        let took = seconds(2, || auxiliary(&subject.mesh, &subject.topology, None, &phase).map(|a| a.updates.len()));
+        let took = seconds(2, || auxiliary(&subject.surface, None, &phase).map(|a| a.updates.len()));
         times.push(took / n as f64);
     }
     Ok(Finding::reproduced(vec![
@@ -147,13 +147,13 @@ pub fn five_iterations(lab: &Lab) -> Result<Finding> {
 
 pub fn phases(lab: &Lab) -> Result<Finding> {
     let ratio = |subject: &Subject| -> Result<Value> {
-        let (mesh, topology) = (&subject.mesh, &subject.topology);
+        let surface = &subject.surface;
         let phase = PhaseOne::default();
-        let made = auxiliary(mesh, topology, None, &phase)?;
-        let first = seconds(5, || auxiliary(mesh, topology, None, &phase).map(|a| a.updates.len()));
+        let made = auxiliary(surface, None, &phase)?;
+        let first = seconds(5, || auxiliary(surface, None, &phase).map(|a| a.updates.len()));
         let plain = Constraints::default();
         let second = seconds(5, || {
-            FirstRefinement::new(&made.mesh, topology, Rule::ZhengCai, &mesh.positions, &plain).map(|f| f.mesh.len())
+            FirstRefinement::new(&made.surface, Rule::ZhengCai, surface.positions(), &plain).map(|f| f.surface.len())
         });
         Ok(Value::Time(second / first))
     };

@@ -8,7 +8,7 @@ use limitlab::Result;
 use limitlab::analysis::splitting::Layout;
 use limitlab::error::Error;
 use limitlab::interpolate::lin_luo::curve::{Ends, refine, refine_n};
-use limitlab::mesh::{Faces, Mesh, Topology};
+use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::unified_sqrt3;
 use limitlab_experiments::report::{Colour, Dash, Figure, LinePlot, Marker, Series, palette};
 
@@ -19,9 +19,8 @@ const POLYGON: Colour = Colour(150, 150, 150);
 /// Levels after which a curve looks smooth.
 const LEVELS: usize = 6;
 
-fn polygon(name: &str, points: &[(f64, f64)]) -> Subject {
-    let points = points.iter().map(|&(x, y)| DVec3::new(x, y, 0.0)).collect();
-    plain(name, Mesh::new(points, Faces::default()))
+fn polygon(points: &[(f64, f64)]) -> Vec<DVec3> {
+    points.iter().map(|&(x, y)| DVec3::new(x, y, 0.0)).collect()
 }
 
 fn flat(points: &[DVec3]) -> impl Iterator<Item = (f64, f64)> {
@@ -34,15 +33,14 @@ fn segments(pairs: impl IntoIterator<Item = (DVec3, DVec3)>) -> Vec<(f64, f64)> 
     pairs.into_iter().flat_map(|(a, b)| [(a.x, a.y), (b.x, b.y), gap]).collect()
 }
 
-fn line<'a>(name: &'a str, shows: &'a str, subject: &'a Subject) -> Line<'a> {
+fn line<'a>(name: &'a str, shows: &'a str, subject: (&'a str, &'a [DVec3])) -> Line<'a> {
     Line { name, shows, subject, iterations: None, error: None }
 }
 
 /// Fig. 2: a step of the cubic B-spline and one of the four-point scheme.
 pub fn relation(album: &mut Album) -> Result<()> {
     let corners = [(0.0, 0.0), (1.2, 2.0), (3.2, 2.6), (4.6, 0.9), (6.4, 0.4)];
-    let subject = polygon("polygon of 5 points", &corners);
-    let p = &subject.mesh.positions;
+    let p = &polygon(&corners);
     let every_second =
         |points: &[DVec3], from: usize| -> Vec<DVec3> { points.iter().skip(from).step_by(2).copied().collect() };
     let spline = refine(p, &[1.0; 5], Ends::Open).0;
@@ -68,14 +66,13 @@ pub fn relation(album: &mut Album) -> Result<()> {
     let shows =
         "Lin-Luo Fig. 2: new points of the four-point scheme from the displacements of the cubic B-spline's step";
     let figure = Figure { width: 480, height: 165, ..Figure::new(plot) };
-    album.add(&line("lin-luo-2", shows, &subject), &figure)
+    album.add(&line("lin-luo-2", shows, ("polygon of 5 points", p)), &figure)
 }
 
 /// Fig. 3: curves for several α; ends and α a point of its own beside.
 pub fn samples(album: &mut Album) -> Result<()> {
     let corners = [(0.0, 0.0), (0.4, 2.2), (1.9, 1.2), (3.3, 2.4), (4.2, 0.6), (2.4, -0.8)];
-    let subject = polygon("polygon of 6 points", &corners);
-    let p = &subject.mesh.positions;
+    let p = &polygon(&corners);
     let all = |alpha: f64| vec![alpha; p.len()];
     let drawn = |ends: Ends| {
         let closing = if ends == Ends::Closed { &p[..1] } else { &[] };
@@ -128,7 +125,7 @@ pub fn samples(album: &mut Album) -> Result<()> {
     let figure = Figure { width: 690, height: 180, ..Figure::row(panels) };
     let shows = "Lin-Luo Fig. 3: the unified curve scheme for α from 0 (four-point) to 1 (B-spline), closed and open, and \
                  with α = 0 at some points";
-    album.add(&line("lin-luo-3", shows, &subject), &figure)
+    album.add(&line("lin-luo-3", shows, ("polygon of 6 points", p)), &figure)
 }
 
 /// A vertex of valence n with three rings about it in the plane, closed by a vertex far away.
@@ -153,19 +150,20 @@ fn star(n: usize) -> Result<Subject> {
     if points.iter().any(|p| !p.is_finite()) {
         return Err(Error::Computation(format!("no star of valence {n}")));
     }
-    Ok(plain(&format!("star of valence {n}"), Mesh::new(points, faces)))
+    plain(&format!("star of valence {n}"), Mesh::new(points, faces))
 }
 
 /// The weights of the new vertex in face 0, read off from the refinement of unit vectors.
-fn weights(mesh: &Mesh) -> Result<Vec<f64>> {
-    let topology = Topology::new(&mesh.faces, mesh.len());
-    let alpha = vec![1.0; mesh.len()];
-    (0..mesh.len())
+fn weights(surface: &Surface) -> Result<Vec<f64>> {
+    let n = surface.len();
+    let alpha = vec![1.0; n];
+    let mut unit = surface.clone();
+    (0..n)
         .map(|v| {
-            let mut unit = Mesh::new(vec![DVec3::ZERO; mesh.len()], mesh.faces.clone());
-            unit.positions[v] = DVec3::X;
-            let (fine, _) = unified_sqrt3::refine(&unit, &topology, &alpha)?;
-            Ok(fine.positions[mesh.len()].x)
+            unit.positions_mut().fill(DVec3::ZERO);
+            unit.positions_mut()[v] = DVec3::X;
+            let (fine, _) = unified_sqrt3::refine(&unit, &alpha)?;
+            Ok(fine.positions[n].x)
         })
         .collect()
 }
@@ -176,14 +174,14 @@ pub fn stencils(album: &mut Album) -> Result<()> {
     let mut last = None;
     for (title, n) in [("regular", 6), ("a corner of valence 7", 7)] {
         let subject = star(n)?;
-        let mesh = &subject.mesh;
+        let mesh = subject.surface.mesh();
         let apex = mesh.len() as u32 - 1;
         let inner = mesh.faces.iter().filter(|face| !face.contains(&apex));
         let at = |v: u32| mesh.positions[v as usize];
         let edges = inner.flat_map(|f| (0..3).map(|k| (at(f[k]), at(f[(k + 1) % 3]))));
         let mut series = vec![Series::line("", segments(edges)).colour(Colour(205, 205, 205))];
         // Vertices of one weight together, the largest first.
-        let weights = weights(mesh)?;
+        let weights = weights(&subject.surface)?;
         let mut order: Vec<usize> = (0..mesh.len()).collect();
         order.retain(|&v| weights[v].abs() > 1e-12);
         order.sort_by(|&a, &b| weights[b].total_cmp(&weights[a]));
@@ -207,5 +205,5 @@ pub fn stencils(album: &mut Album) -> Result<()> {
     let figure = Figure { width: 640, height: 240, ..Figure::row(panels) };
     let shows = "Lin-Luo Fig. 4: the weights of a new vertex of the interpolatory √3 scheme, with how many vertices have \
                  each";
-    album.add(&line("lin-luo-4", shows, &subject), &figure)
+    album.add(&line("lin-luo-4", shows, subject.points()), &figure)
 }

@@ -6,69 +6,68 @@ use glam::DVec3;
 use limitlab::Result;
 use limitlab::interpolate::nasri;
 use limitlab::interpolate::zheng_cai::{Constraints, PhaseOne, TwoPhase, interpolate};
-use limitlab::mesh::{Mesh, builtin};
+use limitlab::mesh::{Surface, builtin};
 use limitlab::schemes::Refinement;
-use limitlab::schemes::doo_sabin::{Rule, refine_by};
 use limitlab::solvers::{Setup, Stop};
-use limitlab_experiments::report::{Colour, Paint, Picture, Points, Surface, Vectors, View};
+use limitlab_experiments::report::{Colour, Paint, Picture, Points, ShadedMesh, Vectors, View};
 
 use super::{Album, CONTROL, FACES, GIVEN, Line, POINT, cage, plain, sheet, view};
 use crate::context::Subject;
 
 /// Doo-Sabin until facets are no longer seen.
-fn surface(first: &Mesh) -> Result<Surface> {
+fn surface(first: &Surface) -> Result<ShadedMesh> {
     let mut levels = 1;
-    while levels < 5 && (first.faces.corners().len() << (2 * levels)) < FACES {
+    while levels < 5 && (first.faces().corners().len() << (2 * levels)) < FACES {
         levels += 1;
     }
-    Ok(Surface::smooth(Refinement::DooSabin.refine_n(first, levels)?))
+    Ok(ShadedMesh::smooth(Refinement::DooSabin.refine_n(first, levels)?))
 }
 
 /// The two-phase method with the paper's settings.
 fn two_phase(subject: &Subject, constraints: &Constraints) -> Result<TwoPhase> {
     let phase = PhaseOne::default();
-    interpolate(&subject.mesh, &subject.topology, constraints, &phase)
+    interpolate(&subject.surface, constraints, &phase)
 }
 
 /// The largest distance of the centroid of a type-V face from its point, over all that are interpolated.
 fn largest_error(subject: &Subject, found: &TwoPhase, is_interpolated: impl Fn(usize) -> bool) -> f64 {
-    let mesh = &found.first.mesh;
+    let mesh = found.first.surface.mesh();
     let distance = |v: usize| {
         let face = mesh.faces.face(found.first.first_vertex_face + v);
         let sum: DVec3 = face.iter().map(|&c| mesh.positions[c as usize]).sum();
-        (sum / face.len() as f64).distance(subject.mesh.positions[v])
+        (sum / face.len() as f64).distance(subject.surface.positions()[v])
     };
-    (0..subject.mesh.len()).filter(|&v| is_interpolated(v)).map(distance).fold(0.0, f64::max)
+    (0..subject.surface.len()).filter(|&v| is_interpolated(v)).map(distance).fold(0.0, f64::max)
 }
 
 /// Panels that show the same part of space.
-fn panels(view: View, framed: &[DVec3], shown: Vec<(&str, Surface)>) -> Vec<Picture> {
+fn panels(view: View, framed: &[DVec3], shown: Vec<(&str, ShadedMesh)>) -> Vec<Picture> {
     shown.into_iter().map(|(caption, surface)| Picture::new(caption, view).surface(surface).frame(framed)).collect()
 }
 
 /// Fig. 3: the Doo-Sabin surface of a mesh, and the one through its vertices.
 pub fn approximation(album: &mut Album) -> Result<()> {
     let subject = album.subject("closed/letterp_26v_poly.off", "irregular-poly:40")?;
-    let approximating = refine_by(Rule::DooSabin, &subject.mesh, &subject.topology)?;
+    let approximating = Refinement::DooSabin.refined(&subject.surface)?;
     let found = two_phase(&subject, &Constraints::default())?;
-    let auxiliary = &found.auxiliary.mesh;
+    let auxiliary = found.auxiliary.surface.mesh();
     let shown = vec![
-        ("(a) input", cage(&subject.mesh, GIVEN)),
-        ("(b) refined once", cage(&approximating, CONTROL)),
+        ("(a) input", cage(subject.surface.mesh(), GIVEN)),
+        ("(b) refined once", cage(approximating.mesh(), CONTROL)),
         ("(c) its surface", surface(&approximating)?),
         ("(d) auxiliary mesh", cage(auxiliary, CONTROL)),
-        ("(e) refined, corrected", cage(&found.first.mesh, CONTROL)),
-        ("(f) its surface", surface(&found.first.mesh)?),
+        ("(e) refined, corrected", cage(found.first.surface.mesh(), CONTROL)),
+        ("(f) its surface", surface(&found.first.surface)?),
     ];
     let view = view(DVec3::Y, 25.0, 20.0);
     let mut panels = panels(view, &auxiliary.positions, shown);
     for at in [2, 5] {
-        panels[at].points.push(Points { positions: subject.mesh.positions.clone(), radius: 1.0, colour: POINT });
+        panels[at].points.push(Points { positions: subject.surface.positions().to_vec(), radius: 1.0, colour: POINT });
     }
     let line = Line {
         name: "zheng-cai-3",
         shows: "Zheng-Cai Fig. 3: approximation (above) and interpolation (below) by Doo-Sabin; given points red",
-        subject: &subject,
+        subject: subject.points(),
         iterations: Some(found.auxiliary.updates.len()),
         error: Some(largest_error(&subject, &found, |_| true)),
     };
@@ -79,26 +78,26 @@ pub fn approximation(album: &mut Album) -> Result<()> {
 pub fn against_nasri(album: &mut Album) -> Result<()> {
     let subject = album.subject("closed/psb_m1630_hat_562v.off", "irregular-tri:562")?;
     let found = two_phase(&subject, &Constraints::default())?;
-    let stop = Stop { tolerance: 1e-10 * subject.mesh.diagonal(), max_iterations: 10 };
-    let solution = nasri::control_points(&subject.mesh, &subject.topology, None, Setup::Lu, &stop)?;
-    let nasri = Mesh::new(solution.points, subject.mesh.faces.clone());
+    let stop = Stop { tolerance: 1e-10 * subject.surface.diagonal(), max_iterations: 10 };
+    let solution = nasri::control_points(&subject.surface, None, Setup::Lu, &stop)?;
+    let nasri = subject.surface.with_positions(solution.points);
     let shown = vec![
-        ("(a) input", cage(&subject.mesh, GIVEN)),
-        ("(b) auxiliary mesh", cage(&found.auxiliary.mesh, CONTROL)),
-        ("(c) its surface", surface(&found.first.mesh)?),
-        ("(d) Nasri's mesh", cage(&nasri, CONTROL)),
-        ("(e) its surface", surface(&refine_by(Rule::DooSabin, &nasri, &subject.topology)?)?),
+        ("(a) input", cage(subject.surface.mesh(), GIVEN)),
+        ("(b) auxiliary mesh", cage(found.auxiliary.surface.mesh(), CONTROL)),
+        ("(c) its surface", surface(&found.first.surface)?),
+        ("(d) Nasri's mesh", cage(nasri.mesh(), CONTROL)),
+        ("(e) its surface", surface(&Refinement::DooSabin.refined(&nasri)?)?),
     ];
     let view = view(DVec3::Y, 25.0, 20.0);
     let line = Line {
         name: "zheng-cai-4",
         shows: "Zheng-Cai Fig. 4: their method (b, c; iterations are theirs) and Nasri's (d, e); on triangles both \
                 systems are the same",
-        subject: &subject,
+        subject: subject.points(),
         iterations: Some(found.auxiliary.updates.len()),
         error: Some(largest_error(&subject, &found, |_| true)),
     };
-    let panels = panels(view, &subject.mesh.positions, shown);
+    let panels = panels(view, subject.surface.positions(), shown);
     album.add(&line, &sheet(3, (135, 120), panels))
 }
 
@@ -107,19 +106,19 @@ pub fn large(album: &mut Album) -> Result<()> {
     let subject = album.subject("closed/spot_11533v.off", "irregular-tri:11540")?;
     let found = two_phase(&subject, &Constraints::default())?;
     let shown = vec![
-        ("(a) input", cage(&subject.mesh, GIVEN)),
-        ("(b) auxiliary mesh", cage(&found.auxiliary.mesh, CONTROL)),
-        ("(c) surface", surface(&found.first.mesh)?),
+        ("(a) input", cage(subject.surface.mesh(), GIVEN)),
+        ("(b) auxiliary mesh", cage(found.auxiliary.surface.mesh(), CONTROL)),
+        ("(c) surface", surface(&found.first.surface)?),
     ];
     let line = Line {
         name: "zheng-cai-5",
         shows: "Zheng-Cai Fig. 5: a mesh of about the size of theirs (11 540 vertices, no file of it was found)",
-        subject: &subject,
+        subject: subject.points(),
         iterations: Some(found.auxiliary.updates.len()),
         error: Some(largest_error(&subject, &found, |_| true)),
     };
     let view = view(DVec3::Y, 60.0, 12.0);
-    let panels = panels(view, &subject.mesh.positions, shown);
+    let panels = panels(view, subject.surface.positions(), shown);
     album.add(&line, &sheet(3, (135, 150), panels))
 }
 
@@ -154,7 +153,7 @@ impl Tagged {
             marks[v] = true;
             normals[v] = Some(DVec3::new(x, sin, 0.0));
         }
-        Ok(Tagged { subject: plain(name, mesh), tips: [left, right], marks, normals })
+        Ok(Tagged { subject: plain(name, mesh)?, tips: [left, right], marks, normals })
     }
 
     fn solve(&self, with_normals: bool, handle: f64) -> Result<TwoPhase> {
@@ -170,12 +169,16 @@ impl Tagged {
     }
 
     fn points(&self) -> Points {
-        Points { positions: self.tips.map(|v| self.subject.mesh.positions[v]).to_vec(), radius: 2.0, colour: POINT }
+        Points {
+            positions: self.tips.map(|v| self.subject.surface.positions()[v]).to_vec(),
+            radius: 2.0,
+            colour: POINT,
+        }
     }
 
     fn arrows(&self) -> Vectors {
         Vectors {
-            tails: self.tips.map(|v| self.subject.mesh.positions[v]).to_vec(),
+            tails: self.tips.map(|v| self.subject.surface.positions()[v]).to_vec(),
             vectors: (self.tips.iter()).filter_map(|&v| self.normals[v]).map(|n| 0.6 * n).collect(),
             width: 1.4,
             colour: NORMAL,
@@ -186,24 +189,24 @@ impl Tagged {
     fn framed(&self) -> Vec<DVec3> {
         let arrows = self.arrows();
         let heads = arrows.tails.iter().zip(&arrows.vectors).map(|(&t, &v)| t + v);
-        self.subject.mesh.positions.iter().copied().chain(heads).collect()
+        self.subject.surface.positions().iter().copied().chain(heads).collect()
     }
 
     /// The first refinement with the type-V faces of the tips in another colour.
-    fn first(&self, found: &TwoPhase) -> Surface {
-        let mesh = &found.first.mesh;
+    fn first(&self, found: &TwoPhase) -> ShadedMesh {
+        let mesh = found.first.surface.mesh();
         let mut colours = vec![CONTROL; mesh.faces.len()];
         for v in self.tips {
             colours[found.first.first_vertex_face + v] = POINT;
         }
-        Surface { paint: Some(Paint::Faces(colours)), ..cage(mesh, CONTROL) }
+        ShadedMesh { paint: Some(Paint::Faces(colours)), ..cage(mesh, CONTROL) }
     }
 
     fn line<'a>(&'a self, name: &'a str, shows: &'a str, found: &TwoPhase) -> Line<'a> {
         Line {
             name,
             shows,
-            subject: &self.subject,
+            subject: self.subject.points(),
             iterations: Some(found.auxiliary.updates.len()),
             error: Some(largest_error(&self.subject, found, |v| self.marks[v])),
         }
@@ -219,12 +222,12 @@ pub fn with_normals(album: &mut Album) -> Result<()> {
         view,
         &tagged.framed(),
         vec![
-            ("(a) input", cage(&tagged.subject.mesh, GIVEN)),
+            ("(a) input", cage(tagged.subject.surface.mesh(), GIVEN)),
             ("(b) refined, corrected", tagged.first(&free)),
-            ("(c) its surface", surface(&free.first.mesh)?),
-            ("(d) input, normals", cage(&tagged.subject.mesh, GIVEN)),
+            ("(c) its surface", surface(&free.first.surface)?),
+            ("(d) input, normals", cage(tagged.subject.surface.mesh(), GIVEN)),
             ("(e) refined, corrected", tagged.first(&held)),
-            ("(f) its surface", surface(&held.first.mesh)?),
+            ("(f) its surface", surface(&held.first.surface)?),
         ],
     );
     for at in [0, 2, 3, 5] {
@@ -242,15 +245,15 @@ pub fn with_normals(album: &mut Album) -> Result<()> {
 /// Fig. 7: what a shape handle does to a type-V face.
 pub fn scaled_faces(album: &mut Album) -> Result<()> {
     let tagged = Tagged::new()?;
-    let tip = tagged.subject.mesh.positions[tagged.tips[1]];
+    let tip = tagged.subject.surface.positions()[tagged.tips[1]];
     let mut last = tagged.solve(false, 1.0)?;
     let mut pictures = Vec::new();
     let mut framed = Vec::new();
     for (caption, handle) in [("s = 1", 1.0), ("s = 0.4", 0.4), ("s = 2.5", 2.5)] {
         last = tagged.solve(false, handle)?;
         let face = last.first.first_vertex_face + tagged.tips[1];
-        let corners = last.first.mesh.faces.face(face);
-        let corners: Vec<DVec3> = (corners.iter()).map(|&c| last.first.mesh.positions[c as usize]).collect();
+        let corners = last.first.surface.faces().face(face);
+        let corners: Vec<DVec3> = (corners.iter()).map(|&c| last.first.surface.positions()[c as usize]).collect();
         let rays = Vectors {
             tails: vec![tip; corners.len()],
             vectors: corners.iter().map(|c| *c - tip).collect(),
@@ -261,7 +264,7 @@ pub fn scaled_faces(album: &mut Album) -> Result<()> {
         picture.points.push(tagged.points());
         picture.vectors.push(rays);
         pictures.push(picture);
-        framed.extend(&last.first.mesh.positions);
+        framed.extend(last.first.surface.positions());
     }
     for picture in &mut pictures {
         picture.framed = Some(framed.clone());
@@ -285,7 +288,7 @@ pub fn with_handles(album: &mut Album) -> Result<()> {
         ("(d) s = 2.5, normals", true, 2.5),
     ] {
         last = tagged.solve(with_normals, handle)?;
-        let shown = vec![(caption, surface(&last.first.mesh)?)];
+        let shown = vec![(caption, surface(&last.first.surface)?)];
         let mut panel = panels(view, &tagged.framed(), shown);
         for picture in &mut panel {
             picture.points.push(tagged.points());

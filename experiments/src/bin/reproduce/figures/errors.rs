@@ -9,10 +9,9 @@ use limitlab::error::Error;
 use limitlab::mesh::builtin;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Setup, System};
-use limitlab_experiments::report::{ColourScale, Picture, Surface};
+use limitlab_experiments::report::{ColourScale, Picture, ShadedMesh};
 
 use super::{Album, FINE_EDGE, Line, control, plain, power, sheet, view};
-use crate::context::Subject;
 
 /// Iterates of the maps.
 const SHOWN: [usize; 6] = [0, 1, 2, 5, 10, 20];
@@ -21,7 +20,7 @@ const SHOWN: [usize; 6] = [0, 1, 2, 5, 10, 20];
 pub fn maps(album: &mut Album) -> Result<()> {
     let subject = album.subject("closed/psb_m104_horse_233v.off", "irregular-tri:233")?;
     let system = subject.system(Scheme::Loop)?;
-    let size = subject.mesh.diagonal();
+    let size = subject.surface.diagonal();
     let scale = ColourScale::logarithmic("error / L", (1e-6, 1e-1));
     let view = view(DVec3::Y, 30.0, 12.0);
     let mut panels = Vec::new();
@@ -30,9 +29,10 @@ pub fn maps(album: &mut Album) -> Result<()> {
         let (iterate, error) = control(&subject, &system, Setup::Pia { omega: 1.0 }, k);
         last = error;
         let errors = (0..system.len())
-            .map(|v| (subject.mesh.positions[v] - system.row(v, &iterate.positions)).length() / size)
+            .map(|v| (subject.surface.positions()[v] - system.row(v, iterate.positions())).length() / size)
             .collect();
-        let surface = Surface::smooth(subject.mesh.clone()).scalars(errors, scale.clone()).edges(FINE_EDGE);
+        let surface =
+            ShadedMesh::smooth(subject.surface.mesh().clone()).scalars(errors, scale.clone()).edges(FINE_EDGE);
         let mut picture = Picture::new(format!("k = {k}: {}", power(error / size)), view).surface(surface);
         if i % 3 == 2 {
             picture = picture.colour_bar(scale.clone());
@@ -43,7 +43,7 @@ pub fn maps(album: &mut Album) -> Result<()> {
         name: "error-maps",
         shows: "PIA, Loop: ‖p_i − (A v)_i‖ at every vertex after 0, 1, 2, 5, 10, 20 updates, L the bounding box's \
                 diagonal",
-        subject: &subject,
+        subject: subject.points(),
         iterations: SHOWN.last().copied(),
         error: Some(last),
     };
@@ -52,7 +52,7 @@ pub fn maps(album: &mut Album) -> Result<()> {
 
 /// The eigenvectors of Catmull-Clark's matrix that PIA is slowest to remove.
 pub fn slow_modes(album: &mut Album) -> Result<()> {
-    let plain = |name: &str| Ok::<Subject, Error>(plain(name, builtin::builtin(name)?));
+    let plain = |name: &str| plain(name, builtin::builtin(name)?);
     let mut subjects = vec![plain("truncated-octahedron")?, plain("prism:17")?, plain("torus:24x12")?];
     subjects.push(album.subject("closed/spot_188v_poly.off", "irregular-quad:226")?);
     let scale = ColourScale::signed("eigenvector / largest", 1.0);
@@ -63,10 +63,10 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
         let view = view(DVec3::Y, 30.0, 25.0);
         // Where the mode is; elsewhere there is nothing to see.
         let framed: Vec<DVec3> =
-            (subject.mesh.positions.iter().zip(&mode)).filter(|(_, x)| x.abs() > 0.01).map(|(&p, _)| p).collect();
+            (subject.surface.positions().iter().zip(&mode)).filter(|(_, x)| x.abs() > 0.01).map(|(&p, _)| p).collect();
         let caption = format!("λ = {}", significant(lambda));
         let mut picture = Picture::new(caption, view)
-            .surface(Surface::flat(subject.mesh.clone()).scalars(mode, scale.clone()).edges(FINE_EDGE));
+            .surface(ShadedMesh::flat(subject.surface.mesh().clone()).scalars(mode, scale.clone()).edges(FINE_EDGE));
         picture.framed = Some(framed);
         if i % 2 == 1 {
             picture = picture.colour_bar(scale.clone());
@@ -77,7 +77,7 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
         name: "slow-modes",
         shows: "Catmull-Clark: the eigenvector of the least eigenvalue of A on the truncated octahedron (whose matrix \
                 is singular), a 17-sided prism, a 24×12 torus and this mesh, where it is not zero",
-        subject: &subjects[3],
+        subject: subjects[3].points(),
         iterations: None,
         error: None,
     };

@@ -106,16 +106,16 @@ pub fn pia(album: &mut Album) -> Result<()> {
         let surface = limit_surface(printed.scheme.refinement(), &cage_mesh)?;
         let view = view(printed.up, printed.azimuth, printed.elevation);
         let height = |p: &DVec3| p.dot(printed.up);
-        let heights = || subject.mesh.positions.iter().map(height);
+        let heights = || subject.surface.positions().iter().map(height);
         let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
         let framed: Vec<DVec3> = (surface.mesh.positions.iter())
-            .chain(&subject.mesh.positions)
+            .chain(subject.surface.positions())
             .filter(|p| height(p) >= high - printed.shown * (high - low))
             .copied()
             .collect();
         let panels = vec![
-            Picture::new(format!("(a) the mesh, {} vertices", subject.mesh.len()), view)
-                .surface(cage(&subject.mesh, GIVEN))
+            Picture::new(format!("(a) the mesh, {} vertices", subject.surface.len()), view)
+                .surface(cage(subject.surface.mesh(), GIVEN))
                 .frame(&framed),
             Picture::new(format!("(b) the surface after {} updates", printed.updates), view)
                 .surface(surface)
@@ -124,7 +124,7 @@ pub fn pia(album: &mut Album) -> Result<()> {
         let line = Line {
             name: printed.name,
             shows: printed.caption,
-            subject: &subject,
+            subject: subject.points(),
             iterations: Some(printed.updates),
             error: Some(error),
         };
@@ -139,7 +139,7 @@ const SERIES: [usize; 6] = [0, 1, 2, 3, 5, 10];
 /// The limit surfaces of Thall's iterates, with the points that they have to reach, and the last one's error.
 fn thall_pictures(subject: &Subject, iterates: &[usize]) -> Result<(Vec<Picture>, f64)> {
     let system = subject.system(Scheme::CatmullClark)?;
-    let size = subject.mesh.diagonal();
+    let size = subject.surface.diagonal();
     let view = view(DVec3::Y, 60.0, 12.0);
     let mut panels = Vec::new();
     let mut last = 0.0;
@@ -149,8 +149,8 @@ fn thall_pictures(subject: &Subject, iterates: &[usize]) -> Result<(Vec<Picture>
         let caption = format!("k = {k}: error {:.2} %", 100.0 * error / size);
         let picture = Picture::new(caption, view)
             .surface(limit_surface(Refinement::CatmullClark, &cage_mesh)?)
-            .points(Points { positions: subject.mesh.positions.clone(), radius: 0.9, colour: POINT })
-            .frame(&subject.mesh.positions);
+            .points(Points { positions: subject.surface.positions().to_vec(), radius: 0.9, colour: POINT })
+            .frame(subject.surface.positions());
         panels.push(picture);
     }
     Ok((panels, last))
@@ -165,7 +165,7 @@ pub fn thall_series(album: &mut Album) -> Result<()> {
     let line = Line {
         name: "thall-iterations",
         shows: "Thall's iteration, ω = ½: the Catmull-Clark surface of iterate 0, 1, 2, … and the given points",
-        subject: &subject,
+        subject: subject.points(),
         iterations: SERIES.last().copied(),
         error: Some(last),
     };
@@ -181,7 +181,7 @@ pub fn thall_animation(album: &mut Album) -> Result<()> {
     let line = Line {
         name: "thall-animation",
         shows: "Thall's iteration, ω = ½, as an animated PNG: iterates 0 to 6 and the given points",
-        subject: &subject,
+        subject: subject.points(),
         iterations: iterates.last().copied(),
         error: Some(last),
     };

@@ -10,13 +10,14 @@ mod limits;
 mod normals;
 mod sqrt3;
 
+use glam::DVec3;
 use limitlab::Result;
 use limitlab::assemble::LimitSystem;
 use limitlab::mesh::validate::Boundary;
-use limitlab::mesh::{Mesh, Topology};
+use limitlab::mesh::{Mesh, Surface, diagonal};
 use limitlab::schemes::Refinement;
 use limitlab::solvers::{Setup, Stop, run as solve};
-use limitlab_experiments::report::{Colour, Column, Figure, Picture, Surface, Table, View};
+use limitlab_experiments::report::{Colour, Column, Figure, Picture, ShadedMesh, Table, View};
 
 use crate::context::{Context, Item, Subject};
 
@@ -74,7 +75,8 @@ struct Line<'a> {
     /// Of the file.
     name: &'a str,
     shows: &'a str,
-    subject: &'a Subject,
+    /// The name and the points of the mesh.
+    subject: (&'a str, &'a [DVec3]),
     iterations: Option<usize>,
     /// The largest distance of a given point from its limit point.
     error: Option<f64>,
@@ -129,12 +131,13 @@ impl<'a> Album<'a> {
     }
 
     fn list(&mut self, line: &Line) {
-        let size = line.subject.mesh.diagonal();
+        let (name, points) = line.subject;
+        let size = diagonal(points);
         self.table.push(vec![
             line.name.into(),
             line.shows.into(),
-            line.subject.name.as_str().into(),
-            line.subject.mesh.len().to_string().into(),
+            name.into(),
+            points.len().to_string().into(),
             line.iterations.into(),
             line.error.map(|e| 100.0 * e / size).into(),
         ]);
@@ -142,9 +145,8 @@ impl<'a> Album<'a> {
 }
 
 /// A mesh of our own.
-fn plain(name: &str, mesh: Mesh) -> Subject {
-    let topology = Topology::new(&mesh.faces, mesh.len());
-    Subject { name: name.to_owned(), mesh, topology }
+fn plain(name: &str, mesh: Mesh) -> Result<Subject> {
+    Ok(Subject { name: name.to_owned(), surface: Surface::new(mesh)? })
 }
 
 /// `3.8×10⁻²`, as the report's texts are marked up.
@@ -157,35 +159,34 @@ fn power(x: f64) -> String {
 }
 
 /// The control points after so many steps from V = P, and the largest error that they leave.
-fn control(subject: &Subject, system: &LimitSystem, setup: Setup, iterations: usize) -> (Mesh, f64) {
+fn control(subject: &Subject, system: &LimitSystem, setup: Setup, iterations: usize) -> (Surface, f64) {
     let stop = Stop { tolerance: 0.0, max_iterations: iterations };
-    let solution = solve(system, &subject.mesh.positions, setup, &stop);
+    let solution = solve(system, subject.surface.positions(), setup, &stop);
     let error = solution.report.last().max;
-    (Mesh::new(solution.points, subject.mesh.faces.clone()), error)
+    (subject.surface.with_positions(solution.points), error)
 }
 
 /// The scheme's limit surface of a control mesh: as many refinements as [`FACES`] allows, then limit points and
 /// limit normals.
-fn limit_surface(scheme: Refinement, control: &Mesh) -> Result<Surface> {
+fn limit_surface(scheme: Refinement, control: &Surface) -> Result<ShadedMesh> {
     let mut levels = 1;
-    while levels < 5 && (control.faces.corners().len() << (2 * levels)) < FACES {
+    while levels < 5 && (control.faces().corners().len() << (2 * levels)) < FACES {
         levels += 1;
     }
-    let refined = scheme.refine_n(control, levels)?;
-    let topology = Topology::new(&refined.faces, refined.len());
-    let points = scheme.limit_positions(&refined, &topology)?;
-    let normals = scheme.limit_normals(&refined, &topology)?;
-    Ok(Surface::with_normals(Mesh::new(points, refined.faces), normals))
+    let refined = scheme.refined_n(control, levels)?;
+    let points = scheme.limit_positions(&refined)?;
+    let normals = scheme.limit_normals(&refined)?;
+    Ok(ShadedMesh::with_normals(Mesh::new(points, refined.into_mesh().faces), normals))
 }
 
 /// A mesh with flat faces and its edges.
-fn cage(mesh: &Mesh, colour: Colour) -> Surface {
+fn cage(mesh: &Mesh, colour: Colour) -> ShadedMesh {
     let width = match mesh.len() {
         0..600 => EDGE,
         600..3000 => FINE_EDGE,
         _ => FINEST_EDGE,
     };
-    Surface::flat(mesh.clone()).colour(colour).edges(width)
+    ShadedMesh::flat(mesh.clone()).colour(colour).edges(width)
 }
 
 /// Panels in rows of `columns`, each `width`×`height` points.
@@ -195,6 +196,6 @@ fn sheet(columns: usize, (width, height): (u32, u32), panels: Vec<Picture>) -> F
 }
 
 /// The view of a model, whose axes differ.
-fn view(up: glam::DVec3, azimuth: f64, elevation: f64) -> View {
+fn view(up: DVec3, azimuth: f64, elevation: f64) -> View {
     View::around(up, azimuth, elevation).perspective(20.0)
 }

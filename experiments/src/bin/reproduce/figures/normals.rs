@@ -5,7 +5,7 @@ use glam::DVec3;
 use limitlab::Result;
 use limitlab::interpolate::normals::{Rotation, rotate_rings};
 use limitlab::interpolate::thall::normal_deviations;
-use limitlab::mesh::{Faces, Mesh, Topology, builtin};
+use limitlab::mesh::{Faces, Mesh, Surface, builtin};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
 use limitlab::solvers::Setup;
 use limitlab_experiments::report::{Colour, Finish, Picture, Points, Vectors, View};
@@ -36,9 +36,8 @@ fn bone() -> Result<(Mesh, Vec<DVec3>)> {
 }
 
 /// The largest angle between the limit normals of a refinement's first vertices and the given ones, in degrees.
-fn largest_deviation(refined: &Mesh, given: &[DVec3]) -> Result<f64> {
-    let topology = Topology::new(&refined.faces, refined.len());
-    let found = catmull_clark::limit_normals(refined, &topology)?;
+fn largest_deviation(refined: &Surface, given: &[DVec3]) -> Result<f64> {
+    let found = catmull_clark::limit_normals(refined)?;
     let angles = normal_deviations(&found[..given.len()], given);
     Ok(angles.into_iter().fold(0.0, f64::max).to_degrees())
 }
@@ -46,18 +45,18 @@ fn largest_deviation(refined: &Mesh, given: &[DVec3]) -> Result<f64> {
 /// Fig. 7: a bone through points alone and through points with normals.
 pub fn bones(album: &mut Album) -> Result<()> {
     let (mesh, normals) = bone()?;
-    let subject = plain("quad-sphere:2 as a bone", mesh);
+    let subject = plain("quad-sphere:2 as a bone", mesh)?;
     let system = subject.system(Scheme::CatmullClark)?;
     let (cage, error) = control(&subject, &system, Setup::Cg, STEPS);
     let given: Vec<Option<DVec3>> = normals.iter().copied().map(Some).collect();
     let turned = rotate_rings(&cage, Refinement::CatmullClark, &given, Rotation::default())?;
-    let deviations = [largest_deviation(&cage, &normals)?, largest_deviation(&turned.mesh, &normals)?];
+    let deviations = [largest_deviation(&cage, &normals)?, largest_deviation(&turned.surface, &normals)?];
     let surfaces =
-        [limit_surface(Refinement::CatmullClark, &cage)?, limit_surface(Refinement::CatmullClark, &turned.mesh)?];
+        [limit_surface(Refinement::CatmullClark, &cage)?, limit_surface(Refinement::CatmullClark, &turned.surface)?];
     let view = view(DVec3::Y, 15.0, 20.0);
-    let framed = &subject.mesh.positions;
+    let framed = subject.surface.positions();
     let arrows = Vectors {
-        tails: framed.clone(),
+        tails: framed.to_vec(),
         vectors: normals.iter().map(|n| 0.22 * *n).collect(),
         width: 0.7,
         colour: NORMAL,
@@ -76,7 +75,7 @@ pub fn bones(album: &mut Album) -> Result<()> {
         name: "thall-7-normals",
         shows: "Thall Fig. 7: a bone through points alone and with normals (green) by turned rings; below, what that \
                 does to reflection lines",
-        subject: &subject,
+        subject: subject.points(),
         iterations: None,
         error: Some(error),
     };
@@ -155,7 +154,7 @@ pub fn end_cap(album: &mut Album) -> Result<()> {
     let (mut panels, mut below) = (Vec::new(), Vec::new());
     let mut last = None;
     for (letters, eta, radius) in [(["(a)", "(d)"], 1.0, 1.0), (["(b)", "(e)"], 1.5, 1.0), (["(c)", "(f)"], 1.5, 0.8)] {
-        let subject = plain("slab of 6×4 medial atoms", slab(eta, radius * RADIUS));
+        let subject = plain("slab of 6×4 medial atoms", slab(eta, radius * RADIUS))?;
         let system = subject.system(Scheme::CatmullClark)?;
         let (cage, error) = control(&subject, &system, Setup::Cg, STEPS);
         let surface = limit_surface(Refinement::CatmullClark, &cage)?;
@@ -163,7 +162,7 @@ pub fn end_cap(album: &mut Album) -> Result<()> {
         let over = 100.0 * (heights.fold(0.0, f64::max) / RADIUS - 1.0);
         let caption = format!("{} η = {eta}, r × {radius}: {over:+.1} %", letters[0]);
         panels.push(Picture::new(caption, across).surface(surface.clone()).points(Points {
-            positions: subject.mesh.positions.clone(),
+            positions: subject.surface.positions().to_vec(),
             radius: 1.1,
             colour: POINT,
         }));
@@ -181,7 +180,7 @@ pub fn end_cap(album: &mut Album) -> Result<()> {
         name: "thall-8-end-cap",
         shows: "Thall Fig. 8: beside an end cap the surface rises above the points, by as much for η = 1 as for 1.5 \
                 with the border atoms moved inwards; less where the border atoms' radius is smaller too",
-        subject: &subject,
+        subject: subject.points(),
         iterations: None,
         error: Some(error),
     };

@@ -3,25 +3,21 @@
 use glam::DVec3;
 
 use limitlab::Result;
-use limitlab::mesh::{Mesh, Topology};
-use limitlab::schemes::{Refinement, unified_sqrt3};
-use limitlab_experiments::report::{Finish, Picture, Points, Surface};
+use limitlab::interpolate::lin_luo::surface::refine_n;
+use limitlab::mesh::{Mesh, Surface};
+use limitlab::schemes::Refinement;
+use limitlab_experiments::report::{Finish, Picture, Points, ShadedMesh};
 
 use super::{Album, FACES, GIVEN, Line, POINT, cage, sheet, view};
 
 /// The mesh after `steps` of the unified scheme.
-fn refined(mesh: &Mesh, alpha: &[f64], steps: usize) -> Result<Mesh> {
-    let (mut mesh, mut alpha) = (mesh.clone(), alpha.to_vec());
-    for _ in 0..steps {
-        let topology = Topology::new(&mesh.faces, mesh.len());
-        (mesh, alpha) = unified_sqrt3::refine(&mesh, &topology, &alpha)?;
-    }
-    Ok(mesh)
+fn refined(surface: &Surface, alpha: &[f64], steps: usize) -> Result<Mesh> {
+    Ok(refine_n(surface, alpha, steps)?.0.into_mesh())
 }
 
 /// An even number of steps, after which the original edges are back, up to [`FACES`] triangles.
-fn surface(mesh: &Mesh, alpha: &[f64]) -> Result<Surface> {
-    Ok(Surface::smooth(refined(mesh, alpha, steps(mesh))?))
+fn shown(surface: &Surface, alpha: &[f64]) -> Result<ShadedMesh> {
+    Ok(ShadedMesh::smooth(refined(surface, alpha, steps(surface.mesh()))?))
 }
 
 fn steps(mesh: &Mesh) -> usize {
@@ -35,24 +31,24 @@ fn steps(mesh: &Mesh) -> usize {
 /// Fig. 5: modified Butterfly and the interpolatory √3 scheme, and beside them Labsik and Greiner's.
 pub fn against_butterfly(album: &mut Album) -> Result<()> {
     let subject = album.subject("closed/bob_small_250v.off", "tri-torus:12x7")?;
-    let mesh = &subject.mesh;
+    let mesh = subject.surface.mesh();
     let view = view(DVec3::Y, 35.0, 20.0);
-    let butterfly = Surface::smooth(Refinement::Butterfly.refine_n(mesh, 4)?);
-    let ours = surface(mesh, &vec![1.0; mesh.len()])?;
-    let earlier = Surface::smooth(Refinement::LabsikGreiner.refine_n(mesh, steps(mesh))?);
-    let shown = [
+    let butterfly = ShadedMesh::smooth(Refinement::Butterfly.refine_n(&subject.surface, 4)?);
+    let ours = shown(&subject.surface, &vec![1.0; mesh.len()])?;
+    let earlier = ShadedMesh::smooth(Refinement::LabsikGreiner.refine_n(&subject.surface, steps(mesh))?);
+    let panels = [
         ("(a) the mesh", cage(mesh, GIVEN)),
         ("(b) modified Butterfly", butterfly),
         ("(c) interpolatory √3", ours),
         ("Labsik-Greiner √3", earlier),
     ];
     let panels =
-        shown.map(|(caption, surface)| Picture::new(caption, view).surface(surface).frame(&mesh.positions)).to_vec();
+        panels.map(|(caption, surface)| Picture::new(caption, view).surface(surface).frame(&mesh.positions)).to_vec();
     let line = Line {
         name: "lin-luo-5",
         shows: "Lin-Luo Fig. 5: a mesh with a hole by modified Butterfly and by the interpolatory √3 scheme (α = 1), with \
                 Labsik and Greiner's beside",
-        subject: &subject,
+        subject: subject.points(),
         iterations: None,
         error: None,
     };
@@ -62,18 +58,18 @@ pub fn against_butterfly(album: &mut Album) -> Result<()> {
 /// Fig. 6: a bunny under the interpolatory √3 scheme, step by step.
 pub fn bunny(album: &mut Album) -> Result<()> {
     let subject = album.subject("closed/bunny_1839v.off", "irregular-tri:1129")?;
-    let mesh = &subject.mesh;
+    let mesh = subject.surface.mesh();
     let alpha = vec![1.0; mesh.len()];
     let view = view(DVec3::Y, 0.0, 10.0);
     let panels = vec![
         Picture::new("(a) the mesh", view).surface(cage(mesh, GIVEN)),
-        Picture::new("(b) after one step", view).surface(cage(&refined(mesh, &alpha, 1)?, super::CONTROL)),
-        Picture::new("(c) after four steps", view).surface(surface(mesh, &alpha)?),
+        Picture::new("(b) after one step", view).surface(cage(&refined(&subject.surface, &alpha, 1)?, super::CONTROL)),
+        Picture::new("(c) after four steps", view).surface(shown(&subject.surface, &alpha)?),
     ];
     let line = Line {
         name: "lin-luo-6",
         shows: "Lin-Luo Fig. 6: a bunny under the interpolatory √3 scheme (α = 1)",
-        subject: &subject,
+        subject: subject.points(),
         iterations: None,
         error: None,
     };
@@ -85,13 +81,13 @@ const MODEL: (&str, &str) = ("closed/tripod_24v.off", "star:5");
 /// Fig. 7: the surfaces for several α, and two through some vertices only.
 pub fn parameters(album: &mut Album) -> Result<()> {
     let subject = album.subject(MODEL.0, MODEL.1)?;
-    let mesh = &subject.mesh;
+    let mesh = subject.surface.mesh();
     let view = view(DVec3::Y, 35.0, 25.0);
     let all = |alpha: f64| vec![alpha; mesh.len()];
     let every = |step: usize| -> Vec<usize> { (0..mesh.len()).step_by(step).collect() };
     let mut panels = vec![Picture::new("control mesh", view).surface(cage(mesh, GIVEN))];
     for alpha in [1.0, 0.8, 0.5] {
-        panels.push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
+        panels.push(Picture::new(format!("α = {alpha}"), view).surface(shown(&subject.surface, &all(alpha))?));
     }
     for (caption, chosen) in [("every 4th vertex", every(4)), ("every 2nd vertex", every(2))] {
         let mut alpha = all(0.0);
@@ -100,10 +96,10 @@ pub fn parameters(album: &mut Album) -> Result<()> {
         }
         let points =
             Points { positions: chosen.iter().map(|&v| mesh.positions[v]).collect(), radius: 1.1, colour: POINT };
-        panels.push(Picture::new(caption, view).surface(surface(mesh, &alpha)?).points(points));
+        panels.push(Picture::new(caption, view).surface(shown(&subject.surface, &alpha)?).points(points));
     }
     for alpha in [0.0, 0.2] {
-        panels.push(Picture::new(format!("α = {alpha}"), view).surface(surface(mesh, &all(alpha))?));
+        panels.push(Picture::new(format!("α = {alpha}"), view).surface(shown(&subject.surface, &all(alpha))?));
     }
     let framed: Vec<DVec3> =
         (panels.iter()).flat_map(|p| p.surfaces.iter().flat_map(|s| &s.mesh.positions)).copied().collect();
@@ -114,7 +110,7 @@ pub fn parameters(album: &mut Album) -> Result<()> {
         name: "lin-luo-7",
         shows: "Lin-Luo Fig. 7: the unified √3 scheme for α from 1 to 0, and with α = 1 at some vertices (red) and 0 \
                 at the others",
-        subject: &subject,
+        subject: subject.points(),
         iterations: None,
         error: None,
     };
@@ -124,17 +120,17 @@ pub fn parameters(album: &mut Album) -> Result<()> {
 /// How smooth the surfaces are: reflection lines for α = 0, ½, 1.
 pub fn reflections(album: &mut Album) -> Result<()> {
     let subject = album.subject(MODEL.0, MODEL.1)?;
-    let mesh = &subject.mesh;
+    let mesh = subject.surface.mesh();
     let view = view(DVec3::Y, 35.0, 25.0);
     let mut panels = Vec::new();
     for (caption, alpha) in [("α = 0", 0.0), ("α = ½", 0.5), ("α = 1", 1.0)] {
-        let surface = surface(mesh, &vec![alpha; mesh.len()])?.finish(Finish::ReflectionLines);
+        let surface = shown(&subject.surface, &vec![alpha; mesh.len()])?.finish(Finish::ReflectionLines);
         panels.push(Picture::new(caption, view).surface(surface));
     }
     let line = Line {
         name: "lin-luo-reflections",
         shows: "The unified √3 scheme: reflection lines, which break where normals jump",
-        subject: &subject,
+        subject: subject.points(),
         iterations: None,
         error: None,
     };

@@ -1,0 +1,330 @@
+//! Valid meshes: closed or open manifolds, oriented, with their topology; made by validation alone.
+
+use std::sync::{Arc, OnceLock};
+
+use glam::DVec3;
+
+use super::curve::{along_curve, is_scattered};
+use super::order::Numbering;
+use super::validate::{Boundary, Validation, remarks, validate};
+use super::{Faces, Incidence, Mesh, Topology};
+use crate::{Error, Result, parallel};
+
+/// From this many vertices on, a scattered mesh is renumbered. Tuned.
+const SCATTERED: usize = 50_000;
+/// Up to so many corners of a face, each is compared with each.
+const FEW: usize = 16;
+
+/// A mesh that the validator has passed, with its topology: an oriented manifold, closed unless a boundary was allowed,
+/// of faces with three different vertices or more, every vertex finite and of valence 3 or more.
+///
+/// Faces and topology never change; points may move. Copies share the topology, which is made when it is first asked
+/// for: a closed mesh is known to be valid by its [`Incidence`] alone.
+///
+/// ```
+/// use limitlab::mesh::{Surface, builtin};
+/// let surface = Surface::new(builtin::builtin("cube")?)?;
+/// assert!(surface.is_closed());
+/// assert_eq!(surface.topology().edges(), 12);
+/// let mut mesh = surface.into_mesh();
+/// mesh.faces = limitlab::mesh::Faces::from_lists(mesh.faces.iter().skip(1));
+/// let message = Surface::new(mesh).unwrap_err().to_string();
+/// assert!(message.starts_with("4 boundary edges (first: face 1, vertices 0 and 1)"), "{message}");
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Surface {
+    mesh: Mesh,
+    connectivity: Arc<Connectivity>,
+}
+
+/// What is known of the faces.
+#[derive(Debug)]
+struct Connectivity {
+    is_closed: bool,
+    incidence: OnceLock<Arc<Incidence>>,
+    topology: OnceLock<Topology>,
+    renumbered: Option<Renumbered>,
+}
+
+/// The faces of a scattered mesh, with their vertices along a space-filling curve: every pass is several times faster.
+#[derive(Debug)]
+pub(crate) struct Renumbered {
+    pub(crate) faces: Faces,
+    pub(crate) incidence: Incidence,
+    pub(crate) numbering: Numbering,
+}
+
+impl Surface {
+    /// A closed mesh, validated. O(corners), in parallel; from some ten thousand vertices on, a mesh whose vertices lie
+    /// [scattered](is_scattered) in memory is renumbered inside.
+    ///
+    /// # Errors
+    /// [`Error::Defects`] with all that is wrong.
+    pub fn new(mesh: Mesh) -> Result<Self> {
+        Self::examined(mesh, None, Boundary::Refuse).map_err(Error::Defects)
+    }
+
+    /// As [`new`](Self::new), with another treatment of boundaries, and the 1-based lines of the vertices and of the
+    /// faces in the file for the report.
+    ///
+    /// # Errors
+    /// The report of [`validate`].
+    pub fn examined(
+        mesh: Mesh,
+        lines: Option<(&[u32], &[u32])>,
+        boundary: Boundary,
+    ) -> std::result::Result<Self, Box<Validation>> {
+        if let Some(connectivity) = Connectivity::closed(&mesh) {
+            return Ok(Surface { mesh, connectivity: Arc::new(connectivity) });
+        }
+        let mut report = validate(&mesh, lines, boundary);
+        match report.topology.take() {
+            Some(topology) if report.is_valid() => Ok(Self::of_topology(mesh, topology)),
+            topology => {
+                report.topology = topology;
+                Err(Box::new(report))
+            }
+        }
+    }
+
+    /// A mesh that is valid by the way it was made: the refinement of a valid one.
+    pub(crate) fn of_topology(mesh: Mesh, topology: Topology) -> Self {
+        debug_assert!(topology.incidence.vertices() == mesh.len() && topology.irregular_edges().is_empty());
+        let connectivity = Connectivity {
+            is_closed: topology.is_closed(),
+            incidence: OnceLock::from(Arc::clone(&topology.incidence)),
+            topology: OnceLock::from(topology),
+            renumbered: None,
+        };
+        Surface { mesh, connectivity: Arc::new(connectivity) }
+    }
+
+    /// A closed mesh that is valid by the way it was made. Its topology is made if it is asked for.
+    pub(crate) fn of_valid(mesh: Mesh) -> Self {
+        let (incidence, topology) = (OnceLock::new(), OnceLock::new());
+        let connectivity = Connectivity { is_closed: true, incidence, topology, renumbered: None };
+        Surface { mesh, connectivity: Arc::new(connectivity) }
+    }
+
+    /// The same faces with other points.
+    ///
+    /// # Panics
+    /// If there is not one point a vertex.
+    pub fn with_positions(&self, positions: Vec<DVec3>) -> Self {
+        assert_eq!(positions.len(), self.len(), "one point a vertex");
+        let mesh = Mesh::new(positions, self.mesh.faces.clone());
+        Surface { mesh, connectivity: Arc::clone(&self.connectivity) }
+    }
+
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    pub fn into_mesh(self) -> Mesh {
+        self.mesh
+    }
+
+    pub fn faces(&self) -> &Faces {
+        &self.mesh.faces
+    }
+
+    pub fn positions(&self) -> &[DVec3] {
+        &self.mesh.positions
+    }
+
+    pub fn positions_mut(&mut self) -> &mut [DVec3] {
+        &mut self.mesh.positions
+    }
+
+    /// Takes the points out, to write others in their memory.
+    pub(crate) fn take_positions(&mut self) -> Vec<DVec3> {
+        std::mem::take(&mut self.mesh.positions)
+    }
+
+    /// The number of vertices N.
+    pub fn len(&self) -> usize {
+        self.mesh.len()
+    }
+
+    /// Never: a valid mesh has vertices.
+    pub fn is_empty(&self) -> bool {
+        self.mesh.is_empty()
+    }
+
+    /// Whether every edge has two faces.
+    pub fn is_closed(&self) -> bool {
+        self.connectivity.is_closed
+    }
+
+    /// The corners at every vertex.
+    pub fn incidence(&self) -> &Incidence {
+        self.shared_incidence()
+    }
+
+    fn shared_incidence(&self) -> &Arc<Incidence> {
+        self.connectivity.incidence.get_or_init(|| Arc::new(Incidence::new(&self.mesh.faces, self.mesh.len())))
+    }
+
+    /// Opposite half-edges, edges, stars. The first call may take as long as validation did.
+    pub fn topology(&self) -> &Topology {
+        let made = || Topology::of(Arc::clone(self.shared_incidence()), &self.mesh.faces);
+        self.connectivity.topology.get_or_init(made)
+    }
+
+    /// The number of edges with one face.
+    pub fn boundary_edges(&self) -> usize {
+        if self.is_closed() { 0 } else { self.topology().boundary_edges() }
+    }
+
+    /// The [`diagonal`](super::diagonal) of the points.
+    pub fn diagonal(&self) -> f64 {
+        self.mesh.diagonal()
+    }
+
+    /// Oddities that no method minds, as in [`Validation::remarks`]: duplicate positions, faces without area, a boundary.
+    pub fn remarks(&self) -> Vec<String> {
+        remarks(self)
+    }
+
+    pub(crate) fn renumbered(&self) -> Option<&Renumbered> {
+        self.connectivity.renumbered.as_ref()
+    }
+}
+
+impl Connectivity {
+    /// That of a closed mesh without defects; `None` if there is any.
+    fn closed(mesh: &Mesh) -> Option<Self> {
+        let renumbered = if mesh.len() >= SCATTERED && is_scattered(&mesh.faces) { along_curve(mesh) } else { None };
+        let (faces, points) = match &renumbered {
+            Some((moved, _)) => (&moved.faces, &moved.positions),
+            None => (&mesh.faces, &mesh.positions),
+        };
+        let corners = faces.corners();
+        let in_range = parallel::all(corners.len(), |c| (corners[c] as usize) < points.len());
+        if faces.is_empty() || !in_range {
+            return None;
+        }
+        let incidence = Incidence::new(faces, points.len());
+        let sound = parallel::all(points.len(), |v| points[v].is_finite() && incidence.face_count(v) >= 3)
+            && parallel::all(faces.len(), |f| are_distinct(faces.face(f)))
+            && incidence.is_closed_manifold(faces);
+        if !sound {
+            return None;
+        }
+        let (incidence, renumbered) = match renumbered {
+            Some((Mesh { faces, .. }, numbering)) => {
+                (OnceLock::new(), Some(Renumbered { faces, incidence, numbering }))
+            }
+            None => (OnceLock::from(Arc::new(incidence)), None),
+        };
+        Some(Connectivity { is_closed: true, incidence, topology: OnceLock::new(), renumbered })
+    }
+}
+
+/// Whether a face has three corners or more, no two the same vertex.
+fn are_distinct(face: &[u32]) -> bool {
+    let n = face.len();
+    if n <= FEW {
+        return n >= 3 && (1..n).all(|i| !face[..i].contains(&face[i]));
+    }
+    let mut sorted = face.to_vec();
+    sorted.sort_unstable();
+    sorted.windows(2).all(|w| w[0] != w[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::builtin;
+    use crate::mesh::generate::{permute_vertices, random_polygons};
+    use crate::mesh::order::Order;
+
+    /// The short way to the verdict, and the report.
+    fn agree(mesh: &Mesh) -> bool {
+        let valid = validate(mesh, None, Boundary::Refuse).is_valid();
+        assert_eq!(Connectivity::closed(mesh).is_some(), valid, "{:?}", mesh.faces);
+        valid
+    }
+
+    #[test]
+    fn a_mesh_is_taken_if_the_validator_reports_no_defect() {
+        let mut valid = 0;
+        for seed in 0..200 {
+            let mesh = random_polygons(seed);
+            assert!(agree(&mesh));
+            // One corner led elsewhere, one face less, one face twice, one turned round, one point lost.
+            let lists: Vec<Vec<u32>> = mesh.faces.iter().map(<[u32]>::to_vec).collect();
+            let f = seed as usize * 7 % lists.len();
+            let with = |change: &dyn Fn(&mut Vec<Vec<u32>>)| {
+                let mut lists = lists.clone();
+                change(&mut lists);
+                Mesh::new(mesh.positions.clone(), Faces::from_lists(lists))
+            };
+            let elsewhere = |v: u32| (v + 1 + seed as u32) % mesh.len() as u32;
+            valid += usize::from(agree(&with(&|lists| lists[f][0] = elsewhere(lists[f][0]))));
+            assert!(!agree(&with(&|lists| drop(lists.remove(f)))));
+            assert!(!agree(&with(&|lists| lists.push(lists[f].clone()))));
+            assert!(!agree(&with(&|lists| lists[f].reverse())));
+            assert!(!agree(&with(&|lists| lists[f][1] = mesh.len() as u32)));
+            let mut lost = mesh.clone();
+            lost.positions[f % mesh.len()].y = f64::NAN;
+            assert!(!agree(&lost));
+            let mut isolated = mesh.clone();
+            isolated.positions.push(DVec3::ONE);
+            assert!(!agree(&isolated));
+        }
+        assert!(valid < 20, "{valid} of 200");
+        assert!(!agree(&Mesh::new(Vec::new(), Faces::default())));
+        assert!(!agree(&Mesh::new(vec![DVec3::X], Faces::default())));
+    }
+
+    #[test]
+    fn meshes_with_one_defect_each_are_refused() {
+        let at = |k: usize| DVec3::new(k as f64, (k * k) as f64, (k * k * k) as f64);
+        let mesh = |n: usize, faces: &[&[u32]]| Mesh::new((0..n).map(at).collect(), Faces::from_lists(faces));
+        let tetrahedra = |shift: [u32; 4]| {
+            let [a, b, c, d] = shift;
+            [[a, b, c], [a, c, d], [a, d, b], [b, d, c]]
+        };
+        // Two tetrahedra that share a vertex: every edge has two sides, and one vertex two umbrellas.
+        let joined = [tetrahedra([0, 1, 2, 3]), tetrahedra([3, 4, 5, 6])].concat();
+        let pinched = Mesh::new((0..7).map(at).collect(), Faces::from_lists(joined));
+        assert!(!agree(&pinched));
+        // A triangle and its back: valence 2.
+        assert!(!agree(&mesh(3, &[&[0, 1, 2], &[0, 2, 1]])));
+        // A vertex that one face passes twice, under one umbrella.
+        let twice = mesh(5, &[&[0, 1, 2, 0, 3, 4], &[0, 2, 1], &[0, 4, 3]]);
+        assert!(!agree(&twice));
+        assert!(agree(&mesh(4, &[&[0, 1, 2], &[0, 2, 3], &[0, 3, 1], &[1, 3, 2]])));
+        // A face of many corners, one of them twice.
+        let prism = builtin::prism(40);
+        assert!(agree(&prism));
+        let mut lists: Vec<Vec<u32>> = prism.faces.iter().map(<[u32]>::to_vec).collect();
+        let large = lists.iter().position(|f| f.len() == 40).unwrap();
+        lists[large][20] = lists[large][0];
+        assert!(!agree(&Mesh::new(prism.positions, Faces::from_lists(lists))));
+    }
+
+    #[test]
+    fn a_scattered_mesh_is_renumbered_inside_and_keeps_its_own_numbers() {
+        let good = builtin::quad_sphere(7);
+        let order = Order::Random(3).order(&good, &Incidence::new(&good.faces, good.len()));
+        let scattered = permute_vertices(&good, &order);
+        let surface = Surface::new(scattered.clone()).unwrap();
+        assert!(surface.renumbered().is_some() && Surface::new(good).unwrap().renumbered().is_none());
+        assert_eq!(*surface.mesh(), scattered);
+        assert_eq!(*surface.topology(), Topology::new(&scattered.faces, scattered.len()));
+        assert_eq!(surface.incidence(), &*surface.topology().incidence);
+    }
+
+    #[test]
+    fn an_open_mesh_is_valid_where_a_boundary_is_allowed() {
+        let mut lists: Vec<Vec<u32>> = builtin::icosphere(1).faces.iter().map(<[u32]>::to_vec).collect();
+        lists.remove(0);
+        let open = Mesh::new(builtin::icosphere(1).positions, Faces::from_lists(lists));
+        assert!(Surface::new(open.clone()).is_err());
+        let surface = Surface::examined(open, None, Boundary::AsInterior).unwrap();
+        assert_eq!((surface.is_closed(), surface.boundary_edges()), (false, 3));
+    }
+}
