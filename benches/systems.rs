@@ -23,7 +23,7 @@ use limitlab::schemes::Scheme;
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
 use limitlab::solvers::system::{Rows, System};
 use limitlab::solvers::wavefront::Wavefront;
-use limitlab::solvers::{Setup, Stop, mixed, run, solve};
+use limitlab::solvers::{Method, Stop, mixed, run, solve};
 use nalgebra::DMatrix;
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
 
@@ -197,21 +197,21 @@ fn methods(c: &mut Criterion) {
             wavefront.iterate(recurrence, 17, &singles, &mut current, &mut scratch);
         });
     });
-    let setups = [
-        ("stored, chebyshev", Setup::Chebyshev { spectrum: INTERVAL }),
-        ("stored, pia", Setup::Pia { omega: 1.0 }),
-        ("stored, thall", Setup::THALL),
-        ("stored, gauss-seidel", Setup::Sor { omega: 1.0, order: None }),
-        ("stored, sor", Setup::Sor { omega: 1.1, order: None }),
-        ("stored, ssor", Setup::Ssor { omega: 1.0, order: None }),
-        ("stored, cg", Setup::Cg),
-        ("stored, pcg-jacobi", Setup::PcgJacobi),
-        ("stored, pcg-ssor", Setup::PcgSsor { omega: 1.0 }),
-        ("stored, pcg-ic0", Setup::PcgIc0),
-        ("faer, cholesky", Setup::Cholesky),
+    let methods = [
+        ("stored, chebyshev", Method::Chebyshev { interval: Some(INTERVAL) }),
+        ("stored, pia", Method::Pia),
+        ("stored, thall", Method::Thall),
+        ("stored, gauss-seidel", Method::GaussSeidel { order: None }),
+        ("stored, sor", Method::Sor { omega: 1.1, order: None }),
+        ("stored, ssor", Method::Ssor { omega: 1.0, order: None }),
+        ("stored, cg", Method::Cg),
+        ("stored, pcg-jacobi", Method::PcgJacobi),
+        ("stored, pcg-ssor", Method::PcgSsor { omega: 1.0 }),
+        ("stored, pcg-ic0", Method::PcgIc0),
+        ("faer, cholesky", Method::Cholesky),
     ];
-    for (name, setup) in setups {
-        group.bench_function(name, |b| b.iter(|| run(&system, points, setup, &stop)));
+    for (name, method) in methods {
+        group.bench_function(name, |b| b.iter(|| run(&system, points, method, &stop)));
     }
     group.finish();
 }

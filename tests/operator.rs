@@ -21,7 +21,7 @@ use limitlab::solvers::iteration::Iterate;
 use limitlab::solvers::local::{Editor, decay};
 use limitlab::solvers::system::{Rows, System};
 use limitlab::solvers::wavefront::Wavefront;
-use limitlab::solvers::{Outcome, Setup, Stop, mixed, run, solve};
+use limitlab::solvers::{Method, Outcome, Stop, mixed, run, solve};
 
 fn mesh(name: &str) -> Mesh {
     let mut mesh = builtin(name).expect("a built-in mesh");
@@ -424,8 +424,8 @@ fn large_meshes_take_the_banded_way_with_the_same_result_as_the_explicit_method(
     let one = in_threads(1, solve);
     assert!(one == in_threads(2, solve));
     assert_eq!(one.1.outcome, Outcome::Converged);
-    let setup = Setup::Chebyshev { spectrum: (bound, 1.0) };
-    let reference = run(&case.explicit, case.surface.positions(), setup, &stop);
+    let method = Method::Chebyshev { interval: Some((bound, 1.0)) };
+    let reference = run(&case.explicit, case.surface.positions(), method, &stop);
     let expected = numbering.there(&reference.points);
     // Both are within tolerance/λ_min of the solution, in a norm close to the greatest difference.
     assert_close("icosphere:7", &one.0, &expected, 2.0 * stop.tolerance / bound);
@@ -454,7 +454,7 @@ fn an_interval_that_is_too_short_is_corrected() {
     let stop = Stop { tolerance: 1e-10, max_iterations: 10_000 };
     let (control, report) = mixed::solve(&case.operator, case.surface.positions(), &stop);
     assert_eq!(report.outcome, Outcome::Converged, "{report:?}");
-    let lu = run(&case.explicit, case.surface.positions(), Setup::Lu, &stop);
+    let lu = run(&case.explicit, case.surface.positions(), Method::Lu, &stop);
     assert_close("prism:7", &control, &lu.points, 1e-8);
 }
 
@@ -518,7 +518,7 @@ fn local_edits_give_what_solving_anew_gives() {
         let errors = Rows::new(n).errors(&case.explicit, editor.points(), editor.control());
         assert!(errors.max <= 1.01 * tolerance, "{}: {errors:?}", case.name);
         assert_eq!(editor.points()[n - 1], points[n - 1] + DVec3::new(0.1, -0.2, 0.05));
-        let lu = run(&case.explicit, editor.points(), Setup::Lu, &stop);
+        let lu = run(&case.explicit, editor.points(), Method::Lu, &stop);
         // The residuals of both, times ‖A⁻¹‖ ≤ √κ(H)/λ_min.
         let h = &case.explicit.h;
         let (low, high) = h.iter().fold((f64::MAX, 0.0f64), |(l, u), &h| (l.min(h), u.max(h)));

@@ -36,7 +36,7 @@ fn main() -> limitlab::Result<()> {
     run("out".as_ref()).map(drop)
 }
 
-pub fn run(out: &Path) -> limitlab::Result<Vec<Row>> {
+pub fn run(out: &Path) -> limitlab::Result<Vec<Row<'static>>> {
     let mut surface = Surface::new(builtin::builtin("torus:16x12")?)?; // or mesh::io::read(path)?.mesh
     move_vertices(&mut surface, 0.1, 1);
     let (system, points) = (LimitSystem::new(&surface, Scheme::CatmullClark)?, surface.positions());
@@ -48,7 +48,7 @@ pub fn run(out: &Path) -> limitlab::Result<Vec<Row>> {
     let stop = Stop { tolerance: 1e-8 * surface.diagonal(), max_iterations: 1000 };
     let (name, parameter) = ("steepest-descent".into(), "mine".into());
     let mine = Own { name, parameter, start: &|s, points| Ok(Box::new(SteepestDescent(s, points, points.to_vec()))) };
-    let lines = entries(&system, &spectrum, &[Method::WPia, Method::Cg, Method::Lu], None, "file")?;
+    let lines = entries(&system, &spectrum, &[Method::WPia { omega: None }, Method::Cg, Method::Lu], None, "file")?;
     let rows = compare(&system, &spectrum, points, &lines, &[mine], &stop, &mut || ())?;
     println!("{}", table("own".into(), "My method".into(), "A torus.".into(), &rows).to_markdown());
     limitlab::output::create_dir(out)?;

@@ -17,7 +17,7 @@ const ANOTHER_SYSTEM: &str = "use --scheme nasri, which is never singular, or --
 #[derive(Clone, Debug)]
 pub struct Failed {
     /// As it was asked for; `None` where the program chose.
-    method: Option<Method>,
+    method: Option<Method<'static>>,
     outcome: Outcome,
     max_error: f64,
     tolerance: f64,
@@ -31,7 +31,7 @@ impl Failed {
     pub fn new(
         (surface, scheme): (&Surface, Scheme),
         interpolated: Option<&[bool]>,
-        method: Option<Method>,
+        method: Option<Method<'static>>,
         report: &Report,
         stop: &Stop,
     ) -> Self {

@@ -13,22 +13,21 @@ use crate::error::Result;
 use crate::mesh::diagonal;
 use crate::solvers::anderson::WINDOW;
 use crate::solvers::jacobi::THALL_OMEGA;
-use crate::solvers::{Method, Setup, Solution, Stop, System, run};
+use crate::solvers::{Accelerated, Method, Solution, Stop, run};
 
 /// A method with its parameter in words: a line of a comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry<'a> {
-    pub method: Method,
+    pub method: Method<'a>,
     /// Which of the method's lines it is, without numbers.
     pub variant: &'static str,
     pub parameter: String,
-    pub setup: Setup<'a>,
 }
 
 /// What came of it.
 #[derive(Clone, Debug)]
-pub struct Row {
-    pub method: Named,
+pub struct Row<'a> {
+    pub method: Named<'a>,
     /// Empty for methods of the caller's own.
     pub variant: &'static str,
     pub parameter: String,
@@ -39,11 +38,6 @@ pub struct Row {
     pub predicted_rate: Option<f64>,
 }
 
-/// ω of `sor` unless told: about the best for all schemes on irregular meshes. Tuned on the sweeps in
-/// `reports/`.
-pub const SOR_OMEGA: f64 = 1.1;
-/// ω of `ssor` and of the preconditioner `pcg-ssor`, where the symmetric sweep is little sensitive to it.
-pub const SSOR_OMEGA: f64 = 1.0;
 /// An estimated λ_min below this part of λ_max is taken for 0: the matrix is singular for all that iterations can tell.
 const VANISHING: f64 = 1e-9;
 /// The part of λ_max where a Chebyshev interval starts if λ_min vanishes: modes beneath are left nearly as they are,
@@ -56,39 +50,54 @@ const SAFETY: f64 = 0.98;
 /// the interval grow.
 const EXCESS: f64 = 1e-6;
 
-/// The set-up that is meant by a method's name alone: Jacobi and W-PIA at their best ω, Anderson's acceleration of PIA, the
-/// heavy ball with an estimated interval, Chebyshev with the proven one where that is positive, else with an estimated one. `spectrum` is asked only where it is needed.
+/// The method with its open parameters set by the spectrum: Jacobi and W-PIA to their best ω, the interval of the heavy
+/// ball to the estimated one, that of Chebyshev to the proven one where that is positive, else to the estimated one.
+/// `spectrum` is asked only where it is needed.
 ///
 /// # Errors
 /// Those of `spectrum`.
-pub fn standard_setup<'a>(
+pub fn with_spectrum<'a>(
     system: &LimitSystem,
-    method: Method,
-    order: Option<&'a [u32]>,
+    method: Method<'a>,
     spectrum: &dyn Fn() -> Result<Spectrum>,
-) -> Result<Setup<'a>> {
+) -> Result<Method<'a>> {
+    let bounds = &system.bounds;
     Ok(match method {
-        Method::Lu => Setup::Lu,
-        Method::Cholesky => Setup::Cholesky,
-        Method::Ldlt => Setup::Ldlt,
-        Method::Jacobi => Setup::Jacobi { omega: spectrum()?.jacobi.optimal_omega() },
-        Method::Thall => Setup::THALL,
-        Method::GaussSeidel => Setup::Sor { omega: 1.0, order },
-        Method::Sor => Setup::Sor { omega: SOR_OMEGA, order },
-        Method::Ssor => Setup::Ssor { omega: SSOR_OMEGA, order },
-        Method::Pia => Setup::Pia { omega: 1.0 },
-        Method::WPia => Setup::Pia { omega: spectrum()?.a.optimal_omega() },
-        // ω = 1 for a scheme's matrix.
-        Method::Anderson => Setup::AndersonPia { omega: 1.0 / system.lambda_max(), window: WINDOW },
-        Method::HeavyBall => Setup::HeavyBall { spectrum: estimated(system, &spectrum()?) },
-        Method::Chebyshev if system.bounds.lambda_min > 0.0 => {
-            Setup::Chebyshev { spectrum: (system.bounds.lambda_min, system.bounds.lambda_max) }
+        Method::Jacobi { omega: None } => Method::Jacobi { omega: Some(spectrum()?.jacobi.optimal_omega()) },
+        Method::WPia { omega: None } => Method::WPia { omega: Some(spectrum()?.a.optimal_omega()) },
+        Method::Anderson { of: Accelerated::Pia { omega: None }, window } => {
+            Method::Anderson { of: Accelerated::Pia { omega: Some(1.0 / bounds.lambda_max) }, window }
         }
-        Method::Chebyshev => Setup::Chebyshev { spectrum: estimated(system, &spectrum()?) },
-        Method::Cg => Setup::Cg,
-        Method::PcgJacobi => Setup::PcgJacobi,
-        Method::PcgSsor => Setup::PcgSsor { omega: SSOR_OMEGA },
-        Method::PcgIc0 => Setup::PcgIc0,
+        Method::Anderson { of: Accelerated::Jacobi { omega: None }, window } => {
+            let omega = Some(spectrum()?.jacobi.optimal_omega());
+            Method::Anderson { of: Accelerated::Jacobi { omega }, window }
+        }
+        Method::HeavyBall { interval: None } => Method::HeavyBall { interval: Some(estimated(system, &spectrum()?)) },
+        Method::Chebyshev { interval: None } if bounds.lambda_min > 0.0 => {
+            Method::Chebyshev { interval: Some((bounds.lambda_min, bounds.lambda_max)) }
+        }
+        Method::Chebyshev { interval: None } => Method::Chebyshev { interval: Some(estimated(system, &spectrum()?)) },
+        Method::Lu
+        | Method::Cholesky
+        | Method::SecondCholesky
+        | Method::Ldlt
+        | Method::Jacobi { omega: Some(_) }
+        | Method::Thall
+        | Method::GaussSeidel { .. }
+        | Method::Sor { .. }
+        | Method::Ssor { .. }
+        | Method::Pia
+        | Method::WPia { omega: Some(_) }
+        | Method::Chebyshev { interval: Some(_) }
+        | Method::Cg
+        | Method::PlainCg
+        | Method::PcgJacobi
+        | Method::PcgSsor { .. }
+        | Method::PcgIc0
+        | Method::Anderson {
+            of: Accelerated::Pia { omega: Some(_) } | Accelerated::Jacobi { omega: Some(_) }, ..
+        }
+        | Method::HeavyBall { interval: Some(_) } => method,
     })
 }
 
@@ -101,100 +110,94 @@ fn estimated(system: &LimitSystem, spectrum: &Spectrum) -> (f64, f64) {
 
 /// The method that `auto` stands for: Chebyshev with proven bounds where the one for λ_min is positive (no inner
 /// products, a count known in advance), else conjugate gradients, which need no bound.
-pub fn automatic(system: &LimitSystem) -> Method {
-    if system.bounds.lambda_min > 0.0 { Method::Chebyshev } else { Method::Cg }
+pub fn automatic(system: &LimitSystem) -> Method<'static> {
+    if system.bounds.lambda_min > 0.0 { Method::Chebyshev { interval: None } } else { Method::Cg }
 }
 
-/// The standard line of each method in `methods`, then the further lines: other intervals, other libraries, the
+/// The line of each method in `methods`, then the further lines: other intervals, other libraries, the
 /// unpreconditioned CG. `order` is the vertex order of in-place sweeps, `order_name` its name.
 ///
 /// # Errors
-/// None with a given spectrum; the type is that of [`standard_setup`].
+/// None with a given spectrum; the type is that of [`with_spectrum`].
 pub fn entries<'a>(
     system: &LimitSystem,
     spectrum: &Spectrum,
-    methods: &[Method],
+    methods: &[Method<'a>],
     order: Option<&'a [u32]>,
     order_name: &str,
 ) -> Result<Vec<Entry<'a>>> {
-    let proven = system.bounds.lambda_min > 0.0;
-    let entry =
-        |method, variant, setup| Entry { method, variant, parameter: parameter(variant, setup, order_name), setup };
-    let mut lines = Vec::new();
-    for &method in methods {
-        let variant = match method {
-            Method::Lu | Method::Cholesky | Method::Ldlt => "faer",
-            Method::Jacobi | Method::WPia => "optimal",
-            Method::Chebyshev if proven => "proven",
-            Method::HeavyBall | Method::Chebyshev => "estimated",
-            Method::Anderson => "of pia",
-            Method::Cg => "preconditioned by H",
-            Method::PcgJacobi => "diag(M)",
-            Method::PcgIc0 => "no fill",
-            Method::Thall | Method::GaussSeidel | Method::Sor | Method::Ssor | Method::Pia | Method::PcgSsor => "",
-        };
-        let setup = standard_setup(system, method, order, &|| Ok(*spectrum))?;
-        lines.push(entry(method, variant, setup));
-    }
-    for &method in methods {
-        match method {
-            Method::Cholesky => {
-                lines.push(entry(method, "nalgebra-sparse", Setup::SecondCholesky));
-            }
-            Method::Cg => lines.push(entry(method, "on M itself", Setup::PlainCg)),
-            Method::Anderson => {
-                let of_jacobi = |omega| Setup::AndersonJacobi { omega, window: WINDOW };
-                lines.push(entry(method, "of thall", of_jacobi(THALL_OMEGA)));
-                lines.push(entry(method, "of jacobi", of_jacobi(spectrum.jacobi.optimal_omega())));
-            }
-            Method::Chebyshev if proven => {
-                let setup = Setup::Chebyshev { spectrum: estimated(system, spectrum) };
-                lines.push(entry(method, "estimated", setup));
-            }
-            Method::Lu
-            | Method::Ldlt
-            | Method::Jacobi
-            | Method::Thall
-            | Method::GaussSeidel
-            | Method::Sor
-            | Method::Ssor
-            | Method::Pia
-            | Method::WPia
-            | Method::HeavyBall
-            | Method::Chebyshev
-            | Method::PcgJacobi
-            | Method::PcgSsor
-            | Method::PcgIc0 => {}
-        }
-    }
-    Ok(lines)
+    let entry = |method: Method<'a>, variant| -> Result<Entry<'a>> {
+        let method = with_spectrum(system, method.in_order(order), &|| Ok(*spectrum))?;
+        Ok(Entry { method, variant, parameter: parameter(variant, method, order_name) })
+    };
+    let variants = |&method: &Method<'a>| variants(system, spectrum, method);
+    let (first, further): (Vec<_>, Vec<_>) = methods.iter().map(variants).unzip();
+    let lines = methods.iter().copied().zip(first).chain(further.into_iter().flatten());
+    lines.map(|(method, variant)| entry(method, variant)).collect()
 }
 
-/// The numbers of a set-up, the order it sweeps in, and its variant, in words.
-fn parameter(variant: &str, setup: Setup, order_name: &str) -> String {
+/// What the line of a method is called, and its further lines.
+fn variants<'a>(
+    system: &LimitSystem,
+    spectrum: &Spectrum,
+    method: Method<'a>,
+) -> (&'static str, Vec<(Method<'a>, &'static str)>) {
+    let anderson = |omega| Method::Anderson { of: Accelerated::Jacobi { omega }, window: WINDOW };
+    match method {
+        Method::Lu | Method::Ldlt => ("faer", Vec::new()),
+        Method::Cholesky => ("faer", vec![(Method::SecondCholesky, "nalgebra-sparse")]),
+        Method::SecondCholesky => ("nalgebra-sparse", Vec::new()),
+        Method::Jacobi { .. } | Method::WPia { .. } => ("optimal", Vec::new()),
+        Method::Chebyshev { .. } if system.bounds.lambda_min > 0.0 => {
+            let interval = Some(estimated(system, spectrum));
+            ("proven", vec![(Method::Chebyshev { interval }, "estimated")])
+        }
+        Method::Chebyshev { .. } | Method::HeavyBall { .. } => ("estimated", Vec::new()),
+        Method::Anderson { of: Accelerated::Pia { .. }, .. } => {
+            ("of pia", vec![(anderson(Some(THALL_OMEGA)), "of thall"), (anderson(None), "of jacobi")])
+        }
+        Method::Anderson { of: Accelerated::Jacobi { .. }, .. } => ("of jacobi", Vec::new()),
+        Method::Cg => ("preconditioned by H", vec![(Method::PlainCg, "on M itself")]),
+        Method::PlainCg => ("on M itself", Vec::new()),
+        Method::PcgJacobi => ("diag(M)", Vec::new()),
+        Method::PcgIc0 => ("no fill", Vec::new()),
+        Method::Thall
+        | Method::GaussSeidel { .. }
+        | Method::Sor { .. }
+        | Method::Ssor { .. }
+        | Method::Pia
+        | Method::PcgSsor { .. } => ("", Vec::new()),
+    }
+}
+
+/// The numbers of a method, the order it sweeps in, and its variant, in words.
+fn parameter(variant: &str, method: Method, order_name: &str) -> String {
     let order = format!("{order_name} order");
-    let mut words = match setup {
-        Setup::Jacobi { omega } | Setup::Pia { omega } | Setup::PcgSsor { omega } => {
-            vec![format!("ω={}", four_digits(omega))]
+    let weight = |omega: f64| format!("ω={}", four_digits(omega));
+    let mut words = match method {
+        Method::Jacobi { omega } | Method::WPia { omega } => omega.map(weight).into_iter().collect(),
+        Method::Thall => vec![weight(THALL_OMEGA)],
+        Method::Pia => vec![weight(1.0)],
+        Method::PcgSsor { omega } => vec![weight(omega)],
+        Method::GaussSeidel { .. } => vec![order],
+        Method::Sor { omega, .. } | Method::Ssor { omega, .. } => vec![weight(omega), order],
+        Method::HeavyBall { interval } | Method::Chebyshev { interval } => {
+            let words = |(min, max)| format!("λ ∈ [{}, {}]", four_digits(min), four_digits(max));
+            interval.map(words).into_iter().collect()
         }
-        Setup::Sor { omega: 1.0, .. } => vec![order],
-        Setup::Sor { omega, .. } | Setup::Ssor { omega, .. } => {
-            vec![format!("ω={}", four_digits(omega)), order]
+        Method::Anderson { of: Accelerated::Pia { omega } | Accelerated::Jacobi { omega }, window } => {
+            let mut words = vec![format!("m={window}")];
+            words.extend(omega.map(weight));
+            words
         }
-        Setup::HeavyBall { spectrum: (min, max) } | Setup::Chebyshev { spectrum: (min, max) } => {
-            vec![format!("λ ∈ [{}, {}]", four_digits(min), four_digits(max))]
-        }
-        Setup::AndersonPia { omega, window } | Setup::AndersonJacobi { omega, window } => {
-            vec![format!("m={window}"), format!("ω={}", four_digits(omega))]
-        }
-        Setup::Lu
-        | Setup::Cholesky
-        | Setup::SecondCholesky
-        | Setup::Ldlt
-        | Setup::Cg
-        | Setup::PlainCg
-        | Setup::PcgJacobi
-        | Setup::PcgIc0 => Vec::new(),
+        Method::Lu
+        | Method::Cholesky
+        | Method::SecondCholesky
+        | Method::Ldlt
+        | Method::Cg
+        | Method::PlainCg
+        | Method::PcgJacobi
+        | Method::PcgIc0 => Vec::new(),
     };
     if !variant.is_empty() {
         words.push(variant.into());
@@ -218,15 +221,15 @@ fn four_digits(x: f64) -> String {
 ///
 /// # Panics
 /// If there is not one point a vertex.
-pub fn compare(
+pub fn compare<'a>(
     system: &LimitSystem,
     spectrum: &Spectrum,
     points: &[DVec3],
-    entries: &[Entry],
+    entries: &[Entry<'a>],
     own: &[Own],
     stop: &Stop,
     done: &mut dyn FnMut(),
-) -> Result<Vec<Row>> {
+) -> Result<Vec<Row<'a>>> {
     let floor = rounding_floor(diagonal(points));
     let observed_rate = |solution: &Solution| {
         let maxima: Vec<f64> = solution.report.history.iter().map(|e| e.max).collect();
@@ -235,9 +238,9 @@ pub fn compare(
     let ours = entries
         .iter()
         .map(|entry| {
-            let solution = run(system, points, entry.setup, stop);
+            let solution = run(system, points, entry.method, stop);
             let observed_rate = (!entry.method.is_direct()).then(|| observed_rate(&solution)).flatten();
-            let predicted_rate = predicted_rate(system, spectrum, entry.setup)?;
+            let predicted_rate = predicted_rate(system, spectrum, entry.method)?;
             done();
             Ok(Row {
                 method: Named::Ours(entry.method),
@@ -248,7 +251,7 @@ pub fn compare(
                 predicted_rate,
             })
         })
-        .collect::<Result<Vec<Row>>>()?;
+        .collect::<Result<Vec<Row<'a>>>>()?;
     let theirs = own.iter().map(|own| {
         let solution = own.run(system, points, stop);
         done();

@@ -136,15 +136,15 @@ impl Iterate for Confirmed<'_> {
 }
 
 /// What a row of a comparison is about.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Named {
+#[derive(Clone, Debug, PartialEq)]
+pub enum Named<'a> {
     /// One of the methods here.
-    Ours(Method),
+    Ours(Method<'a>),
     /// One of the caller's, by its name.
     Own(String),
 }
 
-impl Named {
+impl Named<'_> {
     pub fn name(&self) -> &str {
         match self {
             Named::Ours(method) => method.name(),
@@ -158,13 +158,7 @@ impl Named {
     }
 }
 
-impl PartialEq<Method> for Named {
-    fn eq(&self, other: &Method) -> bool {
-        matches!(self, Named::Ours(method) if method == other)
-    }
-}
-
-impl fmt::Display for Named {
+impl fmt::Display for Named<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
     }

@@ -6,26 +6,35 @@ use super::radius::sweep_radius;
 use super::spectrum::{Extremes, Spectrum};
 use crate::assemble::LimitSystem;
 use crate::error::Result;
-use crate::solvers::Setup;
+use crate::solvers::Method;
 use crate::solvers::gauss_seidel::sweep;
+use crate::solvers::jacobi::THALL_OMEGA;
 use crate::solvers::ssor::symmetric_sweep;
 
-/// The predicted factor per iteration of a method on a system with the given spectra. For relaxation it is the
+/// The predicted factor per iteration of a method on a system with the given spectra, whose best parameters stand for those
+/// that are open. For relaxation it is the
 /// spectral radius of the error matrix; for the heavy ball, Chebyshev and conjugate gradients (√κ−1)/(√κ+1), which
 /// conjugate gradients may beat. `None` for direct methods, and where no prediction is made (Anderson acceleration, plain
 /// and incomplete-Cholesky conjugate gradients).
 ///
 /// # Errors
 /// If the spectral radius of a sweep cannot be computed.
-pub fn predicted_rate(system: &LimitSystem, spectrum: &Spectrum, setup: Setup) -> Result<Option<f64>> {
+pub fn predicted_rate(system: &LimitSystem, spectrum: &Spectrum, method: Method) -> Result<Option<f64>> {
     let zero = || vec![DVec3::ZERO; system.len()];
-    Ok(match setup {
-        Setup::Lu | Setup::Cholesky | Setup::SecondCholesky | Setup::Ldlt | Setup::PlainCg | Setup::PcgIc0 => None,
+    Ok(match method {
+        Method::Lu | Method::Cholesky | Method::SecondCholesky | Method::Ldlt | Method::PlainCg | Method::PcgIc0 => {
+            None
+        }
         // Between the relaxation's own rate and that of full GMRES.
-        Setup::AndersonPia { .. } | Setup::AndersonJacobi { .. } => None,
-        Setup::Jacobi { omega } => Some(spectrum.jacobi.radius(omega)),
-        Setup::Pia { omega } => Some(spectrum.a.radius(omega)),
-        Setup::Sor { omega, order } => {
+        Method::Anderson { .. } => None,
+        Method::Jacobi { omega } => {
+            Some(spectrum.jacobi.radius(omega.unwrap_or_else(|| spectrum.jacobi.optimal_omega())))
+        }
+        Method::Thall => Some(spectrum.jacobi.radius(THALL_OMEGA)),
+        Method::Pia => Some(spectrum.a.radius(1.0)),
+        Method::WPia { omega } => Some(spectrum.a.radius(omega.unwrap_or_else(|| spectrum.a.optimal_omega()))),
+        Method::GaussSeidel { order } => return predicted_rate(system, spectrum, Method::Sor { omega: 1.0, order }),
+        Method::Sor { omega, order } => {
             let points = zero();
             let natural: Vec<u32>;
             let order = match order {
@@ -40,18 +49,18 @@ pub fn predicted_rate(system: &LimitSystem, spectrum: &Spectrum, setup: Setup) -
                 sweep(system, &points, omega, vertices(), x);
             })?)
         }
-        Setup::Ssor { omega, order } => {
+        Method::Ssor { omega, order } => {
             let points = zero();
             Some(sweep_radius(system, |x| {
                 symmetric_sweep(system, &points, omega, order, x);
             })?)
         }
-        Setup::HeavyBall { spectrum: (min, max) } | Setup::Chebyshev { spectrum: (min, max) } => {
-            Some(Extremes { min, max }.krylov_rate())
+        Method::HeavyBall { interval } | Method::Chebyshev { interval } => {
+            Some(interval.map_or(spectrum.a, |(min, max)| Extremes { min, max }).krylov_rate())
         }
-        Setup::Cg => Some(spectrum.a.krylov_rate()),
-        Setup::PcgJacobi => Some(spectrum.jacobi.krylov_rate()),
-        Setup::PcgSsor { omega } => {
+        Method::Cg => Some(spectrum.a.krylov_rate()),
+        Method::PcgJacobi => Some(spectrum.jacobi.krylov_rate()),
+        Method::PcgSsor { omega } => {
             // The preconditioned matrix is I − E with E the error matrix of SSOR, whose spectrum is in [0, ρ].
             let points = zero();
             let radius = sweep_radius(system, |x| {

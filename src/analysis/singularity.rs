@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::mesh::Surface;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::schemes::{Scheme, SingularSet};
-use crate::solvers::Method;
+use crate::solvers::{Accelerated, Method};
 
 /// A component on which A is singular.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,19 +134,24 @@ impl Singularity {
             return Prediction::Converges;
         }
         let soluble = match method {
-            Method::Lu | Method::Cholesky | Method::Ldlt => return Prediction::Refuses,
+            Method::Lu | Method::Cholesky | Method::SecondCholesky | Method::Ldlt => return Prediction::Refuses,
             // Updates lie in the range of A = H M, which is H^-1-orthogonal to the null space.
-            Method::Pia | Method::WPia | Method::Anderson | Method::HeavyBall | Method::Chebyshev | Method::Cg => {
-                Prediction::MinimumNorm
-            }
-            Method::Jacobi
+            Method::Pia
+            | Method::WPia { .. }
+            | Method::Anderson { of: Accelerated::Pia { .. }, .. }
+            | Method::HeavyBall { .. }
+            | Method::Chebyshev { .. }
+            | Method::Cg => Prediction::MinimumNorm,
+            Method::Jacobi { .. }
             | Method::Thall
-            | Method::GaussSeidel
-            | Method::Sor
-            | Method::Ssor
+            | Method::GaussSeidel { .. }
+            | Method::Sor { .. }
+            | Method::Ssor { .. }
+            | Method::PlainCg
             | Method::PcgJacobi
-            | Method::PcgSsor
-            | Method::PcgIc0 => Prediction::SomeSolution,
+            | Method::PcgSsor { .. }
+            | Method::PcgIc0
+            | Method::Anderson { of: Accelerated::Jacobi { .. }, .. } => Prediction::SomeSolution,
         };
         if self.excited { Prediction::Drifts } else { soluble }
     }

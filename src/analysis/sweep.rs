@@ -10,12 +10,12 @@ use super::rate::observed_rate;
 use super::spectrum::{Extremes, Operator, Spectrum, excited, spectrum};
 use crate::assemble::LimitSystem;
 use crate::error::Result;
-use crate::solvers::{Errors, Method, Outcome, Setup, Stop, run};
+use crate::solvers::{Errors, Method, Outcome, Stop, run};
 
 /// A method at one ω.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    pub method: Method,
+    pub method: Method<'static>,
     pub omega: f64,
     pub outcome: Outcome,
     pub iterations: usize,
@@ -32,7 +32,7 @@ pub struct Row {
 /// The thresholds of one relaxation: of the matrix (for every start) and of the data (for V₀ = P).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
-    pub method: Method,
+    pub method: Method<'static>,
     pub matrix: Extremes,
     pub data: Option<Extremes>,
 }
@@ -73,7 +73,7 @@ pub fn rounding_floor(diagonal: f64) -> f64 {
 pub fn sweep(
     system: &LimitSystem,
     points: &[DVec3],
-    grids: &[(Method, Vec<f64>)],
+    grids: &[(Method<'static>, Vec<f64>)],
     order: Option<&[u32]>,
     stop: &Stop,
     floor: f64,
@@ -83,25 +83,36 @@ pub fn sweep(
     let mut thresholds = Vec::new();
     for (method, _) in grids {
         let (operator, matrix) = match method {
-            Method::Jacobi => (Operator::Jacobi, spectrum.jacobi),
-            Method::Pia => (Operator::A, spectrum.a),
-            _ => continue,
+            Method::Jacobi { .. } | Method::Thall => (Operator::Jacobi, spectrum.jacobi),
+            Method::Pia | Method::WPia { .. } => (Operator::A, spectrum.a),
+            Method::Lu
+            | Method::Cholesky
+            | Method::SecondCholesky
+            | Method::Ldlt
+            | Method::GaussSeidel { .. }
+            | Method::Sor { .. }
+            | Method::Ssor { .. }
+            | Method::Chebyshev { .. }
+            | Method::Cg
+            | Method::PlainCg
+            | Method::PcgJacobi
+            | Method::PcgSsor { .. }
+            | Method::PcgIc0
+            | Method::Anderson { .. }
+            | Method::HeavyBall { .. } => continue,
         };
         thresholds.push(Thresholds { method: *method, matrix, data: excited(system, points, operator)? });
     }
-    let jobs: Vec<(Method, f64)> =
+    let jobs: Vec<(Method<'static>, f64)> =
         grids.iter().flat_map(|(method, omegas)| omegas.iter().map(|&omega| (*method, omega))).collect();
     // Beside the rows, the number of each.
     let found = Mutex::new((Sweep { spectrum, thresholds: thresholds.clone(), rows: Vec::new() }, Vec::new()));
     jobs.par_iter().enumerate().try_for_each(|(number, &(method, omega))| -> Result<()> {
-        let setup = match method {
-            Method::Jacobi => Setup::Jacobi { omega },
-            Method::Pia => Setup::Pia { omega },
-            Method::Sor => Setup::Sor { omega, order },
-            other => panic!("{other} is not swept over ω"),
+        let Some(swept) = method.in_order(order).at_omega(omega) else {
+            panic!("{method} is not swept over ω");
         };
-        let report = run(system, points, setup, stop).report;
-        let predicted = predicted_rate(system, &spectrum, setup)?;
+        let report = run(system, points, swept, stop).report;
+        let predicted = predicted_rate(system, &spectrum, swept)?;
         let maxima: Vec<f64> = report.history.iter().map(|e| e.max).collect();
         let data = thresholds.iter().find(|t| t.method == method).and_then(|t| t.data);
         let row = Row {

@@ -27,7 +27,7 @@ impl LimitSystem {
     ///
     /// ```
     /// use limitlab::assemble::{Csr, LimitSystem};
-    /// use limitlab::solvers::{Outcome, Setup, Stop, run};
+    /// use limitlab::solvers::{Method, Outcome, Stop, run};
     /// use glam::DVec3;
     /// use limitlab::analysis::spectrum::spectrum;
     /// use nalgebra_sparse::{CooMatrix, CsrMatrix};
@@ -43,7 +43,7 @@ impl LimitSystem {
     /// }
     /// let system = LimitSystem::from_parts(vec![1.0; 50], Csr::try_from(&CsrMatrix::from(&m))?)?;
     /// let stop = Stop { tolerance: 1e-10, max_iterations: 100 };
-    /// let solution = run(&system, &[DVec3::X; 50], Setup::Cg, &stop);
+    /// let solution = run(&system, &[DVec3::X; 50], Method::Cg, &stop);
     /// // The parabola, symmetric about the middle, as half of the eigenvectors are.
     /// assert_eq!(solution.report.outcome, Outcome::Converged);
     /// assert!(solution.report.iterations <= 25);

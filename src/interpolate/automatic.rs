@@ -42,7 +42,7 @@ pub struct Automatic {
     /// V, in the order of the mesh.
     pub points: Vec<DVec3>,
     /// [`Method::Chebyshev`] or [`Method::Cg`].
-    pub method: Method,
+    pub method: Method<'static>,
     pub report: Report,
     /// The order of the rows, the operator.
     pub setup_seconds: f64,
@@ -118,10 +118,10 @@ fn operator(surface: &Surface, scheme: Scheme) -> Result<(Operator, Option<Numbe
     Ok((operator, numbering))
 }
 
-fn iterate(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Method, Vec<DVec3>, Report) {
+fn iterate(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Method<'static>, Vec<DVec3>, Report) {
     let (control, report) = mixed::solve(operator, points, stop);
     if !matches!(report.outcome, Outcome::Stagnated | Outcome::Diverged) {
-        return (Method::Chebyshev, control, report);
+        return (Method::Chebyshev { interval: None }, control, report);
     }
     let mut cg = ConjugateGradient::new(operator, points, Preconditioner::weights(operator));
     let report = solve(&mut cg, stop, &mut |_| ControlFlow::Continue(()));

@@ -10,7 +10,7 @@ use crate::Result;
 use crate::assemble::LimitSystem;
 use crate::mesh::Surface;
 use crate::schemes::Scheme;
-use crate::solvers::{Setup, Solution, Stop, run};
+use crate::solvers::{Method, Solution, Stop, run};
 
 /// Solves Nasri's system for the control points: all vertices, or those marked in `interpolated` with V_j = I_j at
 /// the others (a principal submatrix, whose eigenvalues stay in [¼, 1], so it is soluble on every mesh).
@@ -20,14 +20,19 @@ use crate::solvers::{Setup, Solution, Stop, run};
 ///
 /// # Panics
 /// If `interpolated` has not one entry a vertex.
-pub fn control_points(surface: &Surface, interpolated: Option<&[bool]>, setup: Setup, stop: &Stop) -> Result<Solution> {
+pub fn control_points(
+    surface: &Surface,
+    interpolated: Option<&[bool]>,
+    method: Method,
+    stop: &Stop,
+) -> Result<Solution> {
     let mesh = surface.mesh();
     let system = LimitSystem::new(surface, Scheme::Nasri)?;
     let points = &mesh.positions;
     Ok(match interpolated {
-        None => run(&system, points, setup, stop),
+        None => run(&system, points, method, stop),
         Some(marks) => {
-            Restriction::new(&system, marks)?.solve(&system, points, setup, stop, &mut |_| ControlFlow::Continue(()))
+            Restriction::new(&system, marks)?.solve(&system, points, method, stop, &mut |_| ControlFlow::Continue(()))
         }
     })
 }

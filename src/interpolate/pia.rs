@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::assemble::LimitSystem;
 use crate::schemes::{Masks, Scheme};
-use crate::solvers::{Errors, Outcome, Setup, Stop, run};
+use crate::solvers::{Errors, Method, Outcome, Stop, run};
 
 /// A run of the paper's algorithm, counted as its Table 1 counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,7 +26,7 @@ pub struct Passes {
 /// If there is not one point a vertex.
 pub fn passes(system: &LimitSystem, points: &[DVec3], tolerance: f64, limit: usize) -> Passes {
     let stop = Stop { tolerance, max_iterations: limit };
-    let report = run(system, points, Setup::Pia { omega: 1.0 }, &stop).report;
+    let report = run(system, points, Method::Pia, &stop).report;
     Passes { outcome: report.outcome, updates: report.iterations, passes: report.iterations + 1, errors: report.last() }
 }
 

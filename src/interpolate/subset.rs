@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use crate::assemble::csr::Pattern;
 use crate::assemble::{Csr, LimitSystem};
-use crate::solvers::{Setup, Solution, Step, Stop, run_watched};
+use crate::solvers::{Method, Solution, Step, Stop, run_watched};
 use crate::{Error, Result};
 
 /// The principal submatrix of a limit system on the interpolated vertices S.
@@ -87,14 +87,14 @@ impl Restriction {
         &self,
         full: &LimitSystem,
         points: &[DVec3],
-        setup: Setup,
+        method: Method,
         stop: &Stop,
         watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
     ) -> Solution {
         assert_eq!(points.len(), full.len(), "one point a vertex");
         let differences: Vec<DVec3> =
             (self.vertices.iter()).map(|&v| points[v as usize] - full.a.row_times(v as usize, points)).collect();
-        let mut solution = run_watched(&self.system, &differences, setup, stop, watch);
+        let mut solution = run_watched(&self.system, &differences, method, stop, watch);
         let mut control = points.to_vec();
         for (&v, x) in self.vertices.iter().zip(&solution.points) {
             control[v as usize] += *x;

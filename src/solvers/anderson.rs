@@ -38,14 +38,14 @@ type Products = [[f64; MOST + 1]; 2];
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::mesh::{Surface, builtin};
 /// use limitlab::schemes::Scheme;
-/// use limitlab::solvers::{Setup, Stop, run};
+/// use limitlab::solvers::{Accelerated, Method, Stop, run};
 ///
 /// let surface = Surface::new(builtin::builtin("icosphere:2")?)?;
 /// let system = LimitSystem::new(&surface, Scheme::Loop)?;
 /// let stop = Stop { tolerance: 1e-9, max_iterations: 200 };
-/// let steps = |setup| run(&system, surface.positions(), setup, &stop).report.iterations;
-/// let plain = steps(Setup::Pia { omega: 1.0 });
-/// assert!(2 * steps(Setup::AndersonPia { omega: 1.0, window: 5 }) < plain);
+/// let steps = |method| run(&system, surface.positions(), method, &stop).report.iterations;
+/// let plain = steps(Method::Pia);
+/// assert!(2 * steps(Method::Anderson { of: Accelerated::Pia { omega: Some(1.0) }, window: 5 }) < plain);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub struct Anderson<'a, S> {

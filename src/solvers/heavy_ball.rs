@@ -19,14 +19,14 @@ use super::system::System;
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::mesh::{Surface, builtin};
 /// use limitlab::schemes::Scheme;
-/// use limitlab::solvers::{Setup, Stop, run};
+/// use limitlab::solvers::{Method, Stop, run};
 ///
 /// let surface = Surface::new(builtin::builtin("icosphere:2")?)?;
 /// let system = LimitSystem::new(&surface, Scheme::Loop)?;
 /// let stop = Stop { tolerance: 1e-9, max_iterations: 200 };
-/// let steps = |setup| run(&system, surface.positions(), setup, &stop).report.iterations;
+/// let steps = |method| run(&system, surface.positions(), method, &stop).report.iterations;
 /// let spectrum = (system.bounds.lambda_min, system.bounds.lambda_max);
-/// assert!(steps(Setup::HeavyBall { spectrum }) < steps(Setup::Pia { omega: 1.0 }));
+/// assert!(steps(Method::HeavyBall { interval: Some(spectrum) }) < steps(Method::Pia));
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub struct HeavyBall<'a, S> {

@@ -1,4 +1,4 @@
-//! The methods by name, and one way to run any of them.
+//! The methods by name with their parameters, and one way to run any of them.
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::anderson::Anderson;
+use super::anderson::{Anderson, WINDOW};
 use super::chebyshev::Chebyshev;
 use super::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use super::direct::{Cholesky, Direct, Factorization, Kind, SecondOpinion, SparseLu};
@@ -21,106 +21,193 @@ use super::ssor::Ssor;
 use super::system::{Rows, System};
 use crate::error::Error;
 
-/// A method, without its parameters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Method {
+/// ω of `sor` unless told: about the best for all schemes on irregular meshes. Tuned on the sweeps in
+/// `reports/`.
+pub const SOR_OMEGA: f64 = 1.1;
+/// ω of `ssor` and of the preconditioner `pcg-ssor`, where the symmetric sweep is little sensitive to it.
+pub const SSOR_OMEGA: f64 = 1.0;
+/// The part of λ_max where the interval of Chebyshev and of the heavy ball starts if no larger λ_min is proven: modes
+/// beneath are left nearly as they are.
+const LOWEST: f64 = 1e-3;
+
+/// A method with its parameters.
+///
+/// A parameter that is `None` is the best that is known of the spectrum:
+/// [`comparison::with_spectrum`](crate::analysis::comparison::with_spectrum) sets it by estimates, and [`run`] by the
+/// [proven bounds](System::bounds), which are all that it knows. So does a name that is parsed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method<'a> {
     /// Sparse LU of A.
     Lu,
     /// Sparse Cholesky M = LLᵀ.
     Cholesky,
+    /// M = LLᵀ by the second, independent library.
+    SecondCholesky,
     /// Sparse M = LDLᵀ.
     Ldlt,
-    /// Damped Jacobi with a given ω.
-    Jacobi,
+    /// Damped Jacobi.
+    Jacobi { omega: Option<f64> },
     /// Jacobi with ω = ½.
     Thall,
     /// Gauss-Seidel (GS-PIA), in a vertex order.
-    GaussSeidel,
+    GaussSeidel { order: Option<&'a [u32]> },
     /// Successive over-relaxation, in a vertex order.
-    Sor,
+    Sor { omega: f64, order: Option<&'a [u32]> },
     /// Symmetric SOR, in a vertex order and back.
-    Ssor,
-    /// Progressive iterative approximation.
+    Ssor { omega: f64, order: Option<&'a [u32]> },
+    /// Progressive iterative approximation: ω = 1.
     Pia,
     /// PIA with a weight.
-    WPia,
-    /// Chebyshev iteration on A.
-    Chebyshev,
+    WPia { omega: Option<f64> },
+    /// Chebyshev iteration on A, for the eigenvalues in an interval.
+    Chebyshev { interval: Option<(f64, f64)> },
     /// Conjugate gradients (CG-PIA), preconditioned by H: they see the spectrum of A.
     Cg,
+    /// Conjugate gradients on M as it is.
+    PlainCg,
     /// Conjugate gradients preconditioned by diag(M)⁻¹.
     PcgJacobi,
     /// Conjugate gradients preconditioned by a symmetric SOR sweep.
-    PcgSsor,
+    PcgSsor { omega: f64 },
     /// Conjugate gradients preconditioned by incomplete Cholesky without fill.
     PcgIc0,
-    /// Anderson acceleration of PIA, of Thall's masks or of Jacobi.
-    Anderson,
-    /// PIA with momentum.
-    HeavyBall,
+    /// Anderson acceleration with the last `window` differences.
+    Anderson { of: Accelerated, window: usize },
+    /// PIA with momentum, for the eigenvalues in an interval.
+    HeavyBall { interval: Option<(f64, f64)> },
 }
 
-impl Method {
-    pub const ALL: [Method; 17] = [
+/// The relaxation that Anderson's acceleration is of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Accelerated {
+    /// PIA; unless told, with ω = 1/λ_max: 1 for a scheme's matrix.
+    Pia { omega: Option<f64> },
+    /// Jacobi, or Thall's masks.
+    Jacobi { omega: Option<f64> },
+}
+
+impl<'a> Method<'a> {
+    /// All by name, with the parameters that a name alone stands for.
+    pub const ALL: [Method<'static>; 17] = [
         Method::Lu,
         Method::Cholesky,
         Method::Ldlt,
-        Method::Jacobi,
+        Method::Jacobi { omega: None },
         Method::Thall,
-        Method::GaussSeidel,
-        Method::Sor,
-        Method::Ssor,
+        Method::GaussSeidel { order: None },
+        Method::Sor { omega: SOR_OMEGA, order: None },
+        Method::Ssor { omega: SSOR_OMEGA, order: None },
         Method::Pia,
-        Method::WPia,
-        Method::Chebyshev,
+        Method::WPia { omega: None },
+        Method::Chebyshev { interval: None },
         Method::Cg,
         Method::PcgJacobi,
-        Method::PcgSsor,
+        Method::PcgSsor { omega: SSOR_OMEGA },
         Method::PcgIc0,
-        Method::Anderson,
-        Method::HeavyBall,
+        Method::Anderson { of: Accelerated::Pia { omega: None }, window: WINDOW },
+        Method::HeavyBall { interval: None },
     ];
 
+    /// The name, which says nothing of parameters and variants.
     pub fn name(self) -> &'static str {
         match self {
             Method::Lu => "lu",
-            Method::Cholesky => "cholesky",
+            Method::Cholesky | Method::SecondCholesky => "cholesky",
             Method::Ldlt => "ldlt",
-            Method::Jacobi => "jacobi",
+            Method::Jacobi { .. } => "jacobi",
             Method::Thall => "thall",
-            Method::GaussSeidel => "gauss-seidel",
-            Method::Sor => "sor",
-            Method::Ssor => "ssor",
+            Method::GaussSeidel { .. } => "gauss-seidel",
+            Method::Sor { .. } => "sor",
+            Method::Ssor { .. } => "ssor",
             Method::Pia => "pia",
-            Method::WPia => "w-pia",
-            Method::Anderson => "anderson",
-            Method::HeavyBall => "heavy-ball",
-            Method::Chebyshev => "chebyshev",
-            Method::Cg => "cg",
+            Method::WPia { .. } => "w-pia",
+            Method::Chebyshev { .. } => "chebyshev",
+            Method::Cg | Method::PlainCg => "cg",
             Method::PcgJacobi => "pcg-jacobi",
-            Method::PcgSsor => "pcg-ssor",
+            Method::PcgSsor { .. } => "pcg-ssor",
             Method::PcgIc0 => "pcg-ic0",
+            Method::Anderson { .. } => "anderson",
+            Method::HeavyBall { .. } => "heavy-ball",
         }
     }
 
     /// Whether the method factors the matrix.
     pub fn is_direct(self) -> bool {
-        matches!(self, Method::Lu | Method::Cholesky | Method::Ldlt)
+        match self {
+            Method::Lu | Method::Cholesky | Method::SecondCholesky | Method::Ldlt => true,
+            Method::Jacobi { .. }
+            | Method::Thall
+            | Method::GaussSeidel { .. }
+            | Method::Sor { .. }
+            | Method::Ssor { .. }
+            | Method::Pia
+            | Method::WPia { .. }
+            | Method::Chebyshev { .. }
+            | Method::Cg
+            | Method::PlainCg
+            | Method::PcgJacobi
+            | Method::PcgSsor { .. }
+            | Method::PcgIc0
+            | Method::Anderson { .. }
+            | Method::HeavyBall { .. } => false,
+        }
     }
 
-    /// Whether the method depends on the vertex order.
-    pub fn is_ordered(self) -> bool {
-        matches!(self, Method::GaussSeidel | Method::Sor | Method::Ssor | Method::PcgSsor)
+    /// The same in another vertex order, where the method sweeps in one.
+    pub fn in_order(self, order: Option<&'a [u32]>) -> Self {
+        match self {
+            Method::GaussSeidel { .. } => Method::GaussSeidel { order },
+            Method::Sor { omega, .. } => Method::Sor { omega, order },
+            Method::Ssor { omega, .. } => Method::Ssor { omega, order },
+            Method::Lu
+            | Method::Cholesky
+            | Method::SecondCholesky
+            | Method::Ldlt
+            | Method::Jacobi { .. }
+            | Method::Thall
+            | Method::Pia
+            | Method::WPia { .. }
+            | Method::Chebyshev { .. }
+            | Method::Cg
+            | Method::PlainCg
+            | Method::PcgJacobi
+            | Method::PcgSsor { .. }
+            | Method::PcgIc0
+            | Method::Anderson { .. }
+            | Method::HeavyBall { .. } => self,
+        }
+    }
+
+    /// The same with another ω, where it is swept over ω: `jacobi`, `pia` (which becomes `w-pia`) and `sor`.
+    pub fn at_omega(self, omega: f64) -> Option<Self> {
+        match self {
+            Method::Jacobi { .. } | Method::Thall => Some(Method::Jacobi { omega: Some(omega) }),
+            Method::Pia | Method::WPia { .. } => Some(Method::WPia { omega: Some(omega) }),
+            Method::GaussSeidel { order } | Method::Sor { order, .. } => Some(Method::Sor { omega, order }),
+            Method::Lu
+            | Method::Cholesky
+            | Method::SecondCholesky
+            | Method::Ldlt
+            | Method::Ssor { .. }
+            | Method::Chebyshev { .. }
+            | Method::Cg
+            | Method::PlainCg
+            | Method::PcgJacobi
+            | Method::PcgSsor { .. }
+            | Method::PcgIc0
+            | Method::Anderson { .. }
+            | Method::HeavyBall { .. } => None,
+        }
     }
 }
 
-impl fmt::Display for Method {
+impl fmt::Display for Method<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
     }
 }
 
-impl FromStr for Method {
+impl FromStr for Method<'static> {
     type Err = Error;
 
     fn from_str(s: &str) -> Result<Self, Error> {
@@ -129,61 +216,6 @@ impl FromStr for Method {
             Error::Unknown(format!("unknown method \"{s}\"; the methods are {names}"))
         })
     }
-}
-
-/// A method with the numbers that it needs. The parameters come from bounds or estimates of the spectrum, which
-/// this room does not make.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Setup<'a> {
-    Lu,
-    Cholesky,
-    /// M = LLᵀ by the second, independent library.
-    SecondCholesky,
-    Ldlt,
-    Jacobi {
-        omega: f64,
-    },
-    Sor {
-        omega: f64,
-        order: Option<&'a [u32]>,
-    },
-    Ssor {
-        omega: f64,
-        order: Option<&'a [u32]>,
-    },
-    Pia {
-        omega: f64,
-    },
-    /// PIA accelerated with the last `window` differences.
-    AndersonPia {
-        omega: f64,
-        window: usize,
-    },
-    /// Jacobi accelerated, or Thall's masks.
-    AndersonJacobi {
-        omega: f64,
-        window: usize,
-    },
-    HeavyBall {
-        spectrum: (f64, f64),
-    },
-    Chebyshev {
-        spectrum: (f64, f64),
-    },
-    /// Preconditioned by H.
-    Cg,
-    /// Not preconditioned: CG on M as it is.
-    PlainCg,
-    PcgJacobi,
-    PcgSsor {
-        omega: f64,
-    },
-    PcgIc0,
-}
-
-impl Setup<'_> {
-    /// Thall's iteration.
-    pub const THALL: Setup<'static> = Setup::Jacobi { omega: THALL_OMEGA };
 }
 
 /// Control points, how they came about, and what it cost.
@@ -210,12 +242,12 @@ pub struct Solution {
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Surface, builtin};
-/// use limitlab::solvers::{Outcome, Setup, Stop, run};
+/// use limitlab::solvers::{Outcome, Method, Stop, run};
 ///
 /// let surface = Surface::new(builtin::builtin("octahedron")?)?;
 /// let system = LimitSystem::new(&surface, Scheme::Loop)?;
 /// let stop = Stop { tolerance: 1e-9, max_iterations: 1000 };
-/// let solution = run(&system, surface.positions(), Setup::Pia { omega: 1.0 }, &stop);
+/// let solution = run(&system, surface.positions(), Method::Pia, &stop);
 /// assert_eq!(solution.report.outcome, Outcome::Converged);
 /// // By symmetry the control mesh is a larger octahedron: opposite corners excite the eigenvalue 2β₄ − 1… only.
 /// let v = solution.points[0];
@@ -223,8 +255,8 @@ pub struct Solution {
 /// assert!(v.length() > surface.positions()[0].length());
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn run<S: System>(system: &S, points: &[DVec3], setup: Setup, stop: &Stop) -> Solution {
-    run_watched(system, points, setup, stop, &mut |_| ControlFlow::Continue(()))
+pub fn run<S: System>(system: &S, points: &[DVec3], method: Method, stop: &Stop) -> Solution {
+    run_watched(system, points, method, stop, &mut |_| ControlFlow::Continue(()))
 }
 
 /// As [`run`], with a watch that sees every iterate.
@@ -234,11 +266,11 @@ pub fn run<S: System>(system: &S, points: &[DVec3], setup: Setup, stop: &Stop) -
 pub fn run_watched<S: System>(
     system: &S,
     points: &[DVec3],
-    setup: Setup,
+    method: Method,
     stop: &Stop,
     watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
 ) -> Solution {
-    run_from(system, points, points, setup, stop, watch)
+    run_from(system, points, points, method, stop, watch)
 }
 
 /// As [`run_watched`], from V = `start` instead of V = P: that of a mesh that has moved a little, or of a solution to be
@@ -253,17 +285,17 @@ pub fn run_watched<S: System>(
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::mesh::{Surface, builtin};
 /// use limitlab::schemes::Scheme;
-/// use limitlab::solvers::{Setup, Step, Stop, run, run_from};
+/// use limitlab::solvers::{Method, Step, Stop, run, run_from};
 ///
 /// let surface = Surface::new(builtin::builtin("icosphere:2")?)?;
 /// let system = LimitSystem::new(&surface, Scheme::Loop)?;
 /// // A rough solution, then on from there: the iterations of one run.
-/// let (setup, points) = (Setup::Pia { omega: 1.0 }, surface.positions());
+/// let (method, points) = (Method::Pia, surface.positions());
 /// let stop = |tolerance| Stop { tolerance, max_iterations: 1000 };
-/// let rough = run(&system, points, setup, &stop(1e-3));
+/// let rough = run(&system, points, method, &stop(1e-3));
 /// let watch = &mut |_: &Step<'_>| ControlFlow::Continue(());
-/// let fine = run_from(&system, points, &rough.points, setup, &stop(1e-9), watch);
-/// let whole = run(&system, points, setup, &stop(1e-9));
+/// let fine = run_from(&system, points, &rough.points, method, &stop(1e-9), watch);
+/// let whole = run(&system, points, method, &stop(1e-9));
 /// assert_eq!(rough.report.iterations + fine.report.iterations, whole.report.iterations);
 /// assert_eq!(fine.points, whole.points);
 /// # Ok::<(), limitlab::Error>(())
@@ -272,7 +304,7 @@ pub fn run_from<S: System>(
     system: &S,
     points: &[DVec3],
     start: &[DVec3],
-    setup: Setup,
+    method: Method,
     stop: &Stop,
     watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
 ) -> Solution {
@@ -281,19 +313,19 @@ pub fn run_from<S: System>(
     let elsewhere = !std::ptr::eq(points, start);
     let size = if elsewhere { largest(points).max(largest(start)) } else { largest(points) };
     let begin = Instant::now();
-    let prepared = prepare(system, points, setup);
+    let prepared = prepare(system, points, method);
     let setup_seconds = begin.elapsed().as_secs_f64();
-    let (mut method, fill) = match prepared {
+    let (mut iterate, fill) = match prepared {
         Ok(prepared) => prepared,
         Err(failure) => return not_set_up(system, (points, start), failure, setup_seconds),
     };
     let begin = Instant::now();
     if elsewhere {
-        method.start_at(start);
+        iterate.start_at(start);
     }
-    let report = solve_in_scale(method.as_mut(), size, stop, watch);
+    let report = solve_in_scale(iterate.as_mut(), size, stop, watch);
     Solution {
-        points: method.points().to_vec(),
+        points: iterate.points().to_vec(),
         report,
         setup_seconds,
         solve_seconds: begin.elapsed().as_secs_f64(),
@@ -303,38 +335,55 @@ pub fn run_from<S: System>(
 
 type Prepared<'a> = (Box<dyn WarmStart + 'a>, Option<usize>);
 
-fn prepare<'a, S: System>(system: &'a S, points: &'a [DVec3], setup: Setup<'a>) -> Result<Prepared<'a>, Failure> {
-    let stored = || system.stored().ok_or_else(|| without_entries(setup));
-    let method: Box<dyn WarmStart + 'a> = match setup {
-        Setup::Lu => return direct(system, points, SparseLu::new(stored()?)?),
-        Setup::Cholesky => return direct(system, points, Cholesky::new(&stored()?.m, Kind::Llt)?),
-        Setup::Ldlt => return direct(system, points, Cholesky::new(&stored()?.m, Kind::Ldlt)?),
-        Setup::SecondCholesky => return direct(system, points, SecondOpinion::new(&stored()?.m)?),
-        Setup::Jacobi { omega } => Box::new(Jacobi::new(system, points, omega)),
-        Setup::Sor { omega, order } => Box::new(Sor::new(system, points, omega, order)),
-        Setup::Ssor { omega, order } => Box::new(Ssor::new(system, points, omega, order)),
-        Setup::Pia { omega } => Box::new(Pia::new(system, points, omega)),
-        Setup::AndersonPia { omega, window } => Box::new(Anderson::of_pia(system, points, omega, window)),
-        Setup::AndersonJacobi { omega, window } => Box::new(Anderson::of_jacobi(system, points, omega, window)),
-        Setup::HeavyBall { spectrum } => Box::new(HeavyBall::new(system, points, spectrum)),
-        Setup::Chebyshev { spectrum } => Box::new(Chebyshev::new(system, points, spectrum)),
-        Setup::Cg => cg(system, points, Preconditioner::weights(system)),
-        Setup::PlainCg => cg(system, points, Preconditioner::identity(system)),
-        Setup::PcgJacobi => cg(system, points, Preconditioner::jacobi(system)),
-        Setup::PcgSsor { omega } => cg(system, points, Preconditioner::Ssor { omega }),
-        Setup::PcgIc0 => {
+fn prepare<'a, S: System>(system: &'a S, points: &'a [DVec3], method: Method<'a>) -> Result<Prepared<'a>, Failure> {
+    let stored = || system.stored().ok_or_else(|| without_entries(method));
+    let bounds = system.bounds();
+    let jacobi_omega = |omega: Option<f64>| {
+        omega.unwrap_or_else(|| 2.0 / (bounds.jacobi_lambda_min.max(0.0) + bounds.jacobi_lambda_max))
+    };
+    let pia_omega =
+        |omega: Option<f64>| omega.unwrap_or_else(|| 2.0 / (bounds.lambda_min.max(0.0) + bounds.lambda_max));
+    let proven = |interval: Option<(f64, f64)>| {
+        interval.unwrap_or_else(|| (bounds.lambda_min.max(LOWEST * bounds.lambda_max), bounds.lambda_max))
+    };
+    let iterate: Box<dyn WarmStart + 'a> = match method {
+        Method::Lu => return direct(system, points, SparseLu::new(stored()?)?),
+        Method::Cholesky => return direct(system, points, Cholesky::new(&stored()?.m, Kind::Llt)?),
+        Method::Ldlt => return direct(system, points, Cholesky::new(&stored()?.m, Kind::Ldlt)?),
+        Method::SecondCholesky => return direct(system, points, SecondOpinion::new(&stored()?.m)?),
+        Method::Jacobi { omega } => Box::new(Jacobi::new(system, points, jacobi_omega(omega))),
+        Method::Thall => Box::new(Jacobi::new(system, points, THALL_OMEGA)),
+        Method::GaussSeidel { order } => Box::new(Sor::new(system, points, 1.0, order)),
+        Method::Sor { omega, order } => Box::new(Sor::new(system, points, omega, order)),
+        Method::Ssor { omega, order } => Box::new(Ssor::new(system, points, omega, order)),
+        Method::Pia => Box::new(Pia::new(system, points, 1.0)),
+        Method::WPia { omega } => Box::new(Pia::new(system, points, pia_omega(omega))),
+        Method::Anderson { of: Accelerated::Pia { omega }, window } => {
+            let omega = omega.unwrap_or(1.0 / bounds.lambda_max);
+            Box::new(Anderson::of_pia(system, points, omega, window))
+        }
+        Method::Anderson { of: Accelerated::Jacobi { omega }, window } => {
+            Box::new(Anderson::of_jacobi(system, points, jacobi_omega(omega), window))
+        }
+        Method::HeavyBall { interval } => Box::new(HeavyBall::new(system, points, proven(interval))),
+        Method::Chebyshev { interval } => Box::new(Chebyshev::new(system, points, proven(interval))),
+        Method::Cg => cg(system, points, Preconditioner::weights(system)),
+        Method::PlainCg => cg(system, points, Preconditioner::identity(system)),
+        Method::PcgJacobi => cg(system, points, Preconditioner::jacobi(system)),
+        Method::PcgSsor { omega } => cg(system, points, Preconditioner::Ssor { omega }),
+        Method::PcgIc0 => {
             let factor = IncompleteCholesky::new(&stored()?.m)?;
             cg(system, points, Preconditioner::IncompleteCholesky(factor))
         }
     };
-    Ok((method, None))
+    Ok((iterate, None))
 }
 
 /// A factorization is asked of a system without stored matrices.
-fn without_entries(setup: Setup) -> Failure {
+fn without_entries(method: Method) -> Failure {
     Failure {
         outcome: Outcome::Breakdown,
-        detail: format!("{setup:?} factors the matrix, and this system does not store it: assemble a LimitSystem"),
+        detail: format!("{method} factors the matrix, and this system does not store it: assemble a LimitSystem"),
     }
 }
 
@@ -348,8 +397,8 @@ fn direct<'a, S: System, F: Factorization + 'a>(
     factorization: F,
 ) -> Result<Prepared<'a>, Failure> {
     let fill = factorization.fill();
-    let method = Direct::new(system, points, factorization)?;
-    Ok((Box::new(method), fill))
+    let iterate = Direct::new(system, points, factorization)?;
+    Ok((Box::new(iterate), fill))
 }
 
 fn not_set_up<S: System>(

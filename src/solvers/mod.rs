@@ -20,5 +20,5 @@ pub mod system;
 pub mod wavefront;
 
 pub use iteration::{Errors, Failure, Iterate, Outcome, Report, Step, Stop, WarmStart, solve};
-pub use method::{Method, Setup, Solution, run, run_from, run_watched};
+pub use method::{Accelerated, Method, Solution, run, run_from, run_watched};
 pub use system::System;

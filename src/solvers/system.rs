@@ -5,6 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::iteration::Errors;
+use crate::assemble::bounds::SpectralBounds;
 use crate::assemble::stencil::Point;
 use crate::assemble::{LimitSystem, Operator};
 use crate::parallel;
@@ -24,8 +25,13 @@ pub trait System: Sync {
     /// The diagonal of A.
     fn diagonal(&self) -> &[f64];
 
+    /// What is proven about the spectra of A and D⁻¹A.
+    fn bounds(&self) -> SpectralBounds;
+
     /// An upper bound of the eigenvalues of A, which tells its scale: 1 for a scheme's matrix, whose rows sum to 1.
-    fn lambda_max(&self) -> f64;
+    fn lambda_max(&self) -> f64 {
+        self.bounds().lambda_max
+    }
 
     /// The stored matrices, where there are any: what factorizations need.
     fn stored(&self) -> Option<&LimitSystem> {
@@ -62,8 +68,8 @@ impl System for LimitSystem {
         &self.diagonal
     }
 
-    fn lambda_max(&self) -> f64 {
-        self.bounds.lambda_max
+    fn bounds(&self) -> SpectralBounds {
+        self.bounds
     }
 
     fn stored(&self) -> Option<&LimitSystem> {
@@ -89,8 +95,8 @@ impl System for Operator {
         Operator::diagonal(self)
     }
 
-    fn lambda_max(&self) -> f64 {
-        self.bounds().lambda_max
+    fn bounds(&self) -> SpectralBounds {
+        Operator::bounds(self)
     }
 
     #[inline]

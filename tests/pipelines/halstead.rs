@@ -6,7 +6,7 @@ use limitlab::interpolate::halstead::{Fairness, LEVELS, Weights, fit, follow};
 use limitlab::interpolate::zheng_cai::Constraints;
 use limitlab::mesh::{Surface, builtin};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
-use limitlab::solvers::{Outcome, Setup, Stop, run};
+use limitlab::solvers::{Method, Outcome, Stop, run};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -138,7 +138,7 @@ fn the_fit_is_the_fairest() {
             assert!(slope.abs() < SOLVED * scale, "{name} {slope:e} {scale:e}");
         }
         let system = LimitSystem::new(&surface, Scheme::CatmullClark).unwrap();
-        let solution = run(&system, surface.positions(), Setup::Lu, &Stop { tolerance: 1e-12, max_iterations: 10 });
+        let solution = run(&system, surface.positions(), Method::Lu, &Stop { tolerance: 1e-12, max_iterations: 10 });
         if solution.report.outcome == Outcome::Converged {
             let control = surface.with_positions(solution.points);
             let other = fairness.energies_of(&control).unwrap();
@@ -247,7 +247,7 @@ fn every_iterate_is_measured_and_the_last_is_the_control_mesh() {
     let fairness = Fairness::new(&surface).unwrap();
     let normals: Vec<DVec3> = surface.positions().iter().map(|p| p.normalize()).collect();
     let stop = Stop { tolerance: 1e-8, max_iterations: 2000 };
-    let (rows, solution) = follow(&surface, &system, &fairness, &normals, Setup::Pia { omega: 1.0 }, &stop).unwrap();
+    let (rows, solution) = follow(&surface, &system, &fairness, &normals, Method::Pia, &stop).unwrap();
     assert_eq!(solution.report.outcome, Outcome::Converged);
     assert_eq!(rows.len(), solution.report.iterations + 1);
     let errors: Vec<_> = rows.iter().map(|r| r.errors).collect();

@@ -10,7 +10,7 @@ use limitlab::interpolate::thall::*;
 use limitlab::mesh::{Faces, Mesh, Surface, builtin};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
 use limitlab::solvers::iteration::Iterate;
-use limitlab::solvers::{Outcome, Setup, Stop, run, run_watched, solve};
+use limitlab::solvers::{Method, Outcome, Stop, run, run_watched, solve};
 
 use crate::common::pipelines::{ROUNDING, centroid, distance, noisy_surface};
 
@@ -34,7 +34,7 @@ fn local_masks_are_jacobi_with_one_half_iterate_by_iterate() {
         let system = LimitSystem::new(&surface, Scheme::CatmullClark).unwrap();
         let iterates = run_local(&surface, Inverse::Exact, 12);
         let stop = Stop { tolerance: 0.0, max_iterations: 12 };
-        run_watched(&system, surface.positions(), Setup::THALL, &stop, &mut |step| {
+        run_watched(&system, surface.positions(), Method::Thall, &stop, &mut |step| {
             let error = distance(step.points, &iterates[step.iteration]);
             assert!(error < ROUNDING, "{name} {}: {error:e}", step.iteration);
             ControlFlow::Continue(())
@@ -71,7 +71,7 @@ fn both_inverses_converge_to_the_direct_solution() {
     let surface = noisy_surface("irregular-poly:60");
     let system = LimitSystem::new(&surface, Scheme::CatmullClark).unwrap();
     let stop = Stop { tolerance: 1e-13, max_iterations: 5000 };
-    let exact = run(&system, surface.positions(), Setup::Lu, &stop).points;
+    let exact = run(&system, surface.positions(), Method::Lu, &stop).points;
     for inverse in [Inverse::Exact, Inverse::Regular] {
         let mut local = LocalIteration::new(&surface, inverse);
         let report = solve(&mut local, &stop, &mut |_| ControlFlow::Continue(()));
@@ -269,7 +269,7 @@ fn attributes_stay_creep_or_interpolate() {
     // The limit system is that of the points: solved for the values, their limits are the given ones.
     let system = LimitSystem::new(&surface, Scheme::CatmullClark).unwrap();
     let stop = Stop { tolerance: 1e-13, max_iterations: 10 };
-    let control = run(&system, &values, Setup::Lu, &stop).points;
+    let control = run(&system, &values, Method::Lu, &stop).points;
     let refined = Surface::new(Mesh::new(refine(control, AttributeRule::Scheme), fine.faces)).unwrap();
     let limits = catmull_clark::limit_positions(&refined).unwrap();
     assert!(distance(&limits[..surface.len()], &values) < 1e-10);

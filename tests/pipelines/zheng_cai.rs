@@ -10,7 +10,7 @@ use limitlab::interpolate::zheng_cai::*;
 use limitlab::mesh::{Mesh, Surface, builtin, io};
 use limitlab::schemes::Scheme;
 use limitlab::schemes::doo_sabin::{self, Rule};
-use limitlab::solvers::{Outcome, Setup, Stop, run, run_watched};
+use limitlab::solvers::{Method, Outcome, Stop, run, run_watched};
 
 use crate::common::pipelines::{ROUNDING, centroid, distance, noisy_surface};
 
@@ -29,14 +29,14 @@ fn both_sweeps_are_the_solvers_of_the_same_system() {
         let order: Vec<u32> = (0..surface.len() as u32).rev().collect();
         let file = Sweep::GaussSeidel(None);
         let reverse = Sweep::GaussSeidel(Some(&order));
-        for (sweep, setup) in [
-            (Sweep::Jacobi, Setup::Jacobi { omega: 1.0 }),
-            (file, Setup::Sor { omega: 1.0, order: None }),
-            (reverse, Setup::Sor { omega: 1.0, order: Some(&order) }),
+        for (sweep, method) in [
+            (Sweep::Jacobi, Method::Jacobi { omega: Some(1.0) }),
+            (file, Method::GaussSeidel { order: None }),
+            (reverse, Method::GaussSeidel { order: Some(&order) }),
         ] {
             let stop = Stop { tolerance: 0.0, max_iterations: 8 };
             let mut before = surface.positions().to_vec();
-            run_watched(&system, surface.positions(), setup, &stop, &mut |step| {
+            run_watched(&system, surface.positions(), method, &stop, &mut |step| {
                 let phase = PhaseOne { sweep, max_iterations: step.iteration, eps: 0.0 };
                 let found = auxiliary(&surface, None, &phase).unwrap();
                 assert!(distance(found.surface.positions(), step.points) < ROUNDING, "{name}");
@@ -266,7 +266,7 @@ fn nasri_s_faces_have_the_given_centroids() {
         let some = half(&surface);
         let stop = Stop { tolerance: 1e-13, max_iterations: 5000 };
         for marks in [None, Some(&some[..])] {
-            let solution = nasri::control_points(&surface, marks, Setup::Cholesky, &stop).unwrap();
+            let solution = nasri::control_points(&surface, marks, Method::Cholesky, &stop).unwrap();
             assert_eq!(solution.report.outcome, Outcome::Converged);
             let control = surface.with_positions(solution.points);
             let limits = doo_sabin::limit_positions(Rule::DooSabin, &control).unwrap();
@@ -291,17 +291,17 @@ fn a_subset_is_interpolated_by_every_scheme_and_method() {
         let order = part.order(&file);
         assert_eq!(order.len(), part.vertices.len());
         let mut first: Option<Vec<DVec3>> = None;
-        for setup in [
-            Setup::Lu,
-            Setup::Cholesky,
-            Setup::THALL,
-            Setup::Pia { omega: 1.0 },
-            Setup::Cg,
-            Setup::Sor { omega: 1.0, order: Some(&order) },
-            Setup::Chebyshev { spectrum: (full.bounds.lambda_min.max(0.02), 1.0) },
+        for method in [
+            Method::Lu,
+            Method::Cholesky,
+            Method::Thall,
+            Method::Pia,
+            Method::Cg,
+            Method::GaussSeidel { order: Some(&order) },
+            Method::Chebyshev { interval: Some((full.bounds.lambda_min.max(0.02), 1.0)) },
         ] {
-            let solution = part.solve(&full, surface.positions(), setup, &stop, &mut |_| ControlFlow::Continue(()));
-            assert_eq!(solution.report.outcome, Outcome::Converged, "{scheme} {setup:?}");
+            let solution = part.solve(&full, surface.positions(), method, &stop, &mut |_| ControlFlow::Continue(()));
+            assert_eq!(solution.report.outcome, Outcome::Converged, "{scheme} {method:?}");
             for (v, &marked) in some.iter().enumerate() {
                 let value = if marked { full.a.row_times(v, &solution.points) } else { solution.points[v] };
                 assert!(value.distance(surface.positions()[v]) < 1e-11);
@@ -316,7 +316,7 @@ fn a_subset_is_interpolated_by_every_scheme_and_method() {
     let full = LimitSystem::new(&surface, Scheme::Loop).unwrap();
     let part = Restriction::new(&full, &vec![true; surface.len()]).unwrap();
     assert_eq!(part.system.a, full.a);
-    let pia = Setup::Pia { omega: 1.0 };
+    let pia = Method::Pia;
     let ahead = part.solve(&full, surface.positions(), pia, &Stop { tolerance: 0.0, max_iterations: 4 }, &mut |_| {
         ControlFlow::Continue(())
     });

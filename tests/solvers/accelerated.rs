@@ -5,10 +5,10 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 use limitlab::assemble::LimitSystem;
 use limitlab::schemes::Scheme;
-use limitlab::solvers::{Outcome, Setup, Stop, run_watched};
+use limitlab::solvers::{Accelerated, Method, Outcome, Stop, run_watched};
 use nalgebra::{DMatrix, DVector};
 
-use super::setups::checked;
+use super::methods::checked;
 use crate::common::meshes::*;
 
 /// The three coordinates one after the other.
@@ -102,23 +102,27 @@ impl Relaxation {
     }
 }
 
-fn iterates(system: &LimitSystem, points: &[DVec3], setup: Setup, count: usize) -> Vec<DVector<f64>> {
+fn iterates(system: &LimitSystem, points: &[DVec3], method: Method, count: usize) -> Vec<DVector<f64>> {
     let mut seen = Vec::new();
     let stop = Stop { tolerance: 0.0, max_iterations: count };
-    run_watched(system, points, setup, &stop, &mut |step| {
+    run_watched(system, points, method, &stop, &mut |step| {
         seen.push(stacked(step.points));
         ControlFlow::Continue(())
     });
     seen
 }
 
-/// Setups with their relaxation.
-fn cases(system: &LimitSystem, points: &[DVec3], window: usize) -> [(&'static str, Setup<'static>, Relaxation); 3] {
+/// Methods with their relaxation.
+fn cases(system: &LimitSystem, points: &[DVec3], window: usize) -> [(&'static str, Method<'static>, Relaxation); 3] {
     let of_jacobi = |omega: f64| Relaxation::new(system, points, |i| omega / system.diagonal[i]);
     [
-        ("pia", Setup::AndersonPia { omega: 1.0, window }, Relaxation::new(system, points, |_| 1.0)),
-        ("thall", Setup::AndersonJacobi { omega: 0.5, window }, of_jacobi(0.5)),
-        ("jacobi", Setup::AndersonJacobi { omega: 0.8, window }, of_jacobi(0.8)),
+        (
+            "pia",
+            Method::Anderson { of: Accelerated::Pia { omega: Some(1.0) }, window },
+            Relaxation::new(system, points, |_| 1.0),
+        ),
+        ("thall", Method::Anderson { of: Accelerated::Jacobi { omega: Some(0.5) }, window }, of_jacobi(0.5)),
+        ("jacobi", Method::Anderson { of: Accelerated::Jacobi { omega: Some(0.8) }, window }, of_jacobi(0.8)),
     ]
 }
 
@@ -134,9 +138,9 @@ fn anderson_is_the_textbook_s() {
         let mesh = noisy(name);
         let system = system(&mesh, scheme);
         for window in [1, 2, 5, 16] {
-            for (what, setup, relaxation) in cases(&system, &mesh.positions, window) {
+            for (what, method, relaxation) in cases(&system, &mesh.positions, window) {
                 let expected = relaxation.anderson(window, 10);
-                let found = iterates(&system, &mesh.positions, setup, 10);
+                let found = iterates(&system, &mesh.positions, method, 10);
                 for (k, (found, expected)) in found.iter().zip(&expected).enumerate() {
                     // Normal equations hold half the digits of the differences, which are as small as the updates.
                     let allowed = 1e-7 * relaxation.update(&relaxation.p).amax();
@@ -156,8 +160,8 @@ fn anderson_is_never_better_than_gmres_for_as_many_products() {
         let mesh = noisy(name);
         let system = system(&mesh, scheme);
         for window in [1, 3, 16] {
-            for (what, setup, relaxation) in cases(&system, &mesh.positions, window) {
-                let found = iterates(&system, &mesh.positions, setup, 12);
+            for (what, method, relaxation) in cases(&system, &mesh.positions, window) {
+                let found = iterates(&system, &mesh.positions, method, 12);
                 for (k, v) in found.iter().enumerate() {
                     let least = relaxation.norm(&relaxation.update(&relaxation.gmres(k)));
                     let reached = relaxation.norm(&relaxation.update(v));
@@ -189,8 +193,8 @@ fn the_heavy_ball_is_its_recurrence_and_keeps_its_rate() {
         let beta = ((high.sqrt() - low.sqrt()) / (high.sqrt() + low.sqrt())).powi(2);
         let alpha = 4.0 / (high.sqrt() + low.sqrt()).powi(2);
         let relaxation = Relaxation::new(&system, &mesh.positions, |_| alpha);
-        let setup = Setup::HeavyBall { spectrum: (low, high) };
-        let found = iterates(&system, &mesh.positions, setup, 40);
+        let method = Method::HeavyBall { interval: Some((low, high)) };
+        let found = iterates(&system, &mesh.positions, method, 40);
         let (mut v, mut before) = (relaxation.p.clone(), relaxation.p.clone());
         let start = relaxation.norm(&relaxation.update(&v));
         for (k, found) in found.iter().enumerate() {
@@ -212,13 +216,13 @@ fn a_short_window_saves_half_of_the_iterations() {
     let mesh = noisy("irregular-tri:500");
     let system = system(&mesh, Scheme::Loop);
     let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 1000 };
-    let count = |setup| {
-        let report = checked(&system, &mesh.positions, setup, &stop).report;
+    let count = |method| {
+        let report = checked(&system, &mesh.positions, method, &stop).report;
         assert_eq!(report.outcome, Outcome::Converged);
         report.iterations
     };
-    let pia = count(Setup::Pia { omega: 1.0 });
-    let accelerated = count(Setup::AndersonPia { omega: 1.0, window: 5 });
+    let pia = count(Method::Pia);
+    let accelerated = count(Method::Anderson { of: Accelerated::Pia { omega: Some(1.0) }, window: 5 });
     assert!(2 * accelerated < pia, "{accelerated} of {pia}");
-    assert!(accelerated >= count(Setup::Cg) - 2);
+    assert!(accelerated >= count(Method::Cg) - 2);
 }

@@ -3,14 +3,14 @@
 use limitlab::assemble::{LimitSystem, Operator};
 use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::Scheme;
-use limitlab::solvers::{Outcome, Setup, Stop, run};
+use limitlab::solvers::{Method, Outcome, Stop, run};
 
-use super::setups::*;
+use super::methods::*;
 use crate::common::meshes::*;
 
 /// The methods that need the entries of the matrix.
-fn factors(setup: Setup) -> bool {
-    DIRECT.iter().any(|d| d.1 == setup) || setup == Setup::PcgIc0
+fn factors(method: Method) -> bool {
+    DIRECT.iter().any(|d| d.1 == method) || method == Method::PcgIc0
 }
 
 /// Meshes whose rows are of every kind: triangles, quads, polygons, mixed.
@@ -30,11 +30,11 @@ fn hold(scheme: Scheme, mesh: &Mesh, explicit: &LimitSystem, free: &Operator) {
     let points = &mesh.positions;
     let stop = Stop { tolerance: 1e-9 * mesh.diagonal(), max_iterations: 20_000 };
     let order = reversed(mesh.len());
-    for (method, setup) in all(explicit, &order) {
-        let what = format!("{method}, {scheme}, {} vertices", mesh.len());
-        let stored = run(explicit, points, setup, &stop);
-        let found = run(free, points, setup, &stop);
-        if factors(setup) {
+    for (name, method) in all(explicit, &order) {
+        let what = format!("{name}, {scheme}, {} vertices", mesh.len());
+        let stored = run(explicit, points, method, &stop);
+        let found = run(free, points, method, &stop);
+        if factors(method) {
             assert_eq!((found.report.outcome, found.report.iterations), (Outcome::Breakdown, 0), "{what}");
             assert!(found.report.detail.is_some_and(|d| d.contains("does not store")), "{what}");
             assert_eq!(&found.points, points);
@@ -44,7 +44,7 @@ fn hold(scheme: Scheme, mesh: &Mesh, explicit: &LimitSystem, free: &Operator) {
         assert_eq!(stored.outcome, Outcome::Converged, "{what}");
         assert_eq!(found.outcome, stored.outcome, "{what}");
         // Anderson's coefficients are quotients of differences, which grow the last digits' differences.
-        let accelerated = matches!(setup, Setup::AndersonPia { .. } | Setup::AndersonJacobi { .. });
+        let accelerated = matches!(method, Method::Anderson { .. });
         let allowed = 1 + if accelerated { stored.iterations / 10 } else { 0 };
         let counts = (stored.iterations, found.iterations);
         assert!(counts.0.abs_diff(counts.1) <= allowed, "{what}: {counts:?}");

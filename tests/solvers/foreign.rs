@@ -12,13 +12,13 @@ use limitlab::analysis::sweep::{rounding_floor, sweep};
 use limitlab::assemble::{Csr, LimitSystem};
 use limitlab::solvers::jacobi::Jacobi;
 use limitlab::solvers::pia::Pia;
-use limitlab::solvers::{Errors, Failure, Iterate, Method, Outcome, Setup, Stop, run};
+use limitlab::solvers::{Accelerated, Errors, Failure, Iterate, Method, Outcome, Stop, run};
 use nalgebra::DMatrix;
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::setups::{checked, residual};
+use super::methods::{checked, residual};
 use crate::common::meshes::random_points;
 use crate::common::tol;
 
@@ -211,23 +211,27 @@ fn every_method_solves_what_is_positive_definite_or_says_why_not() {
         let stop = Stop { tolerance: 1e-9, max_iterations: 100_000 };
         for entry in all_entries(&system, &spectrum) {
             let what = format!("{name}, {} {}", entry.method, entry.parameter);
-            let report = checked(&system, &points, entry.setup, &stop);
+            let report = checked(&system, &points, entry.method, &stop);
             let outcome = report.report.outcome;
             let rate = |all: &[f64], omega: f64| (1.0 - omega * all[0]).abs().max((1.0 - omega * all[n - 1]).abs());
-            let rate = match entry.setup {
-                Setup::Pia { omega } => rate(&a, omega),
-                Setup::Jacobi { omega } => rate(&jacobi, omega),
+            let rate = match entry.method {
+                Method::WPia { omega: Some(omega) } => rate(&a, omega),
+                Method::Jacobi { omega: Some(omega) } => rate(&jacobi, omega),
                 // A short window need not help what stands still without it.
-                Setup::AndersonPia { omega, .. } => rate(&a, omega).min(1.0),
-                Setup::AndersonJacobi { omega, .. } => rate(&jacobi, omega).min(1.0),
+                Method::Anderson { of: Accelerated::Pia { omega: Some(omega) }, .. } => rate(&a, omega).min(1.0),
+                Method::Anderson { of: Accelerated::Jacobi { omega: Some(omega) }, .. } => {
+                    rate(&jacobi, omega).min(1.0)
+                }
+                Method::Pia => rate(&a, 1.0),
+                Method::Thall => rate(&jacobi, 0.5),
                 _ => 0.0,
             };
-            match entry.setup {
+            match entry.method {
                 _ if rate > 1.001 => assert_eq!(outcome, Outcome::Diverged, "{what}"),
                 // So slow that it may be taken for a standstill.
                 _ if rate > 0.999 => {}
                 // An incomplete factorization need not exist.
-                Setup::PcgIc0 if outcome == Outcome::Breakdown => {}
+                Method::PcgIc0 if outcome == Outcome::Breakdown => {}
                 _ => {
                     assert_eq!(outcome, Outcome::Converged, "{what}: {:?}", report.report.detail);
                     let error =
@@ -254,17 +258,21 @@ fn rates_are_predicted_where_rows_do_not_sum_to_1() {
         let Named::Ours(method) = row.method else { panic!("{what}") };
         match method {
             Method::Pia => assert!(row.predicted_rate.unwrap() > 70.0, "{what}"),
-            Method::Jacobi | Method::WPia | Method::GaussSeidel | Method::Thall | Method::Ssor => {
+            Method::Jacobi { .. }
+            | Method::WPia { .. }
+            | Method::GaussSeidel { .. }
+            | Method::Thall
+            | Method::Ssor { .. } => {
                 assert!((row.predicted_rate.unwrap() - row.observed_rate.unwrap()).abs() < tol::RATE, "{what}");
             }
-            Method::Chebyshev => {
+            Method::Chebyshev { .. } => {
                 assert!((row.predicted_rate.unwrap() - row.observed_rate.unwrap()).abs() < 0.05, "{what}");
             }
             _ => {}
         }
     }
     // ω sweeps too: the thresholds are those of this matrix.
-    let grids = vec![(Method::Pia, vec![0.01, 0.02, 0.03]), (Method::Jacobi, vec![0.5, 1.5])];
+    let grids = vec![(Method::Pia, vec![0.01, 0.02, 0.03]), (Method::Jacobi { omega: None }, vec![0.5, 1.5])];
     let found = sweep(&system, &points, &grids, None, &stop, rounding_floor(2.0), &|_| ()).unwrap();
     for row in &found.rows {
         let converges = row.predicted_rho < 1.0;
@@ -283,19 +291,23 @@ fn what_is_not_positive_definite_ends_as_an_outcome() {
         let lines = all_entries(&system, &spectrum);
         let stop = Stop { tolerance: 1e-9, max_iterations: 3000 };
         for entry in &lines {
-            let solution = checked(&system, &points, entry.setup, &stop);
+            let solution = checked(&system, &points, entry.method, &stop);
             let what = format!("{name}, {}", entry.method);
             if solution.report.outcome == Outcome::Converged {
                 assert!(residual(&system, &points, &solution.points) <= stop.tolerance, "{what}");
                 // Only what needs no definite matrix, or does not notice.
-                let any = [Method::Lu, Method::Ldlt, Method::Anderson].contains(&entry.method)
-                    || matches!(entry.setup, Setup::Cg | Setup::PlainCg);
-                assert!(
-                    any || entry.setup == Setup::PcgJacobi
-                        || entry.method == Method::PcgSsor
-                        || entry.method == Method::PcgIc0,
-                    "{what}"
+                let any = matches!(
+                    entry.method,
+                    Method::Lu
+                        | Method::Ldlt
+                        | Method::Anderson { .. }
+                        | Method::Cg
+                        | Method::PlainCg
+                        | Method::PcgJacobi
+                        | Method::PcgSsor { .. }
+                        | Method::PcgIc0
                 );
+                assert!(any, "{what}");
             }
         }
         compare(&system, &spectrum, &points, &lines, &[], &stop, &mut || ()).unwrap();
@@ -310,9 +322,9 @@ fn nearly_singular_is_told_in_the_scale_of_the_matrix() {
             let m = DMatrix::from_row_slice(2, 2, &[1.0, 1.0 - gap, 1.0 - gap, 1.0]) * scale;
             let system = LimitSystem::from_parts(vec![1.0; 2], csr(&m)).unwrap();
             let stop = Stop { tolerance: 1e-8, max_iterations: 50 };
-            for setup in [Setup::Lu, Setup::Cholesky, Setup::Ldlt, Setup::SecondCholesky] {
-                let found = checked(&system, &[DVec3::X, DVec3::Y], setup, &stop);
-                assert_eq!(found.report.outcome, outcome, "{setup:?} {scale:e} {gap:e}: {:?}", found.report.detail);
+            for method in [Method::Lu, Method::Cholesky, Method::Ldlt, Method::SecondCholesky] {
+                let found = checked(&system, &[DVec3::X, DVec3::Y], method, &stop);
+                assert_eq!(found.report.outcome, outcome, "{method:?} {scale:e} {gap:e}: {:?}", found.report.detail);
             }
         }
     }
@@ -420,7 +432,7 @@ fn methods_of_one_s_own_are_run_as_ours_and_not_believed() {
             },
         },
     ];
-    let lines = entries(&system, &spectrum, &[Method::Jacobi], None, "file").unwrap();
+    let lines = entries(&system, &spectrum, &[Method::Jacobi { omega: None }], None, "file").unwrap();
     let mut done = 0;
     let rows = compare(&system, &spectrum, &points, &lines, &mine, &stop, &mut || done += 1).unwrap();
     assert_eq!((done, rows.len()), (5, 5));
@@ -428,7 +440,10 @@ fn methods_of_one_s_own_are_run_as_ours_and_not_believed() {
     assert_eq!((&ours.report, &ours.points), (&same.report, &same.points));
     assert_eq!(rows[0].observed_rate, rows[1].observed_rate);
     assert_eq!((rows[1].method.name(), rows[1].parameter.as_str(), rows[1].predicted_rate), ("mine", "mine", None));
-    assert_eq!(ours.report.iterations, run(&system, &points, Setup::Jacobi { omega }, &stop).report.iterations);
+    assert_eq!(
+        ours.report.iterations,
+        run(&system, &points, Method::Jacobi { omega: Some(omega) }, &stop).report.iterations
+    );
     let report = &rows[2].solution.report;
     assert_eq!((report.outcome, report.iterations, report.detail.as_deref()), (Outcome::Singular, 0, Some("no")));
     assert_eq!(report.last().max, residual(&system, &points, &points));

@@ -8,10 +8,10 @@ use limitlab::mesh::Mesh;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::chebyshev::promised_iterations;
 use limitlab::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
-use limitlab::solvers::{Errors, Iterate, Outcome, Report, Setup, Stop, run_watched};
+use limitlab::solvers::{Errors, Iterate, Method, Outcome, Report, Stop, run_watched};
 use nalgebra::DMatrix;
 
-use super::setups::reversed;
+use super::methods::reversed;
 use crate::common::formulas::{Plain, assemble};
 use crate::common::meshes::*;
 use crate::common::tol;
@@ -185,9 +185,9 @@ impl Dense {
 }
 
 /// The iterates of the library.
-fn watched(system: &LimitSystem, points: &[DVec3], setup: Setup, stop: &Stop) -> (Vec<Points>, Report) {
+fn watched(system: &LimitSystem, points: &[DVec3], method: Method, stop: &Stop) -> (Vec<Points>, Report) {
     let mut seen = Vec::new();
-    let solution = run_watched(system, points, setup, stop, &mut |step| {
+    let solution = run_watched(system, points, method, stop, &mut |step| {
         assert_eq!(step.iteration, seen.len());
         seen.push(rows(step.points));
         ControlFlow::Continue(())
@@ -219,9 +219,9 @@ struct Case<'a> {
 
 impl Case<'_> {
     /// Equal counts, equal iterates, equal histories.
-    fn hold(&self, name: &str, setup: Setup, expected: &[Points], allowed: impl Fn(usize, f64) -> f64) {
+    fn hold(&self, name: &str, method: Method, expected: &[Points], allowed: impl Fn(usize, f64) -> f64) {
         let stop = Stop { tolerance: self.dense.tolerance, max_iterations: 6000 };
-        let (seen, report) = watched(self.system, &self.mesh.positions, setup, &stop);
+        let (seen, report) = watched(self.system, &self.mesh.positions, method, &stop);
         let what = format!("{name}, {}, {} vertices", self.scheme, self.mesh.len());
         assert_eq!(report.outcome, Outcome::Converged, "{what}");
         assert_eq!(report.iterations + 1, expected.len(), "{what}: counts");
@@ -253,11 +253,11 @@ fn for_each_case(tolerance: f64, mut visit: impl FnMut(&Case)) {
 fn relaxations_are_their_splittings() {
     for_each_case(1e-7, |case| {
         let Case { dense, .. } = case;
-        case.hold("thall", Setup::THALL, &dense.jacobi(0.5), tol::iterates);
-        case.hold("jacobi", Setup::Jacobi { omega: 0.4 }, &dense.jacobi(0.4), tol::iterates);
+        case.hold("thall", Method::Thall, &dense.jacobi(0.5), tol::iterates);
+        case.hold("jacobi", Method::Jacobi { omega: Some(0.4) }, &dense.jacobi(0.4), tol::iterates);
         for (name, omega) in [("pia", 1.0), ("w-pia", 1.3)] {
             let expected = dense.iterate(|v, e| v + omega * e);
-            case.hold(name, Setup::Pia { omega }, &expected, tol::iterates);
+            case.hold(name, Method::WPia { omega: Some(omega) }, &expected, tol::iterates);
         }
     });
 }
@@ -268,12 +268,12 @@ fn sweeps_are_triangular_solves() {
         let Case { dense, mesh, .. } = case;
         let order = reversed(mesh.len());
         for omega in [1.0, 0.7, 1.2] {
-            let forward = Setup::Sor { omega, order: None };
+            let forward = Method::Sor { omega, order: None };
             case.hold("sor", forward, &dense.sor(omega, true), tol::iterates);
             // The reversed order is the splitting by the other triangle.
-            let backward = Setup::Sor { omega, order: Some(&order) };
+            let backward = Method::Sor { omega, order: Some(&order) };
             case.hold("sor reversed", backward, &dense.sor(omega, false), tol::iterates);
-            let both = Setup::Ssor { omega, order: None };
+            let both = Method::Ssor { omega, order: None };
             case.hold("ssor", both, &dense.ssor(omega), tol::iterates);
         }
     });
@@ -288,14 +288,14 @@ fn chebyshev_is_the_textbook_s() {
             let expected = case.dense.chebyshev(spectrum);
             // The recurrence forgets no error of its two terms at once.
             let allowed = |k, scale| 8.0 * tol::iterates(k, scale);
-            case.hold("chebyshev", Setup::Chebyshev { spectrum }, &expected, allowed);
+            case.hold("chebyshev", Method::Chebyshev { interval: Some(spectrum) }, &expected, allowed);
         }
     });
 }
 
 /// Conjugate gradients amplify rounding while Ritz values converge (Paige 1980), by how much shows a second run by hand,
 /// on points that differ by rounding: two implementations may differ by a small multiple of that.
-fn hold_cg(case: &Case, name: &str, setup: Setup, loops: impl Fn(&Dense) -> Vec<Points>) {
+fn hold_cg(case: &Case, name: &str, method: Method, loops: impl Fn(&Dense) -> Vec<Points>) {
     const FACTOR: f64 = 100.0;
     let expected = loops(case.dense);
     let mut other = Dense::new(case.mesh, case.scheme, case.dense.tolerance);
@@ -307,7 +307,7 @@ fn hold_cg(case: &Case, name: &str, setup: Setup, loops: impl Fn(&Dense) -> Vec<
         spread[k] = spread[k].max(spread[k - 1]);
     }
     let last = spread.len() - 1;
-    case.hold(name, setup, &expected, |k, scale| tol::iterates(k, scale) + FACTOR * spread[k.min(last)]);
+    case.hold(name, method, &expected, |k, scale| tol::iterates(k, scale) + FACTOR * spread[k.min(last)]);
     // Not so much that the comparison would be idle.
     assert!(spread[last] < 1e-2 * case.dense.tolerance, "{name}: {:e}", spread[last]);
 }
@@ -315,17 +315,17 @@ fn hold_cg(case: &Case, name: &str, setup: Setup, loops: impl Fn(&Dense) -> Vec<
 #[test]
 fn conjugate_gradients_are_the_textbook_s() {
     for_each_case(1e-4, |case| {
-        hold_cg(case, "cg", Setup::Cg, |d| d.cg(|r| d.scaled_rows(r, |i| d.plain.h[i])));
-        hold_cg(case, "plain cg", Setup::PlainCg, |d| d.cg(Points::clone));
-        hold_cg(case, "pcg-jacobi", Setup::PcgJacobi, |d| {
+        hold_cg(case, "cg", Method::Cg, |d| d.cg(|r| d.scaled_rows(r, |i| d.plain.h[i])));
+        hold_cg(case, "plain cg", Method::PlainCg, |d| d.cg(Points::clone));
+        hold_cg(case, "pcg-jacobi", Method::PcgJacobi, |d| {
             let diagonal = d.plain.dense_m().diagonal();
             d.cg(|r| d.scaled_rows(r, |i| 1.0 / diagonal[i]))
         });
         for omega in [1.0, 1.2] {
-            let setup = Setup::PcgSsor { omega };
-            hold_cg(case, "pcg-ssor", setup, |d| d.cg(|r| d.symmetric_sweep(omega, r)));
+            let method = Method::PcgSsor { omega };
+            hold_cg(case, "pcg-ssor", method, |d| d.cg(|r| d.symmetric_sweep(omega, r)));
         }
-        hold_cg(case, "pcg-ic0", Setup::PcgIc0, |d| {
+        hold_cg(case, "pcg-ic0", Method::PcgIc0, |d| {
             let l = d.incomplete_cholesky();
             d.cg(|r| {
                 let y = l.solve_lower_triangular(r).unwrap();
@@ -394,7 +394,7 @@ fn sor_at_1_is_gauss_seidel_at_every_sweep() {
                 }
                 v
             });
-            case.hold("sor(1)", Setup::Sor { omega: 1.0, order }, &expected, tol::iterates);
+            case.hold("sor(1)", Method::GaussSeidel { order }, &expected, tol::iterates);
         }
     });
 }
@@ -419,14 +419,24 @@ fn chebyshev_keeps_its_promise() {
         for factor in [1e-2, 1e-5, 1e-9] {
             let promised = promised_iterations(spectrum, factor);
             let stop = Stop { tolerance: 0.0, max_iterations: promised as usize };
-            let solution = super::setups::checked(&system, &mesh.positions, Setup::Chebyshev { spectrum }, &stop);
+            let solution = super::methods::checked(
+                &system,
+                &mesh.positions,
+                Method::Chebyshev { interval: Some(spectrum) },
+                &stop,
+            );
             assert_eq!(solution.report.iterations as f64, promised, "{scheme}");
             let reached = norm(&solution.points) / start;
             assert!(reached <= factor * (1.0 + 1e-6), "{scheme}: {reached:e} > {factor:e}");
 
             let h_max = system.h.iter().copied().fold(0.0, f64::max);
             let stop = Stop { tolerance: factor * h_max.sqrt() * start, max_iterations: 1000 };
-            let solution = super::setups::checked(&system, &mesh.positions, Setup::Chebyshev { spectrum }, &stop);
+            let solution = super::methods::checked(
+                &system,
+                &mesh.positions,
+                Method::Chebyshev { interval: Some(spectrum) },
+                &stop,
+            );
             assert_eq!(solution.report.outcome, Outcome::Converged);
             assert!(solution.report.iterations as f64 <= promised, "{scheme}");
         }

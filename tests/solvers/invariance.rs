@@ -4,15 +4,15 @@ use glam::{DMat3, DVec3};
 use limitlab::mesh::generate::permute_vertices;
 use limitlab::mesh::order::Order;
 use limitlab::schemes::Scheme;
-use limitlab::solvers::{Setup, Solution, Stop};
+use limitlab::solvers::{Method, Solution, Stop};
 
-use super::setups::*;
+use super::methods::*;
 use crate::common::meshes::*;
 use crate::common::tol;
 
-fn is_krylov(setup: Setup) -> bool {
-    use Setup::*;
-    matches!(setup, Cg | PlainCg | PcgJacobi | PcgSsor { .. } | PcgIc0 | AndersonPia { .. } | AndersonJacobi { .. })
+fn is_krylov(method: Method) -> bool {
+    use Method::*;
+    matches!(method, Cg | PlainCg | PcgJacobi | PcgSsor { .. } | PcgIc0 | Anderson { .. })
 }
 
 const FEW: Stop = Stop { tolerance: 0.0, max_iterations: 12 };
@@ -29,21 +29,22 @@ fn affine_maps_of_the_data_are_affine_maps_of_every_iterate() {
         let mesh = noisy(name);
         let system = system(&mesh, scheme);
         let order = reversed(mesh.len());
-        for (name, setup) in all(&system, &order) {
-            let (map, stop) = match setup {
-                _ if is_krylov(setup) => (rotation, FEW),
+        for (name, method) in all(&system, &order) {
+            let (map, stop) = match method {
+                _ if is_krylov(method) => (rotation, FEW),
                 // One solve; a second one would refine rounding errors.
-                _ if DIRECT.iter().any(|d| d.1 == setup) => (shear, Stop { max_iterations: 1, ..FEW }),
+                _ if DIRECT.iter().any(|d| d.1 == method) => (shear, Stop { max_iterations: 1, ..FEW }),
                 _ => (shear, FEW),
             };
             let moved: Vec<DVec3> = mesh.positions.iter().map(|p| map * *p + shift).collect();
-            let plain = checked(&system, &mesh.positions, setup, &stop);
+            let plain = checked(&system, &mesh.positions, method, &stop);
             let expected: Vec<DVec3> = plain.points.iter().map(|p| map * *p + shift).collect();
-            let found = checked(&system, &moved, setup, &stop);
+            let found = checked(&system, &moved, method, &stop);
             let error = distance(&found.points, &expected);
             // The shear stretches by less than 2.
             let scale = 2.0 * mesh.diagonal();
-            let allowed = if is_krylov(setup) { tol::krylov(scale) } else { tol::iterates(stop.max_iterations, scale) };
+            let allowed =
+                if is_krylov(method) { tol::krylov(scale) } else { tol::iterates(stop.max_iterations, scale) };
             assert!(error <= allowed, "{name}, {scheme}: {error:e}");
             assert_eq!(found.report.iterations, plain.report.iterations);
         }
@@ -59,23 +60,23 @@ fn renumbering_leaves_simultaneous_updates_alone_but_not_sweeps() {
         let renumbered = permute_vertices(&mesh, &order);
         let (before, after) = (system(&mesh, scheme), system(&renumbered, scheme));
         let maxima = |solution: &Solution| -> Vec<f64> { solution.report.history.iter().map(|e| e.max).collect() };
-        let histories = |setup: Setup| {
+        let histories = |method: Method| {
             let runs = [(&before, &mesh), (&after, &renumbered)];
-            runs.map(|(system, mesh)| maxima(&checked(system, &mesh.positions, setup, &FEW)))
+            runs.map(|(system, mesh)| maxima(&checked(system, &mesh.positions, method, &FEW)))
         };
         let largest = |[a, b]: [Vec<f64>; 2]| {
             assert_eq!(a.len(), b.len());
             a.iter().zip(&b).map(|(a, b)| (a - b).abs() / mesh.diagonal()).fold(0.0, f64::max)
         };
-        for setup in [Setup::Pia { omega: 1.0 }, Setup::THALL, Setup::Chebyshev { spectrum: (0.1, 1.0) }] {
-            let difference = largest(histories(setup));
-            assert!(difference <= tol::iterates(12, 1.0), "{scheme} {setup:?}: {difference:e}");
+        for method in [Method::Pia, Method::Thall, Method::Chebyshev { interval: Some((0.1, 1.0)) }] {
+            let difference = largest(histories(method));
+            assert!(difference <= tol::iterates(12, 1.0), "{scheme} {method:?}: {difference:e}");
         }
-        let sweeps = Setup::Sor { omega: 1.0, order: None };
+        let sweeps = Method::GaussSeidel { order: None };
         assert!(largest(histories(sweeps)) > 1e-6, "{scheme}: the order does not matter?");
         // Told the old order in new numbers, the sweeps are the same.
         let told = limitlab::mesh::order::inverse(&order);
-        let in_order = Setup::Sor { omega: 1.0, order: Some(&told) };
+        let in_order = Method::GaussSeidel { order: Some(&told) };
         let first = maxima(&checked(&before, &mesh.positions, sweeps, &FEW));
         let second = maxima(&checked(&after, &renumbered.positions, in_order, &FEW));
         assert!(largest([first, second]) <= tol::iterates(12, 1.0), "{scheme}");
@@ -91,31 +92,31 @@ fn results_are_bit_by_bit_the_same_with_any_number_of_threads() {
         let system = system(mesh, scheme);
         let order = Order::Morton.order(mesh, &topology(mesh).incidence);
         let spectrum = (0.1, 1.0);
-        let setups = [
-            Setup::Pia { omega: 1.0 },
-            Setup::THALL,
-            Setup::Sor { omega: 1.1, order: Some(&order) },
-            Setup::Ssor { omega: 1.0, order: None },
-            Setup::Chebyshev { spectrum },
-            Setup::Cg,
-            Setup::PlainCg,
-            Setup::PcgJacobi,
-            Setup::PcgSsor { omega: 1.0 },
-            Setup::PcgIc0,
-            Setup::Cholesky,
-            Setup::Ldlt,
+        let methods = [
+            Method::Pia,
+            Method::Thall,
+            Method::Sor { omega: 1.1, order: Some(&order) },
+            Method::Ssor { omega: 1.0, order: None },
+            Method::Chebyshev { interval: Some(spectrum) },
+            Method::Cg,
+            Method::PlainCg,
+            Method::PcgJacobi,
+            Method::PcgSsor { omega: 1.0 },
+            Method::PcgIc0,
+            Method::Cholesky,
+            Method::Ldlt,
         ];
-        for setup in setups {
+        for method in methods {
             let [one, two, three] = [1, 2, 3].map(|threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                pool.install(|| checked(&system, &mesh.positions, setup, &FEW))
+                pool.install(|| checked(&system, &mesh.positions, method, &FEW))
             });
             for other in [two, three] {
-                assert_eq!(one.report, other.report, "{scheme} {setup:?}");
+                assert_eq!(one.report, other.report, "{scheme} {method:?}");
                 let bits = |s: &Solution| -> Vec<[u64; 3]> {
                     s.points.iter().map(|p| p.to_array().map(f64::to_bits)).collect()
                 };
-                assert_eq!(bits(&one), bits(&other), "{scheme} {setup:?}");
+                assert_eq!(bits(&one), bits(&other), "{scheme} {method:?}");
             }
         }
     }

@@ -5,9 +5,9 @@ use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::automatic::control_points;
 use limitlab::mesh::Surface;
 use limitlab::schemes::{Masks, Scheme};
-use limitlab::solvers::{Outcome, Setup, Stop, run};
+use limitlab::solvers::{Method, Outcome, Stop, run};
 
-use super::setups::*;
+use super::methods::*;
 use crate::common::meshes::*;
 
 /// The mean of the neighbours: rows sum to 1, but M = Adj has a zero diagonal and negative eigenvalues.
@@ -36,19 +36,19 @@ fn a_breakdown_is_an_outcome_that_says_where() {
     let surface = Surface::new(noisy("icosahedron")).unwrap();
     let system = LimitSystem::with_masks(&surface, &Neighbours).unwrap();
     let stop = Stop { tolerance: 1e-10, max_iterations: 100 };
-    let report = checked(&system, surface.positions(), Setup::PcgIc0, &stop).report;
+    let report = checked(&system, surface.positions(), Method::PcgIc0, &stop).report;
     assert_eq!((report.outcome, report.iterations), (Outcome::Breakdown, 0));
     let detail = report.detail.unwrap();
     assert!(detail.contains("vertex 0") && detail.contains("pivot"), "{detail}");
     // M is indefinite, which conjugate gradients find out or live with: never a false claim.
-    for setup in [Setup::Cg, Setup::PlainCg] {
-        let report = checked(&system, surface.positions(), setup, &stop).report;
+    for method in [Method::Cg, Method::PlainCg] {
+        let report = checked(&system, surface.positions(), method, &stop).report;
         assert!(matches!(report.outcome, Outcome::Breakdown | Outcome::Converged), "{:?}", report.outcome);
     }
     // Cholesky wants positive pivots, LDLᵀ and LU do not.
-    let report = checked(&system, surface.positions(), Setup::Cholesky, &stop).report;
+    let report = checked(&system, surface.positions(), Method::Cholesky, &stop).report;
     assert_eq!(report.outcome, Outcome::Singular);
-    let report = checked(&system, surface.positions(), Setup::Lu, &stop).report;
+    let report = checked(&system, surface.positions(), Method::Lu, &stop).report;
     assert_eq!(report.outcome, Outcome::Converged);
 }
 
@@ -60,7 +60,7 @@ fn incomplete_cholesky_breaks_down_on_the_cube() {
         let mesh = noisy(name);
         let system = system(&mesh, Scheme::CatmullClark);
         let stop = Stop { tolerance: 1e-10, max_iterations: 100 };
-        let report = checked(&system, &mesh.positions, Setup::PcgIc0, &stop).report;
+        let report = checked(&system, &mesh.positions, Method::PcgIc0, &stop).report;
         assert_eq!((report.outcome, report.iterations), (Outcome::Breakdown, 0), "{name}");
         assert!(report.detail.unwrap().contains("is not positive"));
     }
@@ -76,18 +76,18 @@ fn numbers_that_are_not_finite_never_converge() {
             for axis in 0..3 {
                 let mut points = mesh.positions.clone();
                 points[42][axis] = bad;
-                for (name, setup) in all(&system, &order) {
+                for (name, method) in all(&system, &order) {
                     let stop = Stop { tolerance: 1e-3, max_iterations: 50 };
-                    let report = checked(&system, &points, setup, &stop).report;
+                    let report = checked(&system, &points, method, &stop).report;
                     assert_eq!(report.outcome, Outcome::Diverged, "{name}, {scheme}, {bad}");
                 }
             }
         }
         // Nor do points so large that their squares overflow.
         let huge: Vec<DVec3> = mesh.positions.iter().map(|p| 1e200 * *p).collect();
-        for (name, setup) in all(&system, &order) {
+        for (name, method) in all(&system, &order) {
             let stop = Stop { tolerance: 1e-3, max_iterations: 500 };
-            let outcome = checked(&system, &huge, setup, &stop).report.outcome;
+            let outcome = checked(&system, &huge, method, &stop).report.outcome;
             assert_ne!(outcome, Outcome::Converged, "{name}, {scheme}");
         }
     }
@@ -100,8 +100,8 @@ fn a_tolerance_below_rounding_ends_in_stagnation() {
         let system = system(&mesh, scheme);
         let order = reversed(mesh.len());
         let stop = Stop { tolerance: 1e-22 * mesh.diagonal(), max_iterations: 10_000 };
-        for (name, setup) in all(&system, &order) {
-            let report = checked(&system, &mesh.positions, setup, &stop).report;
+        for (name, method) in all(&system, &order) {
+            let report = checked(&system, &mesh.positions, method, &stop).report;
             assert_eq!(report.outcome, Outcome::Stagnated, "{name}, {scheme}, {:?}", report.detail);
             let floor = report.history.iter().map(|e| e.max).fold(f64::INFINITY, f64::min);
             assert!(floor < 1e-13 * mesh.diagonal(), "{name}, {scheme}: {floor:e}");
@@ -114,15 +114,15 @@ fn limits_on_iterations_are_kept() {
     let mesh = noisy("icosphere:2");
     let system = system(&mesh, Scheme::Loop);
     let order = reversed(mesh.len());
-    for (name, setup) in all(&system, &order) {
+    for (name, method) in all(&system, &order) {
         for limit in [0, 1, 2] {
             let stop = Stop { tolerance: 0.0, max_iterations: limit };
-            let report = checked(&system, &mesh.positions, setup, &stop).report;
+            let report = checked(&system, &mesh.positions, method, &stop).report;
             assert_eq!((report.outcome, report.iterations), (Outcome::MaxIterations, limit), "{name}");
         }
         // A start within the tolerance is a solution.
         let stop = Stop { tolerance: mesh.diagonal(), max_iterations: 5 };
-        let report = checked(&system, &mesh.positions, setup, &stop).report;
+        let report = checked(&system, &mesh.positions, method, &stop).report;
         assert_eq!((report.outcome, report.iterations), (Outcome::Converged, 0), "{name}");
     }
 }
@@ -133,9 +133,9 @@ fn the_smallest_mesh_is_solved_by_every_method() {
     for scheme in Scheme::ALL {
         let system = system(&mesh, scheme);
         let order = reversed(4);
-        for (name, setup) in all(&system, &order) {
+        for (name, method) in all(&system, &order) {
             let stop = Stop { tolerance: 1e-12, max_iterations: 1000 };
-            let report = checked(&system, &mesh.positions, setup, &stop).report;
+            let report = checked(&system, &mesh.positions, method, &stop).report;
             assert_eq!(report.outcome, Outcome::Converged, "{name}, {scheme}");
         }
     }
@@ -150,8 +150,8 @@ fn lengths_whose_squares_are_lost_never_converge() {
     for unit in [1e-300, 1e-170, 1e-160, 1e155, 1e300] {
         let points: Vec<DVec3> = surface.positions().iter().map(|p| unit * *p).collect();
         let stop = Stop { tolerance: 1e-10 * unit, max_iterations: 300 };
-        for (name, setup) in all(&system, &order) {
-            let report = run(&system, &points, setup, &stop).report;
+        for (name, method) in all(&system, &order) {
+            let report = run(&system, &points, method, &stop).report;
             let told = !report.history.iter().any(|e| e.max <= stop.tolerance);
             assert!(report.outcome != Outcome::Converged && told, "{name} at {unit:e}: {report:?}");
         }
@@ -169,9 +169,9 @@ fn rounding_far_from_the_origin_is_no_divergence() {
         let points: Vec<DVec3> = mesh.positions.iter().map(|p| *p + DVec3::splat(5e5)).collect();
         let stop = Stop { tolerance: 1e-14, max_iterations: 2000 };
         let order = reversed(mesh.len());
-        for (method, setup) in all(&system, &order) {
-            let report = run(&system, &points, setup, &stop).report;
-            assert_ne!(report.outcome, Outcome::Diverged, "{method} on {name}: {:e}", report.last().max);
+        for (called, method) in all(&system, &order) {
+            let report = run(&system, &points, method, &stop).report;
+            assert_ne!(report.outcome, Outcome::Diverged, "{called} on {name}: {:e}", report.last().max);
         }
     }
 }

@@ -5,7 +5,7 @@ use limitlab::analysis::promise::Promise;
 use limitlab::analysis::{Extremes, Spectrum};
 use limitlab::mesh::order::Order;
 use limitlab::schemes::Scheme;
-use limitlab::solvers::Setup;
+use limitlab::solvers::Method;
 use nalgebra::{Complex, DMatrix};
 
 use crate::common::formulas::assemble;
@@ -61,33 +61,35 @@ fn predicted_rates_are_those_of_the_dense_error_matrices() {
         let file: Vec<u32> = (0..n as u32).collect();
         let other = Order::Random(3).order(&mesh, &topology(&mesh).incidence);
 
-        let mut rates: Vec<(Setup, f64)> = Vec::new();
+        let mut rates: Vec<(Method, f64)> = Vec::new();
         for omega in [0.5, 1.0, 1.2] {
-            rates.push((Setup::Jacobi { omega }, radius(&(&one - omega * &over_d * &a))));
-            rates.push((Setup::Pia { omega }, radius(&(&one - omega * &a))));
+            rates.push((Method::Jacobi { omega: Some(omega) }, radius(&(&one - omega * &over_d * &a))));
+            rates.push((Method::WPia { omega: Some(omega) }, radius(&(&one - omega * &a))));
             for order in [None, Some(other.as_slice())] {
                 let ordered = order.unwrap_or(&file);
-                rates.push((Setup::Sor { omega, order }, radius(&sweep(&a, omega, ordered))));
-                rates.push((Setup::Ssor { omega, order }, radius(&symmetric_sweep(&a, omega, ordered))));
+                rates.push((Method::Sor { omega, order }, radius(&sweep(&a, omega, ordered))));
+                rates.push((Method::Ssor { omega, order }, radius(&symmetric_sweep(&a, omega, ordered))));
             }
             // The preconditioned matrix, similar to a symmetric one, has its spectrum in (0, 1].
             let preconditioned = &one - symmetric_sweep(&a, omega, &file);
             let values = eigenvalues(&preconditioned);
             assert!(values.iter().all(|z| z.re < 1.0 + 1e-10 && z.im.abs() < 1e-6));
             let least = values.iter().map(|z| z.re).fold(1.0, f64::min);
-            rates.push((Setup::PcgSsor { omega }, chebyshev_rate((least, 1.0))));
+            rates.push((Method::PcgSsor { omega }, chebyshev_rate((least, 1.0))));
         }
         for spectrum in [(0.05, 1.0), (0.3, 0.9)] {
-            rates.push((Setup::Chebyshev { spectrum }, chebyshev_rate(spectrum)));
+            rates.push((Method::Chebyshev { interval: Some(spectrum) }, chebyshev_rate(spectrum)));
         }
-        rates.push((Setup::Cg, chebyshev_rate((of_a.min, of_a.max))));
-        rates.push((Setup::PcgJacobi, chebyshev_rate((of_jacobi.min, of_jacobi.max))));
-        for (setup, expected) in rates {
-            let found = predicted_rate(&system, &spectrum, setup).unwrap().unwrap();
-            assert!((found - expected).abs() < tol::ESTIMATE, "{scheme} {setup:?}: {found} instead of {expected}");
+        rates.push((Method::Cg, chebyshev_rate((of_a.min, of_a.max))));
+        rates.push((Method::PcgJacobi, chebyshev_rate((of_jacobi.min, of_jacobi.max))));
+        for (method, expected) in rates {
+            let found = predicted_rate(&system, &spectrum, method).unwrap().unwrap();
+            assert!((found - expected).abs() < tol::ESTIMATE, "{scheme} {method:?}: {found} instead of {expected}");
         }
-        for setup in [Setup::Lu, Setup::Cholesky, Setup::SecondCholesky, Setup::Ldlt, Setup::PlainCg, Setup::PcgIc0] {
-            assert_eq!(predicted_rate(&system, &spectrum, setup).unwrap(), None, "{setup:?}");
+        for method in
+            [Method::Lu, Method::Cholesky, Method::SecondCholesky, Method::Ldlt, Method::PlainCg, Method::PcgIc0]
+        {
+            assert_eq!(predicted_rate(&system, &spectrum, method).unwrap(), None, "{method:?}");
         }
     }
 }

@@ -6,21 +6,21 @@ use limitlab::analysis::sweep::{Row, Sweep, rounding_floor, sweep};
 use limitlab::analysis::{Extremes, Spectrum};
 use limitlab::mesh::Mesh;
 use limitlab::schemes::Scheme;
-use limitlab::solvers::{Errors, Method, Outcome, Setup, Solution, Stop};
+use limitlab::solvers::{Errors, Method, Outcome, Solution, Stop};
 use std::f64::consts::TAU;
 
-use super::setups::checked;
+use super::methods::checked;
 use crate::common::meshes::*;
 use crate::common::tol;
 
-fn solved(mesh: &Mesh, scheme: Scheme, setup: Setup) -> Solution {
+fn solved(mesh: &Mesh, scheme: Scheme, method: Method) -> Solution {
     let stop = Stop { tolerance: 1e-12 * mesh.diagonal(), max_iterations: 20_000 };
-    checked(&system(mesh, scheme), &mesh.positions, setup, &stop)
+    checked(&system(mesh, scheme), &mesh.positions, method, &stop)
 }
 
-fn rate(mesh: &Mesh, scheme: Scheme, setup: Setup) -> f64 {
-    let report = solved(mesh, scheme, setup).report;
-    assert_eq!(report.outcome, Outcome::Converged, "{scheme} {setup:?}");
+fn rate(mesh: &Mesh, scheme: Scheme, method: Method) -> f64 {
+    let report = solved(mesh, scheme, method).report;
+    assert_eq!(report.outcome, Outcome::Converged, "{scheme} {method:?}");
     let history: Vec<f64> = report.history.iter().map(|e| e.max).collect();
     observed_rate(&history, rounding_floor(mesh.diagonal())).unwrap()
 }
@@ -31,30 +31,30 @@ fn rates_on_tori_are_those_of_the_symbols() {
     // spectra are attained.
     let quads = noisy("torus:8x6");
     let triangles = noisy("tri-torus:6x6");
-    for (mesh, scheme, setup, expected) in [
+    for (mesh, scheme, method, expected) in [
         // D⁻¹A has its spectrum in [1/4, 9/4].
-        (&quads, Scheme::CatmullClark, Setup::Jacobi { omega: 0.8 }, 0.8),
-        (&quads, Scheme::CatmullClark, Setup::THALL, 7.0 / 8.0),
+        (&quads, Scheme::CatmullClark, Method::Jacobi { omega: Some(0.8) }, 0.8),
+        (&quads, Scheme::CatmullClark, Method::Thall, 7.0 / 8.0),
         // A in [1/9, 1].
-        (&quads, Scheme::CatmullClark, Setup::Pia { omega: 1.0 }, 8.0 / 9.0),
-        (&quads, Scheme::CatmullClark, Setup::Pia { omega: 1.8 }, 0.8),
+        (&quads, Scheme::CatmullClark, Method::Pia, 8.0 / 9.0),
+        (&quads, Scheme::CatmullClark, Method::WPia { omega: Some(1.8) }, 0.8),
         // A in [1/4, 1], [1/2, 1].
-        (&quads, Scheme::Nasri, Setup::Pia { omega: 1.0 }, 0.75),
-        (&quads, Scheme::ZhengCai, Setup::Pia { omega: 1.0 }, 0.5),
-        (&triangles, Scheme::Loop, Setup::Pia { omega: 1.0 }, 0.75),
-        (&triangles, Scheme::Sqrt3, Setup::Pia { omega: 1.0 }, 0.75),
+        (&quads, Scheme::Nasri, Method::Pia, 0.75),
+        (&quads, Scheme::ZhengCai, Method::Pia, 0.5),
+        (&triangles, Scheme::Loop, Method::Pia, 0.75),
+        (&triangles, Scheme::Sqrt3, Method::Pia, 0.75),
         // D = A/2 there: the same spectrum, halved damping.
-        (&triangles, Scheme::Loop, Setup::THALL, 0.75),
+        (&triangles, Scheme::Loop, Method::Thall, 0.75),
     ] {
-        let found = rate(mesh, scheme, setup);
-        assert!((found - expected).abs() <= tol::RATE, "{scheme} {setup:?}: {found} instead of {expected}");
+        let found = rate(mesh, scheme, method);
+        assert!((found - expected).abs() <= tol::RATE, "{scheme} {method:?}: {found} instead of {expected}");
     }
 }
 
 #[test]
 fn undamped_jacobi_diverges_on_regular_quads_and_is_found_out_early() {
     let mesh = noisy("torus:16x12");
-    let solution = solved(&mesh, Scheme::CatmullClark, Setup::Jacobi { omega: 1.0 });
+    let solution = solved(&mesh, Scheme::CatmullClark, Method::Jacobi { omega: Some(1.0) });
     let report = solution.report;
     assert_eq!(report.outcome, Outcome::Diverged);
     // It grows by up to 5/4 an iteration, and 1.25^60 = 10^5.8.
@@ -62,12 +62,14 @@ fn undamped_jacobi_diverges_on_regular_quads_and_is_found_out_early() {
     assert!(report.last().max > report.history[0].max);
 }
 
+const JACOBI: Method<'static> = Method::Jacobi { omega: None };
+
 fn torus_sweep(grid: &[f64]) -> Sweep {
     let mesh = noisy("torus:32x32");
     let system = system(&mesh, Scheme::CatmullClark);
     let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 20_000 };
     let floor = rounding_floor(mesh.diagonal());
-    let grids = [(Method::Jacobi, grid.to_vec())];
+    let grids = [(JACOBI, grid.to_vec())];
     sweep(&system, &mesh.positions, &grids, None, &stop, floor, &|_| {}).unwrap()
 }
 
@@ -100,7 +102,7 @@ fn the_noisy_torus_is_best_at_four_fifths_and_diverges_where_an_excited_mode_gro
     // On the program's grid, steps of 0.05, the best is exactly 0.8.
     let coarse: Vec<f64> = (1..=24).map(|k| k as f64 / 20.0).collect();
     let sweep = torus_sweep(&coarse);
-    assert_eq!(sweep.best(Method::Jacobi).unwrap().omega, 0.8);
+    assert_eq!(sweep.best(JACOBI).unwrap().omega, 0.8);
     let first = sweep.rows.iter().find(|r| r.outcome == Outcome::Diverged).unwrap();
     assert_eq!(first.omega, 0.9);
 }
@@ -125,12 +127,12 @@ fn the_best_omega_has_the_fewest_iterations_then_the_smallest_error() {
         row(pia, 1.1, converged, 20, 1e-11),
         row(pia, 1.2, converged, 20, 2e-11),
         row(pia, 1.3, Outcome::MaxIterations, 10, 1e-13),
-        row(Method::Jacobi, 0.8, converged, 5, 1e-13),
+        row(JACOBI, 0.8, converged, 5, 1e-13),
     ];
     let sweep = Sweep { spectrum: Spectrum { a: all, jacobi: all }, thresholds: Vec::new(), rows };
     assert_eq!(sweep.best(pia).map(|r| r.omega), Some(1.1));
-    assert_eq!(sweep.best(Method::Jacobi).map(|r| r.omega), Some(0.8));
-    assert_eq!(sweep.best(Method::Sor), None);
+    assert_eq!(sweep.best(JACOBI).map(|r| r.omega), Some(0.8));
+    assert_eq!(sweep.best(Method::Sor { omega: 1.1, order: None }), None);
 }
 
 /// A smooth torus, and a part of it in the lowest mode, ±1 over a chessboard, of ever smaller amplitude.
@@ -159,7 +161,7 @@ fn a_smooth_torus_says_little_about_the_matrix() {
     let smooth = built_in("torus:32x32");
     let system = system(&smooth, Scheme::CatmullClark);
     let stop = Stop { tolerance: 1e-10 * smooth.diagonal(), max_iterations: 1000 };
-    let pia = Setup::Pia { omega: 1.0 };
+    let pia = Method::Pia;
     let report = checked(&system, &smooth.positions, pia, &stop).report;
     assert_eq!((report.outcome, report.iterations), (Outcome::Converged, 4));
     let noisy = noisy("torus:32x32");

@@ -4,9 +4,9 @@ use glam::DVec3;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::{Mesh, io};
 use limitlab::schemes::Scheme;
-use limitlab::solvers::{Outcome, Setup, Stop};
+use limitlab::solvers::{Method, Outcome, Stop};
 
-use super::setups::*;
+use super::methods::*;
 use crate::common::collection::collection;
 use crate::common::meshes::*;
 use crate::common::tol;
@@ -72,13 +72,13 @@ fn direct_methods_call_singular_what_is_singular_whatever_the_data() {
         let consistent = product(&system, &random_points(mesh.len(), 4));
         let inconsistent: Vec<DVec3> = consistent.iter().zip(&colour).map(|(p, c)| *p + 0.1 * *c).collect();
         for points in [&mesh.positions, &consistent, &inconsistent] {
-            for (method, setup) in DIRECT {
-                let solution = checked(&system, points, setup, &stop(&mesh));
+            for (called, method) in DIRECT {
+                let solution = checked(&system, points, method, &stop(&mesh));
                 let report = &solution.report;
-                assert_eq!(report.outcome, Outcome::Singular, "{name}, {method}");
+                assert_eq!(report.outcome, Outcome::Singular, "{name}, {called}");
                 assert_eq!(report.iterations, 0);
                 assert_eq!(&solution.points, points);
-                assert!(report.detail.as_ref().is_some_and(|d| !d.contains('\n')), "{name}, {method}");
+                assert!(report.detail.as_ref().is_some_and(|d| !d.contains('\n')), "{name}, {called}");
             }
         }
     }
@@ -90,18 +90,18 @@ fn meshes_beside_the_singular_ones_are_regular() {
     for name in ["prism:3", "prism:5", "prism:101", "prism:1001", "dodecahedron", "tetrahedron", "octahedron"] {
         let mesh = noisy(name);
         let system = system(&mesh, Scheme::CatmullClark);
-        for (method, setup) in DIRECT {
-            let report = checked(&system, &mesh.positions, setup, &stop(&mesh)).report;
-            assert_eq!(report.outcome, Outcome::Converged, "{name}, {method}: {:?}", report.detail);
+        for (called, method) in DIRECT {
+            let report = checked(&system, &mesh.positions, method, &stop(&mesh)).report;
+            assert_eq!(report.outcome, Outcome::Converged, "{name}, {called}: {:?}", report.detail);
         }
     }
     // The singular ones are regular under the schemes that are regular always.
     for scheme in [Scheme::Nasri, Scheme::ZhengCai] {
         for (name, mesh) in singular_meshes() {
             let system = system(&mesh, scheme);
-            for (method, setup) in DIRECT {
-                let report = checked(&system, &mesh.positions, setup, &stop(&mesh)).report;
-                assert_eq!(report.outcome, Outcome::Converged, "{name}, {method}");
+            for (called, method) in DIRECT {
+                let report = checked(&system, &mesh.positions, method, &stop(&mesh)).report;
+                assert_eq!(report.outcome, Outcome::Converged, "{name}, {called}");
             }
         }
     }
@@ -112,8 +112,8 @@ fn meshes_beside_the_singular_ones_are_regular() {
 fn pia_converges_on_the_cube_s_own_points_and_stagnates_on_perturbed_ones() {
     let cube = built_in("cube");
     let system = system(&cube, Scheme::CatmullClark);
-    for setup in [Setup::Pia { omega: 1.0 }, Setup::THALL] {
-        let solution = checked(&system, &cube.positions, setup, &stop(&cube));
+    for method in [Method::Pia, Method::Thall] {
+        let solution = checked(&system, &cube.positions, method, &stop(&cube));
         assert_eq!(solution.report.outcome, Outcome::Converged);
         // A corner's limit is at half its control point: the control cube is twice as large.
         let twice: Vec<DVec3> = cube.positions.iter().map(|p| 2.0 * *p).collect();
@@ -121,7 +121,7 @@ fn pia_converges_on_the_cube_s_own_points_and_stagnates_on_perturbed_ones() {
         for seed in 1..6 {
             let mut perturbed = cube.clone();
             add_noise(&mut perturbed, 0.1, seed);
-            let report = checked(&system, &perturbed.positions, setup, &stop(&cube)).report;
+            let report = checked(&system, &perturbed.positions, method, &stop(&cube)).report;
             assert_eq!(report.outcome, Outcome::Stagnated, "seed {seed}");
             // What is left is the points' part in the kernel, H-weighted: the same at all vertices.
             let colour = kernel(&cube);
@@ -143,13 +143,15 @@ fn no_method_claims_a_solution_that_does_not_exist() {
             let consistent = product(&system, &random);
             let amount = 0.05 * (seed + 1) as f64;
             let inconsistent: Vec<DVec3> = consistent.iter().zip(&colour).map(|(p, c)| *p + amount * *c).collect();
-            for (method, setup) in all(&system, &order) {
-                let report = checked(&system, &inconsistent, setup, &stop(&mesh)).report;
-                assert_ne!(report.outcome, Outcome::Converged, "{name}, {method}, seed {seed}");
+            for (called, method) in all(&system, &order) {
+                let report = checked(&system, &inconsistent, method, &stop(&mesh)).report;
+                assert_ne!(report.outcome, Outcome::Converged, "{name}, {called}, seed {seed}");
                 // Consistent data: relaxation finds one of infinitely many solutions.
-                if matches!(setup, Setup::Pia { omega: 1.0 } | Setup::Sor { .. } | Setup::Cg) && mesh.len() < 60 {
-                    let report = checked(&system, &consistent, setup, &stop(&mesh)).report;
-                    assert_eq!(report.outcome, Outcome::Converged, "{name}, {method}, seed {seed}");
+                if matches!(method, Method::Pia | Method::GaussSeidel { .. } | Method::Sor { .. } | Method::Cg)
+                    && mesh.len() < 60
+                {
+                    let report = checked(&system, &consistent, method, &stop(&mesh)).report;
+                    assert_eq!(report.outcome, Outcome::Converged, "{name}, {called}, seed {seed}");
                 }
             }
         }

@@ -3,10 +3,10 @@
 use glam::DVec3;
 use limitlab::analysis::dense::gaussian_elimination;
 use limitlab::schemes::Scheme;
-use limitlab::solvers::{Outcome, Setup, Stop};
+use limitlab::solvers::{Method, Outcome, Stop};
 use nalgebra::DMatrix;
 
-use super::setups::*;
+use super::methods::*;
 use crate::common::formulas::assemble;
 use crate::common::meshes::*;
 use crate::common::tol;
@@ -31,11 +31,11 @@ fn every_method_finds_the_solution_chosen_beforehand() {
             let exact = random_points(mesh.len(), seed);
             let points = product(&system, &exact);
             let order = reversed(mesh.len());
-            for (name, setup) in all(&system, &order) {
-                let solution = checked(&system, &points, setup, &STOP);
+            for (name, method) in all(&system, &order) {
+                let solution = checked(&system, &points, method, &STOP);
                 let what = format!("{name}, {scheme}, seed {seed}, {} vertices", mesh.len());
                 runs += 1;
-                if setup == Setup::PcgIc0 && solution.report.outcome == Outcome::Breakdown {
+                if method == Method::PcgIc0 && solution.report.outcome == Outcome::Breakdown {
                     breakdowns += 1;
                     continue;
                 }
@@ -68,8 +68,8 @@ fn every_method_agrees_with_dense_elimination_of_the_formulas() {
         let lambda_min = plain.eigenvalues()[0];
         let allowed = tol::solution(&system, lambda_min, STOP.tolerance, mesh.diagonal());
         let order = reversed(mesh.len());
-        for (name, setup) in all(&system, &order) {
-            let solution = checked(&system, &mesh.positions, setup, &STOP);
+        for (name, method) in all(&system, &order) {
+            let solution = checked(&system, &mesh.positions, method, &STOP);
             assert_eq!(solution.report.outcome, Outcome::Converged, "{name}, {scheme}");
             let error = distance(&solution.points, &expected);
             assert!(error <= allowed, "{name}, {scheme}: {error:e} > {allowed:e}");
@@ -87,8 +87,8 @@ fn every_solution_keeps_the_weighted_sum() {
         let sum = |points: &[DVec3]| -> DVec3 { points.iter().zip(&system.h).map(|(p, h)| *p / *h).sum() };
         let total: f64 = system.h.iter().map(|h| 1.0 / h).sum();
         let order = reversed(mesh.len());
-        for (name, setup) in all(&system, &order) {
-            let solution = checked(&system, &mesh.positions, setup, &STOP);
+        for (name, method) in all(&system, &order) {
+            let solution = checked(&system, &mesh.positions, method, &STOP);
             let drift = (sum(&solution.points) - sum(&mesh.positions)).length() / total;
             // w·(V − P) = w·(A V − P): no more than the residual, averaged.
             let allowed = STOP.tolerance + tol::rounding(mesh.len()) * mesh.diagonal();
@@ -102,13 +102,13 @@ fn direct_methods_need_one_iteration_and_tell_their_fill() {
     let mesh = noisy("irregular-quad:1000");
     let system = system(&mesh, Scheme::CatmullClark);
     let lower = (system.m.values().len() + mesh.len()) / 2;
-    for (name, setup) in DIRECT {
-        let solution = checked(&system, &mesh.positions, setup, &STOP);
+    for (name, method) in DIRECT {
+        let solution = checked(&system, &mesh.positions, method, &STOP);
         assert_eq!((solution.report.outcome, solution.report.iterations), (Outcome::Converged, 1), "{name}");
         // Factors hold at least the matrix's own entries.
         assert!(solution.fill.is_none_or(|fill| fill >= lower), "{name}: {:?}", solution.fill);
     }
-    let fill = |setup| checked(&system, &mesh.positions, setup, &STOP).fill.unwrap();
+    let fill = |method| checked(&system, &mesh.positions, method, &STOP).fill.unwrap();
     // The two libraries factor in the same order; faer's supernodes store some zeros too.
-    assert!(fill(Setup::SecondCholesky) <= fill(Setup::Cholesky));
+    assert!(fill(Method::SecondCholesky) <= fill(Method::Cholesky));
 }

@@ -12,7 +12,7 @@ use limitlab::assemble::Operator as MatrixFree;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::{Surface, builtin};
 use limitlab::schemes::Scheme;
-use limitlab::solvers::{Method, Outcome, Setup, Stop, run};
+use limitlab::solvers::{Method, Outcome, Stop, run};
 
 #[test]
 fn a_regular_grid_attains_its_bounds_at_once() {
@@ -134,22 +134,22 @@ fn promised_counts_are_kept_by_runs() {
         let promise = Promise::new(&system.bounds);
         let counts = promise.counts(&system, &mesh.positions, tolerance);
         let stop = Stop { tolerance, max_iterations: 5000 };
-        let mut check = |setup: Setup, promised: f64| {
+        let mut check = |method: Method, promised: f64| {
             if !promised.is_finite() {
                 return;
             }
-            let report = run(&system, &mesh.positions, setup, &stop).report;
-            assert_eq!(report.outcome, Outcome::Converged, "{name} {setup:?}");
+            let report = run(&system, &mesh.positions, method, &stop).report;
+            assert_eq!(report.outcome, Outcome::Converged, "{name} {method:?}");
             let took = report.iterations as f64;
-            assert!(took <= promised, "{name} {setup:?}: {took} > {promised}");
+            assert!(took <= promised, "{name} {method:?}: {took} > {promised}");
             tight += usize::from(took > 0.5 * promised);
         };
-        check(Setup::Pia { omega: 1.0 }, counts.pia);
-        check(Setup::Pia { omega: promise.omega_w_pia }, counts.w_pia);
-        check(Setup::THALL, counts.thall);
+        check(Method::Pia, counts.pia);
+        check(Method::WPia { omega: Some(promise.omega_w_pia) }, counts.w_pia);
+        check(Method::Thall, counts.thall);
         if promise.a.min > 0.0 {
             let spectrum = (promise.a.min, promise.a.max);
-            check(Setup::Chebyshev { spectrum }, counts.chebyshev);
+            check(Method::Chebyshev { interval: Some(spectrum) }, counts.chebyshev);
         }
     }
     assert!(tight > 50, "the promises are not idle: {tight}");
@@ -163,8 +163,9 @@ fn an_estimated_chebyshev_interval_holds_the_spectrum() {
         assert_eq!(system.bounds.lambda_min, 0.0);
         let least = dense::eigenvalues(&system).expect("small").a[0];
         let spectrum = || limitlab::analysis::spectrum::spectrum(&system);
-        let setup = comparison::standard_setup(&system, Method::Chebyshev, None, &spectrum).expect("dense spectra");
-        let Setup::Chebyshev { spectrum: (low, high) } = setup else { panic!("{setup:?}") };
+        let method =
+            comparison::with_spectrum(&system, Method::Chebyshev { interval: None }, &spectrum).expect("dense spectra");
+        let Method::Chebyshev { interval: Some((low, high)) } = method else { panic!("{method:?}") };
         assert_eq!(high, 1.0);
         if name == "cube" {
             assert_eq!(low, 1e-3);

@@ -8,7 +8,7 @@ use limitlab::assemble::LimitSystem;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::{Mesh, Surface, generate};
 use limitlab::schemes::{Masks, Scheme};
-use limitlab::solvers::{Method, Outcome, Setup, Stop, run};
+use limitlab::solvers::{Method, Outcome, Stop, run};
 
 /// The dimension of the kernel, by theory and by numbers.
 fn kernel_of(mesh: &Mesh, scheme: Scheme, name: &str) -> usize {
@@ -86,7 +86,7 @@ fn a_part_out_of_reach_is_told_from_rounding() {
                 // What is left of the error at the end, at every vertex.
                 let stop = Stop { tolerance: 1e-3 * moved * size, max_iterations: 1000 };
                 let system = assemble(&mesh, Scheme::CatmullClark);
-                let report = run(&system, &mesh.positions, Setup::Pia { omega: 1.0 }, &stop).report;
+                let report = run(&system, &mesh.positions, Method::Pia, &stop).report;
                 assert_ne!(report.outcome, Outcome::Converged);
                 assert!((report.last().mean / part.length() - 1.0).abs() < 1e-3, "{moved:e} of {size:e}");
             }
@@ -115,12 +115,12 @@ fn methods_do_on_singular_meshes_what_was_predicted() {
             let stop = Stop { tolerance: 1e-10 * surface.diagonal(), max_iterations: 2000 };
             let spectrum = || limitlab::analysis::spectrum::spectrum(&system);
             for method in Method::ALL {
-                let mut setup = comparison::standard_setup(&system, method, None, &spectrum).expect("dense spectra");
-                if let Setup::Chebyshev { spectrum } = &mut setup {
+                let mut method = comparison::with_spectrum(&system, method, &spectrum).expect("dense spectra");
+                if let Method::Chebyshev { interval: Some(spectrum) } = &mut method {
                     let all = dense::eigenvalues(&system).expect("small").a;
                     spectrum.0 = all.into_iter().find(|&l| l > 1e-10).expect("not all zero");
                 }
-                let solution = run(&system, surface.positions(), setup, &stop);
+                let solution = run(&system, surface.positions(), method, &stop);
                 let outcome = solution.report.outcome;
                 let prediction = verdict.prediction(method);
                 let expected = match prediction {
@@ -180,6 +180,6 @@ fn own_masks_may_have_a_negative_eigenvalue() {
     let mut points = surface.positions().to_vec();
     points[0].z += 0.1;
     let stop = Stop { tolerance: 1e-10, max_iterations: 2000 };
-    let report = run(&system, &points, Setup::Pia { omega: 1.0 }, &stop).report;
+    let report = run(&system, &points, Method::Pia, &stop).report;
     assert_eq!(report.outcome, Outcome::Diverged);
 }

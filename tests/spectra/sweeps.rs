@@ -11,7 +11,7 @@ use limitlab::mesh::noise::add_noise;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::gauss_seidel::sweep;
 use limitlab::solvers::ssor::symmetric_sweep;
-use limitlab::solvers::{Outcome, Setup, Stop, run};
+use limitlab::solvers::{Method, Outcome, Stop, run};
 
 #[test]
 fn spectral_radii_of_sweeps_agree_with_dense_ones() {
@@ -47,7 +47,7 @@ fn greedy_and_ordered_sweeps_solve_the_same_system() {
         let greedy = gauss_southwell(&system, surface.positions(), &stop);
         assert_eq!(greedy.outcome, Outcome::Converged);
         assert!(greedy.max_error <= 1.01 * stop.tolerance);
-        let direct = run(&system, surface.positions(), Setup::Cholesky, &stop).points;
+        let direct = run(&system, surface.positions(), Method::Cholesky, &stop).points;
         for (a, b) in greedy.points.iter().zip(&direct) {
             assert!(a.distance(*b) < 1e-6 * surface.diagonal());
         }

@@ -26,7 +26,7 @@ struct Arguments {
     meshes: Vec<String>,
     /// Methods, separated by commas; all unless told
     #[arg(long, value_name = "NAME,…")]
-    method: Option<List<Method>>,
+    method: Option<List<Method<'static>>>,
     /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
@@ -78,7 +78,7 @@ fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// The rows, their errors in the units of the files.
-fn compare(problem: &Problem, arguments: &Arguments) -> Result<Vec<Row>> {
+fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<Row<'a>>> {
     let Problem { system, points, .. } = problem;
     let methods = match &arguments.method {
         Some(list) => list.0.clone(),

@@ -8,7 +8,6 @@ use serde_json::{Map, Value, json};
 
 use limitlab::Result;
 use limitlab::analysis::certificate::{Certificate, certify};
-use limitlab::analysis::comparison::{SOR_OMEGA, SSOR_OMEGA};
 use limitlab::analysis::dense;
 use limitlab::analysis::eigen::End;
 use limitlab::analysis::promise::{Counts, Promise};
@@ -19,6 +18,7 @@ use limitlab::assemble::LimitSystem;
 use limitlab::assemble::bounds::SpectralBounds;
 use limitlab::solvers::direct::SINGULAR;
 use limitlab::solvers::gauss_seidel::sweep;
+use limitlab::solvers::method::{SOR_OMEGA, SSOR_OMEGA};
 use limitlab::solvers::ssor::symmetric_sweep;
 use limitlab::solvers::{Method, Stop, System};
 use limitlab_experiments::cli::{
@@ -80,7 +80,7 @@ struct Findings {
     bounds: SpectralBounds,
     ends: Ends,
     full: Option<dense::Eigenvalues>,
-    sweeps: Vec<(Method, f64, SpectralRadius)>,
+    sweeps: Vec<(Method<'static>, f64, SpectralRadius)>,
     /// What theory says of a mesh.
     verdict: Option<Singularity>,
     promise: Promise,
@@ -265,16 +265,16 @@ fn analyse_given(given: &Given, arguments: &Arguments) -> Result<Findings> {
     found.map_err(|e| limitlab::Error::mesh(&subject.name, e.to_string()))
 }
 
-fn radii_of_sweeps(system: &LimitSystem) -> Result<Vec<(Method, f64, SpectralRadius)>> {
+fn radii_of_sweeps(system: &LimitSystem) -> Result<Vec<(Method<'static>, f64, SpectralRadius)>> {
     let zero = vec![DVec3::ZERO; system.len()];
     let sor = |omega| spectral_radius(system, |x| sweep(system, &zero, omega, 0..zero.len(), x));
     let ssor = spectral_radius(system, |x| {
         symmetric_sweep(system, &zero, SSOR_OMEGA, None, x);
     })?;
     Ok(vec![
-        (Method::GaussSeidel, 1.0, sor(1.0)?),
-        (Method::Sor, SOR_OMEGA, sor(SOR_OMEGA)?),
-        (Method::Ssor, SSOR_OMEGA, ssor),
+        (Method::GaussSeidel { order: None }, 1.0, sor(1.0)?),
+        (Method::Sor { omega: SOR_OMEGA, order: None }, SOR_OMEGA, sor(SOR_OMEGA)?),
+        (Method::Ssor { omega: SSOR_OMEGA, order: None }, SSOR_OMEGA, ssor),
     ])
 }
 
@@ -374,7 +374,7 @@ fn of_a_mesh(verdict: &Singularity) -> String {
         text += &format!(
             " PIA {}; Gauss-Seidel {}; Cholesky {}.",
             verdict.prediction(Method::Pia).name(),
-            verdict.prediction(Method::GaussSeidel).name(),
+            verdict.prediction(Method::GaussSeidel { order: None }).name(),
             verdict.prediction(Method::Cholesky).name()
         );
     }

@@ -29,7 +29,7 @@ struct Arguments {
     meshes: Vec<String>,
     /// Methods to sweep: jacobi, pia, sor
     #[arg(long, value_name = "NAME,…", default_value = "jacobi,pia,sor", value_parser = methods)]
-    method: List<Method>,
+    method: List<Method<'static>>,
     /// Values of ω from A to B, both included; unless told, 0.05 to the first value beyond each method's threshold
     #[arg(long, value_name = "A:B:STEP")]
     omega: Option<Grid>,
@@ -50,9 +50,9 @@ struct Arguments {
 const BUILT_IN: [&str; 4] = ["torus:32x32", "quad-sphere:4", "icosphere:3", "irregular-quad:1000"];
 
 /// The methods that have an ω to sweep, as a `value_parser`.
-fn methods(text: &str) -> std::result::Result<List<Method>, String> {
-    let list: List<Method> = text.parse()?;
-    match list.0.iter().find(|m| !matches!(m, Method::Jacobi | Method::Pia | Method::Sor)) {
+fn methods(text: &str) -> std::result::Result<List<Method<'static>>, String> {
+    let list: List<Method<'static>> = text.parse()?;
+    match list.0.iter().find(|m| !matches!(m, Method::Jacobi { .. } | Method::Pia | Method::Sor { .. })) {
         None => Ok(list),
         Some(method) => Err(format!("{method} has no ω to sweep; choose among jacobi, pia and sor")),
     }
@@ -112,7 +112,7 @@ fn sweep_one(
     arguments: &Arguments,
     write: &(dyn Fn(&Sweep) -> Result<Vec<PathBuf>> + Sync),
 ) -> Result<Sweep> {
-    let grids: Vec<(Method, Vec<f64>)> = arguments
+    let grids: Vec<(Method<'static>, Vec<f64>)> = arguments
         .method
         .0
         .iter()

@@ -8,7 +8,7 @@ use limitlab::solvers::{Method, Outcome};
 
 /// The grids unless told: Jacobi's reaches beyond 2/λ_max(D⁻¹A) on regular quads, the others over all of (0, 2].
 pub fn default_grid(method: Method) -> Vec<f64> {
-    let text = if method == Method::Jacobi { "0.05:1.2:0.05" } else { "0.05:2:0.05" };
+    let text = if matches!(method, Method::Jacobi { .. }) { "0.05:1.2:0.05" } else { "0.05:2:0.05" };
     text.parse::<Grid>().map(|g| g.0).unwrap_or_default()
 }
 
@@ -72,7 +72,7 @@ pub fn table(id: String, title: String, about: String, sweep: &Sweep) -> Table {
 }
 
 /// Iterations above, rates below, over ω.
-pub fn plot(title: String, methods: &[Method], sweep: &Sweep) -> Figure {
+pub fn plot(title: String, methods: &[Method<'static>], sweep: &Sweep) -> Figure {
     let mut iterations = LinePlot {
         title,
         x_label: "ω".into(),
@@ -112,7 +112,7 @@ pub fn plot(title: String, methods: &[Method], sweep: &Sweep) -> Figure {
         );
     }
     for t in &sweep.thresholds {
-        if t.method == Method::Jacobi {
+        if matches!(t.method, Method::Jacobi { .. }) {
             for (at, label) in
                 [(t.matrix.optimal_omega(), "Jacobi ω_{opt}"), (t.matrix.critical_omega(), "Jacobi ω_{crit}")]
             {

@@ -10,7 +10,7 @@ use crate::assemble::LimitSystem;
 use crate::interpolate::thall::normal_deviations;
 use crate::mesh::Surface;
 use crate::schemes::catmull_clark;
-use crate::solvers::{Errors, Setup, Solution, Stop, run_watched};
+use crate::solvers::{Errors, Method, Solution, Stop, run_watched};
 use crate::{Error, Result};
 
 /// One iterate.
@@ -39,13 +39,13 @@ pub fn follow(
     system: &LimitSystem,
     fairness: &Fairness,
     normals: &[DVec3],
-    setup: Setup,
+    method: Method,
     stop: &Stop,
 ) -> Result<(Vec<Row>, Solution)> {
     let mut rows = Vec::new();
     let mut failure: Option<Error> = None;
     let mut iterate = surface.clone();
-    let solution = run_watched(system, surface.positions(), setup, stop, &mut |step| {
+    let solution = run_watched(system, surface.positions(), method, stop, &mut |step| {
         iterate.positions_mut().copy_from_slice(step.points);
         match measure(&iterate, fairness, normals) {
             Ok((energies, deviation_max, deviation_mean)) => {

@@ -11,7 +11,7 @@ use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::order::{Numbering, Order};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::direct::SINGULAR;
-use limitlab::solvers::{Outcome, Setup, Solution, Stop, run};
+use limitlab::solvers::{Method, Outcome, Solution, Stop, run};
 use nalgebra::{DMatrix, DVector};
 
 use super::{Case, on_any_threads};
@@ -171,28 +171,28 @@ fn methods(reference: &Reference) {
     let n = points.len();
     let few = Stop { max_iterations: 300, ..stop };
     let iterative = [
-        Setup::THALL,
-        Setup::Sor { omega: 1.1, order: None },
-        Setup::Ssor { omega: 1.0, order: None },
-        Setup::Pia { omega: 1.0 },
-        Setup::Cg,
-        Setup::PlainCg,
-        Setup::PcgJacobi,
-        Setup::PcgSsor { omega: 1.0 },
-        Setup::PcgIc0,
+        Method::Thall,
+        Method::Sor { omega: 1.1, order: None },
+        Method::Ssor { omega: 1.0, order: None },
+        Method::Pia,
+        Method::Cg,
+        Method::PlainCg,
+        Method::PcgJacobi,
+        Method::PcgSsor { omega: 1.0 },
+        Method::PcgIc0,
     ];
-    for setup in iterative {
-        let Solution { points: v, report, .. } = run(system, points, setup, &few);
-        reference.check(report.outcome, &v, &format!("{setup:?}"));
+    for method in iterative {
+        let Solution { points: v, report, .. } = run(system, points, method, &few);
+        reference.check(report.outcome, &v, &format!("{method:?}"));
     }
     // What elimination cannot tell from 0.
     let threshold = SINGULAR * n as f64 * f64::EPSILON;
-    for setup in [Setup::Lu, Setup::Cholesky, Setup::Ldlt, Setup::SecondCholesky] {
-        let Solution { points: v, report, .. } = run(system, points, setup, &stop);
+    for method in [Method::Lu, Method::Cholesky, Method::Ldlt, Method::SecondCholesky] {
+        let Solution { points: v, report, .. } = run(system, points, method, &stop);
         let outcome = report.outcome;
-        reference.check(outcome, &v, &format!("{setup:?}"));
+        reference.check(outcome, &v, &format!("{method:?}"));
         let Some(lambda_min) = lambda_min else { continue };
-        let what = format!("{scheme} {setup:?}: {outcome} with λ_min {lambda_min:e}");
+        let what = format!("{scheme} {method:?}: {outcome} with λ_min {lambda_min:e}");
         if lambda_min < 0.25 * threshold {
             assert_ne!(outcome, Outcome::Converged, "{what}");
         } else if lambda_min >= REGULAR {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::DVec3;
 use limitlab::Result;
 use limitlab::analysis::advice::Failed;
-use limitlab::analysis::comparison::{SOR_OMEGA, automatic, standard_setup};
+use limitlab::analysis::comparison::{automatic, with_spectrum};
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::Operator;
 use limitlab::error::Error;
@@ -62,7 +62,7 @@ fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Contr
     if let Some(remark) = input.remark_on_rounding(input.frame.scale() * stop.tolerance) {
         arguments.common.remark(format_args!("{}: {remark}", input.name));
     }
-    if let (Choice::Solver(method @ (Method::GaussSeidel | Method::Sor)), Order::Multicolour, None) =
+    if let (Choice::Solver(method @ (Method::GaussSeidel { .. } | Method::Sor { .. })), Order::Multicolour, None) =
         (arguments.method, arguments.order, &wishes.interpolated)
     {
         return by_colour(arguments, input, wishes, method, &stop);
@@ -93,7 +93,7 @@ fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Contr
     let order = part.as_ref().map_or_else(|| order.clone(), |p| p.order(&order));
     let progress = Progress::toward("solving", arguments.common.quiet);
     let solve = |method: Method| -> Result<Solution> {
-        let setup = standard_setup(solved, method, Some(&order), &|| spectrum(solved))?;
+        let method = with_spectrum(solved, method.in_order(Some(&order)), &|| spectrum(solved))?;
         let mut start = None;
         let watch = &mut |step: &Step| {
             // In digits: from the first error seen to the tolerance.
@@ -107,8 +107,8 @@ fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Contr
         };
         let points = input.surface.positions();
         Ok(match &part {
-            Some(part) => part.solve(&system, points, setup, &stop, watch),
-            None => run_watched(&system, points, setup, &stop, watch),
+            Some(part) => part.solve(&system, points, method, &stop, watch),
+            None => run_watched(&system, points, method, &stop, watch),
         })
     };
     let mut solution = solve(method)?;
@@ -172,7 +172,7 @@ fn by_colour(arguments: &Arguments, input: &Input, wishes: &Wishes, method: Meth
     let operator = Operator::in_order(surface, input.scheme, Some(&numbering)).map_err(|e| input.named(e))?;
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let omega = if method == Method::Sor { SOR_OMEGA } else { 1.0 };
+    let omega = if let Method::Sor { omega, .. } = method { omega } else { 1.0 };
     let points = numbering.there(surface.positions());
     let (control, report) = by_colours(&operator, &points, omega, stop);
     drop(progress);

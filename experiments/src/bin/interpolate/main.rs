@@ -117,7 +117,7 @@ struct ShapeFlags {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Choice {
     Auto,
-    Solver(Method),
+    Solver(Method<'static>),
     TwoPhase,
     Halstead,
     /// A scheme that keeps its vertices.

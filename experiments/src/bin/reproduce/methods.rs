@@ -1,10 +1,11 @@
 //! All methods × all schemes × all meshes: iterations to 10⁻³, 10⁻⁶ and 10⁻¹⁰, and convergence plots.
 
 use limitlab::Result;
-use limitlab::analysis::comparison::{SOR_OMEGA, SSOR_OMEGA, entries};
+use limitlab::analysis::comparison::entries;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::anderson::WINDOW;
+use limitlab::solvers::method::{SOR_OMEGA, SSOR_OMEGA};
 use limitlab::solvers::{Method, Stop, run as solve};
 use limitlab_experiments::report::{Cell, Column, Figure, LinePlot, Scale, Series, Table};
 
@@ -26,30 +27,30 @@ const STAND_INS: [&str; 9] = [
 ];
 /// Meshes with convergence plots, one for every scheme they suit.
 const PLOTTED: [&str; 4] = ["irregular-quad:1000", "irregular-tri:1000", "psb_m104_horse_233v", "spot_2930v_quad"];
-/// The lines of a comparison that have a column.
-const COLUMNS: [(Method, &str); 22] = [
-    (Method::Lu, ""),
-    (Method::Cholesky, "faer"),
-    (Method::Cholesky, "nalgebra-sparse"),
-    (Method::Ldlt, ""),
-    (Method::Jacobi, ""),
-    (Method::Thall, ""),
-    (Method::GaussSeidel, ""),
-    (Method::Sor, ""),
-    (Method::Ssor, ""),
-    (Method::Pia, ""),
-    (Method::WPia, ""),
-    (Method::Chebyshev, "proven"),
-    (Method::Chebyshev, "estimated"),
-    (Method::Cg, "preconditioned by H"),
-    (Method::Cg, "on M itself"),
-    (Method::PcgJacobi, ""),
-    (Method::PcgSsor, ""),
-    (Method::PcgIc0, ""),
-    (Method::Anderson, "of pia"),
-    (Method::Anderson, "of thall"),
-    (Method::Anderson, "of jacobi"),
-    (Method::HeavyBall, ""),
+/// The lines of a comparison, each a column: a method's name, and which of its lines where there are several.
+const COLUMNS: [(&str, &str); 22] = [
+    ("lu", ""),
+    ("cholesky", "faer"),
+    ("cholesky", "nalgebra-sparse"),
+    ("ldlt", ""),
+    ("jacobi", ""),
+    ("thall", ""),
+    ("gauss-seidel", ""),
+    ("sor", ""),
+    ("ssor", ""),
+    ("pia", ""),
+    ("w-pia", ""),
+    ("chebyshev", "proven"),
+    ("chebyshev", "estimated"),
+    ("cg", "preconditioned by H"),
+    ("cg", "on M itself"),
+    ("pcg-jacobi", ""),
+    ("pcg-ssor", ""),
+    ("pcg-ic0", ""),
+    ("anderson", "of pia"),
+    ("anderson", "of thall"),
+    ("anderson", "of jacobi"),
+    ("heavy-ball", ""),
 ];
 /// Relative to the diagonal of the bounding box.
 const TOLERANCES: [f64; 3] = [1e-3, 1e-6, 1e-10];
@@ -100,23 +101,9 @@ fn empty_tables() -> Vec<Table> {
 }
 
 /// The method, with the variant where the method has several.
-fn column_name(method: Method, variant: &str) -> String {
-    match method {
-        Method::Cholesky | Method::Anderson | Method::Chebyshev | Method::Cg => format!("{method} {variant}"),
-        Method::Lu
-        | Method::Ldlt
-        | Method::Jacobi
-        | Method::Thall
-        | Method::GaussSeidel
-        | Method::Sor
-        | Method::Ssor
-        | Method::Pia
-        | Method::WPia
-        | Method::HeavyBall
-        | Method::PcgJacobi
-        | Method::PcgSsor
-        | Method::PcgIc0 => method.name().into(),
-    }
+fn column_name(method: &str, variant: &str) -> String {
+    let several = COLUMNS.iter().filter(|column| column.0 == method).count() > 1;
+    if several { format!("{method} {variant}") } else { method.into() }
 }
 
 fn one(context: &Context, subject: &Subject, scheme: Scheme, tables: &mut [Table]) -> Result<()> {
@@ -132,13 +119,13 @@ fn one(context: &Context, subject: &Subject, scheme: Scheme, tables: &mut [Table
     let lines = entries(&system, &spectrum, &Method::ALL, None, "file")?;
     for (method, variant) in COLUMNS {
         let name = column_name(method, variant);
-        let line = lines.iter().find(|l| column_name(l.method, l.variant) == name);
+        let line = lines.iter().find(|l| column_name(l.method.name(), l.variant) == name);
         let Some(line) = line else {
             // No bound of λ_min is proven for this mesh.
             rows.iter_mut().for_each(|row| row.push(Cell::Empty));
             continue;
         };
-        let report = solve(&system, subject.surface.positions(), line.setup, &stop).report;
+        let report = solve(&system, subject.surface.positions(), line.method, &stop).report;
         let errors: Vec<f64> = report.history.iter().map(|e| e.max / size).collect();
         for (row, tolerance) in rows.iter_mut().zip(TOLERANCES) {
             row.push(match errors.iter().position(|&e| e <= tolerance) {
@@ -169,4 +156,16 @@ fn one(context: &Context, subject: &Subject, scheme: Scheme, tables: &mut [Table
             ..LinePlot::default()
         }),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_method_has_a_column() {
+        for method in Method::ALL {
+            assert!(COLUMNS.iter().any(|column| column.0 == method.name()), "{method}");
+        }
+    }
 }

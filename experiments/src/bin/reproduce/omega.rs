@@ -4,6 +4,7 @@ use limitlab::Result;
 use limitlab::analysis::sweep::{rounding_floor, sweep};
 use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::Scheme;
+use limitlab::solvers::method::SOR_OMEGA;
 use limitlab::solvers::{Method, Stop};
 use limitlab_experiments::report::{Column, Table};
 use limitlab_experiments::studies::sweep as study;
@@ -26,7 +27,8 @@ const MODELS: [(&str, Scheme); 4] = [
     ("closed/spot_188v_poly.off", Scheme::CatmullClark),
     ("closed/psb_m1630_hat_562v.off", Scheme::ZhengCai),
 ];
-const METHODS: [Method; 3] = [Method::Jacobi, Method::Pia, Method::Sor];
+const METHODS: [Method<'static>; 3] =
+    [Method::Jacobi { omega: None }, Method::Pia, Method::Sor { omega: SOR_OMEGA, order: None }];
 /// Relative to the diagonal of the bounding box.
 const TOLERANCE: f64 = 1e-10;
 const LIMIT: usize = 10_000;

@@ -6,7 +6,7 @@ use limitlab::interpolate::zheng_cai::Constraints;
 use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::Scheme;
 use limitlab::schemes::catmull_clark::limit_normals;
-use limitlab::solvers::{Setup, Stop};
+use limitlab::solvers::{Method, Stop};
 use limitlab_experiments::report::{Column, Figure, LinePlot, Scale, Series, Table};
 
 use crate::context::{Context, Item};
@@ -17,11 +17,11 @@ pub const RIPPLES: Item = Item {
     run,
 };
 
-const METHODS: [(&str, Setup); 4] = [
-    ("pia", Setup::Pia { omega: 1.0 }),
-    ("thall", Setup::THALL),
-    ("gauss-seidel", Setup::Sor { omega: 1.0, order: None }),
-    ("cg", Setup::Cg),
+const METHODS: [(&str, Method); 4] = [
+    ("pia", Method::Pia),
+    ("thall", Method::Thall),
+    ("gauss-seidel", Method::GaussSeidel { order: None }),
+    ("cg", Method::Cg),
 ];
 /// Iterates with a row, besides the last.
 const SHOWN: [usize; 8] = [0, 1, 2, 3, 5, 10, 20, 50];
@@ -67,8 +67,8 @@ fn run(context: &mut Context) -> Result<()> {
     let size = subject.surface.diagonal();
     let stop = Stop { tolerance: TOLERANCE * size, max_iterations: 1000 };
     let (mut energies, mut deviations) = (Vec::new(), Vec::new());
-    for (name, setup) in METHODS {
-        let (rows, _) = follow(&subject.surface, &system, &fairness, &normals, setup, &stop)?;
+    for (name, method) in METHODS {
+        let (rows, _) = follow(&subject.surface, &system, &fairness, &normals, method, &stop)?;
         let last = rows.len().saturating_sub(1);
         for row in &rows {
             if !SHOWN.contains(&row.iteration) && row.iteration != last {

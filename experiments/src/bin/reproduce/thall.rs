@@ -4,7 +4,7 @@ use limitlab::Result;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::jacobi::THALL_OMEGA;
-use limitlab::solvers::{Setup, Stop, run as solve};
+use limitlab::solvers::{Method, Stop, run as solve};
 use limitlab_experiments::report::{Column, Figure, LinePlot, Scale, Series, Table};
 
 use crate::context::{Context, Item};
@@ -63,7 +63,7 @@ fn run(context: &mut Context) -> Result<()> {
         let size = subject.surface.diagonal();
         let stop = Stop { tolerance: TOLERANCES[1] * size, max_iterations: LIMIT };
         for (name, omega) in [("ω = ½", THALL_OMEGA), ("best ω", jacobi.optimal_omega())] {
-            let solution = solve(&system, subject.surface.positions(), Setup::Jacobi { omega }, &stop);
+            let solution = solve(&system, subject.surface.positions(), Method::Jacobi { omega: Some(omega) }, &stop);
             let errors: Vec<f64> = solution.report.history.iter().map(|e| e.max / size).collect();
             let mut row = vec![
                 subject.name.as_str().into(),

@@ -15,7 +15,7 @@ use limitlab::assemble::LimitSystem;
 use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::gauss_seidel::sweep;
-use limitlab::solvers::{Setup, Stop, run as solve, run_watched};
+use limitlab::solvers::{Method, Stop, run as solve, run_watched};
 use limitlab_experiments::report::{Column, Table};
 
 use crate::context::{Context, Item, Subject};
@@ -114,8 +114,8 @@ fn updates(system: &LimitSystem, points: &[DVec3], size: f64) -> (Vec<f64>, f64)
     let mut before = points.to_vec();
     let mut updates: Vec<f64> = Vec::new();
     let stop = Stop { tolerance: 0.0, max_iterations: 1000 };
-    let setup = Setup::Sor { omega: 1.0, order: None };
-    let solution = run_watched(system, points, setup, &stop, &mut |step| {
+    let method = Method::GaussSeidel { order: None };
+    let solution = run_watched(system, points, method, &stop, &mut |step| {
         if step.iteration > 0 {
             updates.push(largest_update(&before, step.points) / size);
         }
@@ -156,11 +156,11 @@ fn timing(
     let most = if context.quick { DENSE_QUICK } else { DENSE };
     let dense = (nasri.len() <= most).then(|| dense_seconds(&nasri, points));
     let stop = Stop { tolerance: 1e-10 * subject.surface.diagonal(), max_iterations: 10 };
-    let direct = |setup: Setup| {
-        let solution = solve(&nasri, points, setup, &stop);
+    let direct = |method: Method| {
+        let solution = solve(&nasri, points, method, &stop);
         solution.setup_seconds + solution.solve_seconds
     };
-    let (lu, cholesky) = (direct(Setup::Lu), direct(Setup::Cholesky));
+    let (lu, cholesky) = (direct(Method::Lu), direct(Method::Cholesky));
     let printed = (system.len() == 562).then_some((0.0049, 1.4));
     Ok(vec![
         subject.name.as_str().into(),

@@ -28,7 +28,7 @@ use limitlab::mesh::order::{Numbering, Order};
 use limitlab::mesh::{Faces, Incidence, Mesh, Surface, builtin::builtin, io};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::gauss_seidel::{by_colours, in_waves};
-use limitlab::solvers::{Method, Report, Setup, Stop, run};
+use limitlab::solvers::{Method, Report, Stop, run};
 use limitlab_experiments::cli::{self, CommonFlags, List, Printer, Progress, number};
 use limitlab_experiments::report::{Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette};
 
@@ -205,12 +205,20 @@ enum Way {
     /// As `interpolate` does: read, validate, solve, write.
     Files,
     Plain,
-    Free(Method),
+    Free(Method<'static>),
     /// Gauss-Seidel on the operator in fronts.
     Waves,
     /// Gauss-Seidel on the operator by colours.
     Colours,
-    Stored(Method),
+    Stored(Method<'static>),
+}
+
+const CHEBYSHEV: Method<'static> = Method::Chebyshev { interval: None };
+const GAUSS_SEIDEL: Method<'static> = Method::GaussSeidel { order: None };
+
+/// The method, with the interval of Chebyshev where an estimate starts it.
+fn from_estimate(method: Method<'static>, estimate: f64) -> Method<'static> {
+    if method == CHEBYSHEV { Method::Chebyshev { interval: Some((estimate, 1.0)) } } else { method }
 }
 
 impl Way {
@@ -218,12 +226,12 @@ impl Way {
         Way::Auto,
         Way::Files,
         Way::Plain,
-        Way::Free(Method::Chebyshev),
+        Way::Free(CHEBYSHEV),
         Way::Free(Method::Cg),
         Way::Waves,
         Way::Colours,
-        Way::Stored(Method::Chebyshev),
-        Way::Stored(Method::GaussSeidel),
+        Way::Stored(CHEBYSHEV),
+        Way::Stored(GAUSS_SEIDEL),
         Way::Stored(Method::PcgIc0),
         Way::Stored(Method::Cholesky),
         Way::Stored(Method::Lu),
@@ -235,8 +243,8 @@ impl Way {
             Way::Files => "auto (file to file)".into(),
             Way::Plain => "plain-chebyshev".into(),
             Way::Free(method) => format!("{method} (matrix-free)"),
-            Way::Waves => format!("{} (in waves)", Method::GaussSeidel),
-            Way::Colours => format!("{} (by colours)", Method::GaussSeidel),
+            Way::Waves => format!("{GAUSS_SEIDEL} (in waves)"),
+            Way::Colours => format!("{GAUSS_SEIDEL} (by colours)"),
             Way::Stored(method) => method.name().into(),
         }
     }
@@ -318,7 +326,7 @@ fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut 
                     Some(curve) => curve.points.push(at),
                     None => curves.push(Curve { way, random, points: vec![at] }),
                 }
-                if way == Way::Free(Method::Chebyshev) && !random {
+                if way == Way::Free(CHEBYSHEV) && !random {
                     // What a fused iteration in double precision must move, as often.
                     let bytes = 4.0 * 24.0 + 37.0;
                     bound.push((at.0, 1e9 * bytes * outcome.iterations as f64 / bandwidth));
@@ -336,12 +344,12 @@ fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) ->
         Way::Auto => (palette(0), Marker::Circle),
         Way::Files => (Colour(0, 0, 110), Marker::Triangle),
         Way::Plain => (palette(1), Marker::Square),
-        Way::Free(Method::Chebyshev) => (palette(2), Marker::Circle),
+        Way::Free(Method::Chebyshev { .. }) => (palette(2), Marker::Circle),
         Way::Free(_) => (palette(3), Marker::Diamond),
         Way::Waves => (palette(5), Marker::Circle),
         Way::Colours => (Colour(140, 86, 75), Marker::Circle),
-        Way::Stored(Method::Chebyshev) => (palette(4), Marker::Square),
-        Way::Stored(Method::GaussSeidel) => (Colour(160, 160, 0), Marker::Square),
+        Way::Stored(Method::Chebyshev { .. }) => (palette(4), Marker::Square),
+        Way::Stored(Method::GaussSeidel { .. }) => (Colour(160, 160, 0), Marker::Square),
         Way::Stored(Method::PcgIc0) => (palette(6), Marker::Diamond),
         Way::Stored(Method::Cholesky) => (Colour(100, 100, 100), Marker::Triangle),
         Way::Stored(_) => (Colour(170, 170, 170), Marker::InvertedTriangle),
@@ -477,23 +485,15 @@ fn go(mesh: Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<O
             let surface = Surface::new(mesh)?;
             let operator = Operator::new(&surface, scheme)?;
             let since = Instant::now();
-            let setup = if method == Method::Cg { Setup::Cg } else { Setup::Chebyshev { spectrum: (estimate, 1.0) } };
-            let report = run(&operator, surface.positions(), setup, &stop).report;
+            let report = run(&operator, surface.positions(), from_estimate(method, estimate), &stop).report;
             start(&mut solve_seconds, since);
             Outcome { iterations: report.iterations, status: report.outcome.name(), solve_seconds }
         }
         Way::Stored(method) => {
             let surface = Surface::new(mesh)?;
             let system = LimitSystem::new(&surface, scheme)?;
-            let setup = match method {
-                Method::Chebyshev => Setup::Chebyshev { spectrum: (estimate, 1.0) },
-                Method::GaussSeidel => Setup::Sor { omega: 1.0, order: None },
-                Method::PcgIc0 => Setup::PcgIc0,
-                Method::Lu => Setup::Lu,
-                _ => Setup::Cholesky,
-            };
             let since = Instant::now();
-            let solution = run(&system, surface.positions(), setup, &stop);
+            let solution = run(&system, surface.positions(), from_estimate(method, estimate), &stop);
             start(&mut solve_seconds, since);
             Outcome { iterations: solution.report.iterations, status: solution.report.outcome.name(), solve_seconds }
         }

@@ -17,7 +17,7 @@ use limitlab_experiments::cli::Printer;
 use limitlab_experiments::report::{Column, Table};
 
 use super::machine::triad;
-use super::{Arguments, Way, estimate, family, go, noisy};
+use super::{Arguments, CHEBYSHEV, Way, estimate, family, go, noisy};
 
 /// Products or sweeps of one measurement.
 const ITERATIONS: usize = 8;
@@ -26,11 +26,11 @@ const ITERATIONS: usize = 8;
 const WAYS: [Way; 7] = [
     Way::Auto,
     Way::Plain,
-    Way::Free(Method::Chebyshev),
+    Way::Free(CHEBYSHEV),
     Way::Free(Method::Cg),
     Way::Waves,
     Way::Colours,
-    Way::Stored(Method::Chebyshev),
+    Way::Stored(CHEBYSHEV),
 ];
 
 /// Runs `work` on so many threads.

@@ -14,7 +14,7 @@ use limitlab::analysis::dense;
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
 use limitlab::assemble::LimitSystem;
 use limitlab::mesh::{Mesh, Surface, builtin, generate};
-use limitlab::solvers::{Outcome, Setup, Solution, Stop, run, run_watched};
+use limitlab::solvers::{Method, Outcome, Solution, Stop, run, run_watched};
 
 use crate::context::{Context, Subject};
 
@@ -165,17 +165,17 @@ pub fn ends(system: &LimitSystem) -> Result<Ends> {
 }
 
 /// Solves with structureless points, which excite every eigenvector, to `tolerance` times the largest coordinate 1.
-pub fn solve_random(system: &LimitSystem, setup: Setup, tolerance: f64, limit: usize) -> Solution {
+pub fn solve_random(system: &LimitSystem, method: Method, tolerance: f64, limit: usize) -> Solution {
     let points = random_points(system.len(), system.len() as u64);
     let stop = Stop { tolerance, max_iterations: limit };
-    run(system, &points, setup, &stop)
+    run(system, &points, method, &stop)
 }
 
 /// The first `count` iterates after the start V = P.
-pub fn iterates(system: &LimitSystem, points: &[DVec3], setup: Setup, count: usize) -> Vec<Vec<DVec3>> {
+pub fn iterates(system: &LimitSystem, points: &[DVec3], method: Method, count: usize) -> Vec<Vec<DVec3>> {
     let stop = Stop { tolerance: 0.0, max_iterations: count };
     let mut found = Vec::with_capacity(count);
-    run_watched(system, points, setup, &stop, &mut |step| {
+    run_watched(system, points, method, &stop, &mut |step| {
         if step.iteration > 0 {
             found.push(step.points.to_vec());
         }
@@ -185,16 +185,16 @@ pub fn iterates(system: &LimitSystem, points: &[DVec3], setup: Setup, count: usi
 }
 
 /// Iterations from V = P to `tolerance` of the bounding box's diagonal; `None` if it was not reached.
-pub fn iterations(system: &LimitSystem, subject: &Subject, setup: Setup, tolerance: f64) -> Option<usize> {
+pub fn iterations(system: &LimitSystem, subject: &Subject, method: Method, tolerance: f64) -> Option<usize> {
     let stop = Stop { tolerance: tolerance * subject.surface.diagonal(), max_iterations: 20_000 };
-    let report = run(system, subject.surface.positions(), setup, &stop).report;
+    let report = run(system, subject.surface.positions(), method, &stop).report;
     (report.outcome == Outcome::Converged).then_some(report.iterations)
 }
 
 /// max_i ‖p_i − (A v)_i‖ after each iteration, relative to the bounding box's diagonal; entry 0 is the start.
-pub fn history(system: &LimitSystem, subject: &Subject, setup: Setup, count: usize) -> Vec<f64> {
+pub fn history(system: &LimitSystem, subject: &Subject, method: Method, count: usize) -> Vec<f64> {
     let stop = Stop { tolerance: 0.0, max_iterations: count };
-    let report = run(system, subject.surface.positions(), setup, &stop).report;
+    let report = run(system, subject.surface.positions(), method, &stop).report;
     let size = subject.surface.diagonal();
     report.history.iter().map(|e| e.max / size).collect()
 }

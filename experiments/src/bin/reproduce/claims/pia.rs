@@ -11,7 +11,7 @@ use limitlab::interpolate::pia::{TwoStepsBack, passes};
 use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::loop_scheme::loop_beta;
 use limitlab::schemes::{Refinement, Scheme};
-use limitlab::solvers::{Outcome, Setup, Stop, run_watched};
+use limitlab::solvers::{Method, Outcome, Stop, run_watched};
 
 use super::finding::{Evidence, Finding};
 use super::lab::{
@@ -262,7 +262,7 @@ fn loop_convergence(lab: &Lab) -> Result<Finding> {
     let rows = each(lab.triangles(), |subject| {
         let system = subject.system(Scheme::Loop)?;
         let ends = ends(&system)?;
-        let outcome = solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-9, 10_000).report.outcome;
+        let outcome = solve_random(&system, Method::Pia, 1e-9, 10_000).report.outcome;
         Ok((ends.min, ends.max, ends.min - system.bounds.lambda_min, outcome))
     })?;
     Ok(Finding::reproduced(vec![
@@ -360,7 +360,7 @@ fn growth(system: &LimitSystem, points: &[DVec3]) -> [f64; 2] {
     let mut last: Option<[f64; 2]> = None;
     let mut worst = [0.0f64; 2];
     let stop = Stop { tolerance: 1e-8, max_iterations: 60 };
-    run_watched(system, points, Setup::Pia { omega: 1.0 }, &stop, &mut |step| {
+    run_watched(system, points, Method::Pia, &stop, &mut |step| {
         let energy: f64 = (0..system.len())
             .map(|i| (points[i] - system.a.row_times(i, step.points)).length_squared() / system.h[i])
             .sum();
@@ -406,7 +406,7 @@ fn linear_time(_: &Lab) -> Result<Finding> {
     for level in LEVELS {
         let system = exact(&format!("icosphere:{level}"))?.system(Scheme::Loop)?;
         entries.push(entries_per_vertex(&system));
-        counts.push(solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-6, 1000).report.iterations);
+        counts.push(solve_random(&system, Method::Pia, 1e-6, 1000).report.iterations);
     }
     let spread = |v: &[f64]| largest(v.iter().copied()) / smallest(v.iter().copied());
     let iterations: Vec<f64> = counts.iter().map(|&n| n as f64).collect();

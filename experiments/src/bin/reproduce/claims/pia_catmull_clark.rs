@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use limitlab::Result;
 use limitlab::analysis::singularity::Singularity;
 use limitlab::schemes::Scheme;
-use limitlab::solvers::{Outcome, Setup};
+use limitlab::solvers::{Method, Outcome};
 
 use super::finding::{Evidence, Finding};
 use super::lab::{Lab, each, ends, exact, largest, random_points, smallest, solve_random};
@@ -83,7 +83,7 @@ pub fn when_singular(lab: &Lab) -> Result<Finding> {
         rows.push(judge(&exact(name)?)?);
     }
     let cube = exact("cube")?;
-    let run = solve_random(&cube.system(Scheme::CatmullClark)?, Setup::Pia { omega: 1.0 }, 1e-6, 10_000);
+    let run = solve_random(&cube.system(Scheme::CatmullClark)?, Method::Pia, 1e-6, 10_000);
     Ok(Finding::settled(vec![
         Evidence::equal(
             "meshes whose kernel is not of the dimension that theory says",
@@ -146,7 +146,7 @@ pub fn arbitrary_meshes(lab: &Lab) -> Result<Finding> {
         let system = subject.system(Scheme::CatmullClark)?;
         let ends = ends(&system)?;
         let fast = ends.min > 1e-3;
-        let outcome = fast.then(|| solve_random(&system, Setup::Pia { omega: 1.0 }, 1e-6, 60_000).report.outcome);
+        let outcome = fast.then(|| solve_random(&system, Method::Pia, 1e-6, 60_000).report.outcome);
         // The form of P8 for faces of any size, on a random vector.
         let x: Vec<f64> = random_points(system.len(), 5).iter().map(|p| p.x).collect();
         let form: f64 = (0..system.len()).map(|i| x[i] * system.m.row_times(i, &x)).sum();

@@ -11,7 +11,7 @@ use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
 use limitlab::interpolate::thall::{Inverse, LocalIteration};
 use limitlab::mesh::Surface;
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
-use limitlab::solvers::{Outcome, Setup, Stop, solve};
+use limitlab::solvers::{Method, Outcome, Stop, solve};
 
 use super::finding::{Evidence, Finding};
 use super::lab::{
@@ -258,7 +258,7 @@ fn matrix_form(lab: &Lab) -> Result<Finding> {
     let compare = |name: &str, inverse: Inverse| -> Result<f64> {
         let subject = lab.context.stand_in(name)?;
         let system = subject.system(CC)?;
-        let matrix = iterates(&system, subject.surface.positions(), Setup::THALL, COUNT);
+        let matrix = iterates(&system, subject.surface.positions(), Method::Thall, COUNT);
         let local = local_iterates(&subject, inverse, COUNT);
         let pairs = matrix.iter().zip(&local);
         let size = subject.surface.diagonal();
@@ -314,7 +314,7 @@ fn best_omega(lab: &Lab) -> Result<Finding> {
             return Ok(None); // singular: no best ω
         }
         let omega = jacobi.optimal_omega();
-        let count = |omega| iterations(&system, subject, Setup::Jacobi { omega }, 1e-6);
+        let count = |omega| iterations(&system, subject, Method::Jacobi { omega: Some(omega) }, 1e-6);
         Ok(match (count(0.5), count(omega)) {
             (Some(half), Some(best)) => Some((omega, half as f64 / best.max(1) as f64)),
             _ => Some((omega, f64::NAN)),
@@ -353,7 +353,7 @@ fn convergence(lab: &Lab) -> Result<Finding> {
         let ends = ends(&system)?;
         // Slower ones need more iterations than are of use here.
         let outcome =
-            (ends.jacobi_min > 1e-3).then(|| solve_random(&system, Setup::THALL, 1e-6, 60_000).report.outcome);
+            (ends.jacobi_min > 1e-3).then(|| solve_random(&system, Method::Thall, 1e-6, 60_000).report.outcome);
         Ok(Row {
             inverse: largest(system.diagonal.iter().map(|a| 1.0 / a)),
             jacobi_max: ends.jacobi_max,
@@ -470,7 +470,7 @@ fn masks_in_numbers(_: &Lab) -> Result<Finding> {
 }
 
 fn first_iterations(lab: &Lab) -> Result<Finding> {
-    let runs = each(lab.subjects()?, |subject| Ok(history(&subject.system(CC)?, subject, Setup::THALL, 3)))?;
+    let runs = each(lab.subjects()?, |subject| Ok(history(&subject.system(CC)?, subject, Method::Thall, 3)))?;
     let after = |k: usize| runs.iter().map(move |r| r.get(k).copied().unwrap_or(f64::NAN));
     // How much of the error an iteration leaves, at worst.
     let left = |k: usize| largest(after(k).zip(after(k - 1)).map(|(now, before)| now / before));
@@ -496,7 +496,7 @@ fn linear_time(_: &Lab) -> Result<Finding> {
     const LEVELS: std::ops::RangeInclusive<usize> = 3..=7;
     let solved = |name: &str| -> Result<(f64, usize)> {
         let system = exact(name)?.system(CC)?;
-        let report = solve_random(&system, Setup::THALL, 1e-6, 20_000).report;
+        let report = solve_random(&system, Method::Thall, 1e-6, 20_000).report;
         Ok((entries_per_vertex(&system), report.iterations))
     };
     let (mut entries, mut counts) = (Vec::new(), Vec::new());

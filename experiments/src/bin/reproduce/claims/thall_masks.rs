@@ -9,7 +9,7 @@ use limitlab::analysis::splitting::thall::{Entry, ThallTables, formula_mask};
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix, thall_tables};
 use limitlab::schemes::Scheme;
 use limitlab::schemes::catmull_clark::{refine, refine_in_place};
-use limitlab::solvers::{Outcome, Setup};
+use limitlab::solvers::{Method, Outcome};
 
 use super::Claim;
 use super::finding::{Evidence, Finding};
@@ -308,7 +308,7 @@ fn in_place(lab: &Lab) -> Result<Finding> {
 }
 
 fn full_step(lab: &Lab) -> Result<Finding> {
-    let step = Setup::Jacobi { omega: 1.0 };
+    let step = Method::Jacobi { omega: Some(1.0) };
     let quads = exact("torus:12x12")?;
     let quads_system = quads.system(Scheme::CatmullClark)?;
     let on_quads = ends(&quads_system)?;
@@ -342,7 +342,7 @@ fn other_schemes(lab: &Lab) -> Result<Finding> {
             let system = subject.system(scheme)?;
             let inverse = largest(system.diagonal.iter().map(|a| 1.0 / a));
             let slow = scheme == Scheme::CatmullClark && ends(&system)?.jacobi_min < 1e-3;
-            let outcome = (!slow).then(|| solve_random(&system, Setup::THALL, 1e-6, 60_000).report.outcome);
+            let outcome = (!slow).then(|| solve_random(&system, Method::Thall, 1e-6, 60_000).report.outcome);
             Ok((inverse, outcome))
         })?;
         let stuck = rows.iter().filter(|r| r.1.is_some_and(|o| o != Outcome::Converged)).count();
@@ -399,9 +399,9 @@ fn not_sor(lab: &Lab) -> Result<Finding> {
     let subject = lab.context.stand_in("irregular-quad:200")?;
     let system = subject.system(Scheme::CatmullClark)?;
     let points = subject.surface.positions();
-    let sor = Setup::Sor { omega: 0.5, order: None };
+    let sor = Method::Sor { omega: 0.5, order: None };
     let by_sor = &iterates(&system, points, sor, 1)[0];
-    let jacobi = &iterates(&system, points, Setup::THALL, 1)[0];
+    let jacobi = &iterates(&system, points, Method::Thall, 1)[0];
     // Eq. 3 at every vertex by the limit mask alone, all neighbours old.
     let limits = limitlab::schemes::catmull_clark::limit_positions(&subject.surface)?;
     let by_eq_3: Vec<DVec3> = (0..points.len())

@@ -10,7 +10,7 @@ use limitlab::interpolate::thall::{
 };
 use limitlab::mesh::Surface;
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
-use limitlab::solvers::{Setup, Stop, run};
+use limitlab::solvers::{Method, Stop, run};
 
 use super::finding::{Evidence, Finding};
 use super::lab::{Lab, distance, each, exact, largest, median, random_points};
@@ -89,7 +89,7 @@ pub fn metrics(_: &Lab) -> Result<Finding> {
     let given: Vec<DVec3> = mesh.positions.iter().map(|p| p.normalize()).collect();
     let system = subject.system(CC)?;
     let stop = Stop { tolerance: 0.0, max_iterations: 100 };
-    let control = run(&system, &mesh.positions, Setup::THALL, &stop).points;
+    let control = run(&system, &mesh.positions, Method::Thall, &stop).points;
     let control = surface.with_positions(control);
     let limits = catmull_clark::limit_positions(&control)?;
     let normals = catmull_clark::limit_normals(&control)?;
@@ -192,7 +192,7 @@ pub fn attributes(_: &Lab) -> Result<Finding> {
     };
     let system = LimitSystem::new(&subject.surface, CC)?;
     let stop = Stop { tolerance: 1e-10, max_iterations: 1 };
-    let control = run(&system, &values, Setup::Cholesky, &stop).points;
+    let control = run(&system, &values, Method::Cholesky, &stop).points;
     let limits = catmull_clark::limit_positions(&subject.surface.with_positions(control))?;
     Ok(Finding::reproduced(vec![
         Evidence::equal(

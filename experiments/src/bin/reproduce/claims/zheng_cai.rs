@@ -16,7 +16,7 @@ use limitlab::mesh::order::Order;
 use limitlab::schemes::doo_sabin::Rule;
 use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::gauss_seidel::sweep;
-use limitlab::solvers::{Outcome, Setup, Stop};
+use limitlab::solvers::{Method, Outcome, Stop};
 
 use super::finding::{Evidence, Finding};
 use super::lab::{Lab, each, ends, exact, excess, largest, median, smallest, solve_random};
@@ -25,7 +25,7 @@ use crate::context::Subject;
 
 const ROUNDING: f64 = 1e-12;
 
-const GAUSS_SEIDEL: Setup = Setup::Sor { omega: 1.0, order: None };
+const GAUSS_SEIDEL: Method = Method::GaussSeidel { order: None };
 
 pub const CLAIMS: &[Claim] = &[
     Claim {
@@ -352,7 +352,7 @@ fn both_converge(lab: &Lab) -> Result<Finding> {
         let ends = ends(&system)?;
         let zero = vec![DVec3::ZERO; system.len()];
         let radius = sweep_radius(&system, |x| sweep(&system, &zero, 1.0, 0..zero.len(), x))?;
-        let failed = [GAUSS_SEIDEL, Setup::Jacobi { omega: 1.0 }]
+        let failed = [GAUSS_SEIDEL, Method::Jacobi { omega: Some(1.0) }]
             .into_iter()
             .filter(|&s| solve_random(&system, s, 1e-9, 2000).report.outcome != Outcome::Converged);
         Ok((radius, (1.0 - ends.jacobi_min).max(ends.jacobi_max - 1.0), failed.count()))

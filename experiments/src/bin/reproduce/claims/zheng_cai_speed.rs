@@ -8,13 +8,13 @@ use limitlab::interpolate::zheng_cai::{Constraints, FirstRefinement, PhaseOne, S
 use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::Scheme;
 use limitlab::schemes::doo_sabin::Rule;
-use limitlab::solvers::{Setup, Stop, run};
+use limitlab::solvers::{Method, Stop, run};
 
 use super::finding::{Evidence, Finding, Value};
 use super::lab::{Lab, each, entries_per_vertex, exact, history, largest, median, smallest};
 use crate::context::Subject;
 
-const GAUSS_SEIDEL: Setup = Setup::Sor { omega: 1.0, order: None };
+const GAUSS_SEIDEL: Method = Method::GaussSeidel { order: None };
 
 pub fn sweeps(lab: &Lab) -> Result<Finding> {
     if !lab.context.real() {
@@ -75,12 +75,12 @@ pub fn speed(lab: &Lab) -> Result<Finding> {
     let own = seconds(5, || auxiliary(&subject.surface, None, &phase).map(|a| a.updates.len()));
     let dense = seconds(3, || gaussian_elimination(&nasri, points));
     let stop = Stop { tolerance: 1e-10 * subject.surface.diagonal(), max_iterations: 1 };
-    let direct = |setup| seconds(3, || run(&nasri, points, setup, &stop));
+    let direct = |method| seconds(3, || run(&nasri, points, method, &stop));
     let ratio = |seconds: f64| Value::Time(seconds / own);
     Ok(Finding::reproduced(vec![
         Evidence::at_least("seconds of dense elimination on Nasri's system over those of Gauss-Seidel to 0.3 %", ratio(dense), 10.0),
-        Evidence::shown("the same, sparse LU", ratio(direct(Setup::Lu))),
-        Evidence::shown("the same, sparse Cholesky", ratio(direct(Setup::Cholesky))),
+        Evidence::shown("the same, sparse LU", ratio(direct(Method::Lu))),
+        Evidence::shown("the same, sparse Cholesky", ratio(direct(Method::Cholesky))),
     ])
     .remark("Reproduced is read as ten times at least; the printed ratio is 286. Sparse factorisation takes most of it away."))
 }
@@ -92,7 +92,7 @@ pub fn size(lab: &Lab) -> Result<Finding> {
     let nasri = subject.system(Scheme::Nasri)?;
     let size = subject.surface.diagonal();
     let stop = Stop { tolerance: 1e-10 * size, max_iterations: 1 };
-    let solution = run(&nasri, subject.surface.positions(), Setup::Cholesky, &stop);
+    let solution = run(&nasri, subject.surface.positions(), Method::Cholesky, &stop);
     // A double and a 32-bit row number for every entry of the factor.
     let sparse = solution.fill.map_or(f64::NAN, |fill| 12.0 * fill as f64);
     let n = nasri.len() as f64;

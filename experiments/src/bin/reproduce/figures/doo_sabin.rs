@@ -8,7 +8,7 @@ use limitlab::interpolate::nasri;
 use limitlab::interpolate::zheng_cai::{Constraints, PhaseOne, TwoPhase, interpolate};
 use limitlab::mesh::{Surface, builtin};
 use limitlab::schemes::Refinement;
-use limitlab::solvers::{Setup, Stop};
+use limitlab::solvers::{Method, Stop};
 use limitlab_experiments::report::{Colour, Paint, Picture, Points, ShadedMesh, Vectors, View};
 
 use super::{Album, CONTROL, FACES, GIVEN, Line, POINT, cage, plain, sheet, view};
@@ -79,7 +79,7 @@ pub fn against_nasri(album: &mut Album) -> Result<()> {
     let subject = album.subject("closed/psb_m1630_hat_562v.off", "irregular-tri:562")?;
     let found = two_phase(&subject, &Constraints::default())?;
     let stop = Stop { tolerance: 1e-10 * subject.surface.diagonal(), max_iterations: 10 };
-    let solution = nasri::control_points(&subject.surface, None, Setup::Lu, &stop)?;
+    let solution = nasri::control_points(&subject.surface, None, Method::Lu, &stop)?;
     let nasri = subject.surface.with_positions(solution.points);
     let shown = vec![
         ("(a) input", cage(subject.surface.mesh(), GIVEN)),

@@ -8,7 +8,7 @@ use limitlab::assemble::LimitSystem;
 use limitlab::error::Error;
 use limitlab::mesh::builtin;
 use limitlab::schemes::Scheme;
-use limitlab::solvers::{Setup, System};
+use limitlab::solvers::{Method, System};
 use limitlab_experiments::report::{ColourScale, Picture, ShadedMesh};
 
 use super::{Album, FINE_EDGE, Line, control, plain, power, sheet, view};
@@ -26,7 +26,7 @@ pub fn maps(album: &mut Album) -> Result<()> {
     let mut panels = Vec::new();
     let mut last = 0.0;
     for (i, k) in SHOWN.into_iter().enumerate() {
-        let (iterate, error) = control(&subject, &system, Setup::Pia { omega: 1.0 }, k);
+        let (iterate, error) = control(&subject, &system, Method::Pia, k);
         last = error;
         let errors = (0..system.len())
             .map(|v| (subject.surface.positions()[v] - system.row(v, iterate.positions())).length() / size)

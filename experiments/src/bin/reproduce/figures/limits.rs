@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::schemes::{Refinement, Scheme};
-use limitlab::solvers::Setup;
+use limitlab::solvers::Method;
 use limitlab_experiments::report::{Figure, Picture, Points};
 
 use super::{Album, GIVEN, Line, POINT, cage, control, limit_surface, sheet, view};
@@ -102,7 +102,7 @@ pub fn pia(album: &mut Album) -> Result<()> {
     for printed in &PRINTED {
         let subject = album.subject(printed.file, printed.otherwise)?;
         let system = subject.system(printed.scheme)?;
-        let (cage_mesh, error) = control(&subject, &system, Setup::Pia { omega: 1.0 }, printed.updates);
+        let (cage_mesh, error) = control(&subject, &system, Method::Pia, printed.updates);
         let surface = limit_surface(printed.scheme.refinement(), &cage_mesh)?;
         let view = view(printed.up, printed.azimuth, printed.elevation);
         let height = |p: &DVec3| p.dot(printed.up);
@@ -144,7 +144,7 @@ fn thall_pictures(subject: &Subject, iterates: &[usize]) -> Result<(Vec<Picture>
     let mut panels = Vec::new();
     let mut last = 0.0;
     for &k in iterates {
-        let (cage_mesh, error) = control(subject, &system, Setup::THALL, k);
+        let (cage_mesh, error) = control(subject, &system, Method::Thall, k);
         last = error;
         let caption = format!("k = {k}: error {:.2} %", 100.0 * error / size);
         let picture = Picture::new(caption, view)

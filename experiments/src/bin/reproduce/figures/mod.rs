@@ -16,7 +16,7 @@ use limitlab::assemble::LimitSystem;
 use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Mesh, Surface, diagonal};
 use limitlab::schemes::Refinement;
-use limitlab::solvers::{Setup, Stop, run as solve};
+use limitlab::solvers::{Method, Stop, run as solve};
 use limitlab_experiments::report::{Colour, Column, Figure, Picture, ShadedMesh, Table, View};
 
 use crate::context::{Context, Item, Subject};
@@ -159,9 +159,9 @@ fn power(x: f64) -> String {
 }
 
 /// The control points after so many steps from V = P, and the largest error that they leave.
-fn control(subject: &Subject, system: &LimitSystem, setup: Setup, iterations: usize) -> (Surface, f64) {
+fn control(subject: &Subject, system: &LimitSystem, method: Method, iterations: usize) -> (Surface, f64) {
     let stop = Stop { tolerance: 0.0, max_iterations: iterations };
-    let solution = solve(system, subject.surface.positions(), setup, &stop);
+    let solution = solve(system, subject.surface.positions(), method, &stop);
     let error = solution.report.last().max;
     (subject.surface.with_positions(solution.points), error)
 }

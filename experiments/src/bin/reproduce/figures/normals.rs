@@ -7,7 +7,7 @@ use limitlab::interpolate::normals::{Rotation, rotate_rings};
 use limitlab::interpolate::thall::normal_deviations;
 use limitlab::mesh::{Faces, Mesh, Surface, builtin};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
-use limitlab::solvers::Setup;
+use limitlab::solvers::Method;
 use limitlab_experiments::report::{Colour, Finish, Picture, Points, Vectors, View};
 
 use super::{Album, Line, POINT, control, limit_surface, plain, sheet, view};
@@ -47,7 +47,7 @@ pub fn bones(album: &mut Album) -> Result<()> {
     let (mesh, normals) = bone()?;
     let subject = plain("quad-sphere:2 as a bone", mesh)?;
     let system = subject.system(Scheme::CatmullClark)?;
-    let (cage, error) = control(&subject, &system, Setup::Cg, STEPS);
+    let (cage, error) = control(&subject, &system, Method::Cg, STEPS);
     let given: Vec<Option<DVec3>> = normals.iter().copied().map(Some).collect();
     let turned = rotate_rings(&cage, Refinement::CatmullClark, &given, Rotation::default())?;
     let deviations = [largest_deviation(&cage, &normals)?, largest_deviation(&turned.surface, &normals)?];
@@ -156,7 +156,7 @@ pub fn end_cap(album: &mut Album) -> Result<()> {
     for (letters, eta, radius) in [(["(a)", "(d)"], 1.0, 1.0), (["(b)", "(e)"], 1.5, 1.0), (["(c)", "(f)"], 1.5, 0.8)] {
         let subject = plain("slab of 6×4 medial atoms", slab(eta, radius * RADIUS))?;
         let system = subject.system(Scheme::CatmullClark)?;
-        let (cage, error) = control(&subject, &system, Setup::Cg, STEPS);
+        let (cage, error) = control(&subject, &system, Method::Cg, STEPS);
         let surface = limit_surface(Refinement::CatmullClark, &cage)?;
         let heights = surface.mesh.positions.iter().map(|p| p.y);
         let over = 100.0 * (heights.fold(0.0, f64::max) / RADIUS - 1.0);
