@@ -15,7 +15,7 @@ use faer::sparse::linalg::matmul::sparse_dense_matmul;
 use faer::{Accum, Par};
 use glam::DVec3;
 use limitlab::assemble::{Csr, LimitSystem, Operator};
-use limitlab::interpolate::automatic::control_points;
+use limitlab::interpolate::interpolate;
 use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::{Incidence, Mesh, Surface, Topology, builtin::builtin};
@@ -171,7 +171,7 @@ fn methods(c: &mut Criterion) {
     let mut group = c.benchmark_group("solve to 1e-10");
     group.sample_size(10);
     group.bench_function("auto, from faces to control points", |b| {
-        let solved = |mesh| control_points(&Surface::new(mesh).expect("a closed mesh"), SCHEME, &stop);
+        let solved = |mesh| interpolate(&Surface::new(mesh).expect("a closed mesh"), SCHEME, &stop.into());
         b.iter_batched(|| surface.mesh().clone(), solved, BatchSize::LargeInput);
     });
     group.bench_function("mixed precision", |b| {

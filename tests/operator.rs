@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use glam::{DVec3, Vec3A};
 use limitlab::assemble::{LimitSystem, Operator};
-use limitlab::interpolate::automatic::control_points;
+use limitlab::interpolate::interpolate;
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::curve::{along_curve, is_scattered};
 use limitlab::mesh::fronts::in_fronts;
@@ -577,7 +577,7 @@ fn auto_returns_to_file_order_and_meets_the_tolerance() {
         for surface in [good, Surface::new(scattered).expect("a closed mesh")] {
             let scheme = Scheme::default_for(surface.faces());
             let stop = Stop { tolerance: 1e-10 * surface.diagonal(), max_iterations: 1000 };
-            let found = control_points(&surface, scheme, &stop).expect("a system");
+            let found = interpolate(&surface, scheme, &stop.into()).expect("a system");
             assert_eq!(found.report.outcome, Outcome::Converged, "{name}");
             let explicit = LimitSystem::new(&surface, scheme).expect("an explicit system");
             let errors = Rows::new(surface.len()).errors(&explicit, surface.positions(), &found.points);
@@ -589,6 +589,6 @@ fn auto_returns_to_file_order_and_meets_the_tolerance() {
     add_noise(&mut prism, 0.1, 3);
     let stop = Stop { tolerance: 1e-9, max_iterations: 10_000 };
     let prism = Surface::new(prism).expect("a closed mesh");
-    let found = control_points(&prism, Scheme::CatmullClark, &stop).expect("a system");
+    let found = interpolate(&prism, Scheme::CatmullClark, &stop.into()).expect("a system");
     assert_eq!(found.report.outcome, Outcome::Converged, "{:?}", found.report);
 }

@@ -108,12 +108,6 @@ fn estimated(system: &LimitSystem, spectrum: &Spectrum) -> (f64, f64) {
     (lowest, highest)
 }
 
-/// The method that `auto` stands for: Chebyshev with proven bounds where the one for λ_min is positive (no inner
-/// products, a count known in advance), else conjugate gradients, which need no bound.
-pub fn automatic(system: &LimitSystem) -> Method<'static> {
-    if system.bounds.lambda_min > 0.0 { Method::Chebyshev { interval: None } } else { Method::Cg }
-}
-
 /// The line of each method in `methods`, then the further lines: other intervals, other libraries, the
 /// unpreconditioned CG. `order` is the vertex order of in-place sweeps, `order_name` its name.
 ///

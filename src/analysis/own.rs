@@ -79,7 +79,14 @@ impl Own<'_> {
                 (points.to_vec(), Report { outcome, iterations: 0, history, detail: Some(detail) })
             }
         };
-        Solution { points, report, setup_seconds, solve_seconds: begin.elapsed().as_secs_f64(), fill: None }
+        Solution {
+            points,
+            method: "own",
+            report,
+            setup_seconds,
+            solve_seconds: begin.elapsed().as_secs_f64(),
+            fill: None,
+        }
     }
 }
 

@@ -12,7 +12,6 @@ use super::stencil::{Point, Stencil, runs};
 use super::system::check;
 use crate::error::Result;
 use crate::mesh::order::Numbering;
-use crate::mesh::surface::Renumbered;
 use crate::mesh::{Faces, Incidence, Surface, Topology};
 use crate::parallel;
 use crate::schemes::{Masks, Scheme};
@@ -57,32 +56,42 @@ impl Operator {
     pub fn in_order(surface: &Surface, scheme: Scheme, numbering: Option<&Numbering>) -> Result<Self> {
         check(surface, scheme)?;
         let open = if surface.is_closed() { None } else { Some(surface.topology()) };
-        Self::build(surface.faces(), (surface.incidence(), open), scheme, numbering)
+        Self::build(surface.faces(), (surface.incidence(), open), scheme, (numbering, None))
     }
 
-    /// As [`in_order`](Self::in_order), on a closed surface that was renumbered inside; the numbering is one of its
-    /// renumbered vertices.
+    /// As [`in_order`](Self::in_order), on the renumbered faces where a surface has such inside; the numbering is one of
+    /// those vertices.
+    ///
+    /// The rows of vertices that are not marked `free` are *fixed*: zero, (A x)_i = 0. For x that vanishes there, the other
+    /// rows are those of the principal submatrix A_SS, whose eigenvalues keep to the bounds by interlacing.
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub(crate) fn renumbered(
+    pub(crate) fn inside(
         surface: &Surface,
-        renumbered: &Renumbered,
         scheme: Scheme,
         numbering: Option<&Numbering>,
+        free: Option<&[bool]>,
     ) -> Result<Self> {
         check(surface, scheme)?;
-        Self::build(&renumbered.faces, (&renumbered.incidence, None), scheme, numbering)
+        let rows = (numbering, free);
+        match surface.renumbered() {
+            Some(inside) => Self::build(&inside.faces, (&inside.incidence, None), scheme, rows),
+            None => {
+                let open = if surface.is_closed() { None } else { Some(surface.topology()) };
+                Self::build(surface.faces(), (surface.incidence(), open), scheme, rows)
+            }
+        }
     }
 
     fn build(
         faces: &Faces,
         sides: (&Incidence, Option<&Topology>),
         scheme: Scheme,
-        numbering: Option<&Numbering>,
+        rows: (Option<&Numbering>, Option<&[bool]>),
     ) -> Result<Self> {
         let closed = sides.1.is_none();
-        let source = Source::new(faces, sides, scheme, numbering);
+        let source = Source::new(faces, sides, scheme, rows);
         let kinds = source.kinds();
         let greatest = source.valences.iter().copied().max().unwrap_or(0);
         let h: Vec<f64> = (0..=greatest).map(|n| scheme.h(n.max(1) as usize)).collect();
@@ -99,7 +108,7 @@ impl Operator {
             let [least, greatest] = stencil.extremes(run);
             [(n, least), (n, greatest)]
         });
-        let (valences, diagonal): (Vec<u32>, Vec<f64>) = extremes.into_iter().flatten().unzip();
+        let (valences, diagonal): (Vec<u32>, Vec<f64>) = extremes.into_iter().flatten().filter(|e| e.0 > 0).unzip();
         let triangles = faces.uniform_size() == Some(3);
         let bounds = if closed {
             SpectralBounds::closed(scheme, &valences, triangles, &diagonal)
@@ -235,5 +244,41 @@ impl Operator {
     /// Neighbours of all rows together, but for those by faces that are summed.
     pub fn entries(&self) -> usize {
         self.stencil.codes.offsets().last().map_or(0, |&end| end as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::builtin::builtin;
+    use crate::mesh::fronts::in_fronts;
+
+    #[test]
+    fn fixed_rows_are_zero_and_the_others_as_they_were() {
+        for name in ["irregular-poly:200", "irregular-tri:200", "torus:8x9", "prism:40"] {
+            let surface = Surface::new(builtin(name).unwrap()).unwrap();
+            let n = surface.len();
+            let free: Vec<bool> = (0..n).map(|v| v % 3 != 1).collect();
+            let x: Vec<DVec3> = (0..n).map(|v| DVec3::new((v * v % 17) as f64, 1.0, v as f64)).collect();
+            let fronts = in_fronts(surface.faces(), surface.incidence());
+            for scheme in Scheme::ALL.into_iter().filter(|s| s.first_unsuitable_face(surface.faces()).is_none()) {
+                let full = Operator::new(&surface, scheme).unwrap();
+                let row = |v: usize| if free[v] { full.row(v, &x) } else { DVec3::ZERO };
+                let expected: Vec<DVec3> = (0..n).map(row).collect();
+                let (mut sums, mut image) = (Vec::new(), vec![DVec3::ONE; n]);
+                for order in [None, Some(&fronts)] {
+                    let fixed = Operator::inside(&surface, scheme, order, Some(&free)).unwrap();
+                    let there = |values: &[DVec3]| order.map_or(values.to_vec(), |order| order.there(values));
+                    let (x, expected) = (there(&x), there(&expected));
+                    fixed.all_sums(&x, &mut sums);
+                    fixed.product(0..n, (&x, 0), (&sums, 0), &mut image);
+                    for i in 0..n {
+                        let off = image[i].distance(expected[i]).max(fixed.row(i, &x).distance(expected[i]));
+                        assert!(off <= 1e-12 * n as f64, "{name}, {scheme}, row {i}: {off:e}");
+                    }
+                    assert!(fixed.bounds().lambda_min >= full.bounds().lambda_min - 1e-15);
+                }
+            }
+        }
     }
 }

@@ -19,6 +19,8 @@ pub(super) struct Source<'a> {
     incidence: &'a Incidence,
     /// The sides without an opposite, where there are such.
     open: Option<&'a Topology>,
+    /// By vertex: those whose rows are not fixed, where some are.
+    free: Option<&'a [bool]>,
     /// Which row is that of which vertex; the k-th of the k-th unless told.
     numbering: Option<&'a Numbering>,
     scheme: Scheme,
@@ -33,17 +35,19 @@ impl<'a> Source<'a> {
         faces: &'a Faces,
         (incidence, open): (&'a Incidence, Option<&'a Topology>),
         scheme: Scheme,
-        numbering: Option<&'a Numbering>,
+        (numbering, free): (Option<&'a Numbering>, Option<&'a [bool]>),
     ) -> Self {
         let n = incidence.vertices();
         let order = numbering.map(Numbering::order);
         assert!(order.is_none_or(|order| order.len() == n), "one entry a vertex");
+        assert!(free.is_none_or(|free| free.len() == n), "one mark a vertex");
         let vertex = |k: usize| order.map_or(k, |order| order[k] as usize);
         let valences = parallel::collect(n, |k| match open {
+            _ if free.is_some_and(|free| !free[vertex(k)]) => 0,
             None => incidence.face_count(vertex(k)) as u32,
             Some(topology) => topology.edge_valence(faces, vertex(k)) as u32,
         });
-        Source { faces, incidence, open, numbering, scheme, valences }
+        Source { faces, incidence, open, free, numbering, scheme, valences }
     }
 
     /// The vertex of a row.
@@ -64,7 +68,7 @@ impl<'a> Source<'a> {
         self.numbering.map_or(v, |numbering| numbering.place()[v as usize])
     }
 
-    /// The kind of every row.
+    /// The kind of every row; a fixed one is a vertex without edges.
     pub(super) fn kinds(&self) -> Vec<Kind> {
         let n = self.valences.len();
         let edges_only = self.scheme.edges_only();
@@ -74,11 +78,14 @@ impl<'a> Source<'a> {
             4 => Kind::Quads,
             _ => Kind::Polygons,
         };
-        if let Some(size) = self.faces.uniform_size() {
+        if let (Some(size), None) = (self.faces.uniform_size(), self.free) {
             return vec![of_size(size); n];
         }
         let incidence = self.incidence;
         parallel::collect(n, |k| {
+            if self.valences[k] == 0 {
+                return Kind::Edges;
+            }
             self.fetch_ahead(k);
             // One bit for each kind that occurs: no branch on what there is no pattern in.
             let at = incidence.corners_at(self.vertex(k)).iter();
@@ -89,7 +96,7 @@ impl<'a> Source<'a> {
             let only = |kind: Kind| met == 1 << kind as u8;
             if only(Kind::Quads) {
                 Kind::Quads
-            } else if met == 0 || only(Kind::Edges) {
+            } else if only(Kind::Edges) {
                 Kind::Edges
             } else {
                 Kind::Polygons
@@ -208,6 +215,9 @@ impl<'a> Source<'a> {
             let (h, own, x) = weights(n);
             Ring::new(h * (own + x * s.circulant(4).identity), h * s.edge_weight(), h)
         };
-        Rings { quads: rings(4), edges: rings(3), polygons: (0..=greatest).map(polygons).collect() }
+        let mut all = Rings { quads: rings(4), edges: rings(3), polygons: (0..=greatest).map(polygons).collect() };
+        // Fixed rows.
+        all.edges[0] = Ring::new(0.0, 0.0, 0.0);
+        all
     }
 }

@@ -10,18 +10,20 @@
 //! | [`lin_luo`] | Lin & Luo's unified schemes for curves and √3 surfaces |
 //! | [`halstead`] | fair interpolation as a sparse constrained least-squares problem; iterations watched by it |
 //! | [`surface`] | from a control mesh to the surface: levels, limit points, normals |
-//! | [`automatic`] | the control mesh by the fastest way: order, operator, mixed precision |
+//! | [`solver`] | the front door: the control mesh by any method, by `auto` unless told; once, or again for points that move |
 //! | [`subset`] | some vertices only, for every scheme and solver |
 //!
 //! This room builds on meshes, subdivision, assembly, solvers and analysis, and knows no plotting.
 
-pub mod automatic;
 pub mod halstead;
 pub mod lin_luo;
 pub mod nasri;
 pub mod normals;
 pub mod pia;
+pub mod solver;
 pub mod subset;
 pub mod surface;
 pub mod thall;
 pub mod zheng_cai;
+
+pub use solver::{Interpolator, Options, Tolerance, interpolate, interpolate_watched};

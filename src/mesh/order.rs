@@ -237,6 +237,16 @@ impl Numbering {
         gather(values, &self.order)
     }
 
+    /// As [`there`](Self::there), into memory that is there already.
+    ///
+    /// # Panics
+    /// If there is not one value, and one place in `out`, a vertex.
+    pub fn there_into<T: Copy + Send + Sync>(&self, values: &[T], out: &mut [T]) {
+        let n = self.order.len();
+        assert!(values.len() == n && out.len() == n, "one value a vertex");
+        parallel::fill(out, |k| values[self.order[k] as usize]);
+    }
+
     /// Values in this order, by vertex again. In parallel.
     ///
     /// # Panics

@@ -223,6 +223,8 @@ impl FromStr for Method<'static> {
 pub struct Solution {
     /// The last iterate V, one point a vertex.
     pub points: Vec<DVec3>,
+    /// The name of the method that found it.
+    pub method: &'static str,
     pub report: Report,
     /// Factorization or preconditioner, memory included.
     pub setup_seconds: f64,
@@ -317,7 +319,7 @@ pub fn run_from<S: System>(
     let setup_seconds = begin.elapsed().as_secs_f64();
     let (mut iterate, fill) = match prepared {
         Ok(prepared) => prepared,
-        Err(failure) => return not_set_up(system, (points, start), failure, setup_seconds),
+        Err(failure) => return not_set_up(system, (points, start), method.name(), (failure, setup_seconds)),
     };
     let begin = Instant::now();
     if elsewhere {
@@ -326,6 +328,7 @@ pub fn run_from<S: System>(
     let report = solve_in_scale(iterate.as_mut(), size, stop, watch);
     Solution {
         points: iterate.points().to_vec(),
+        method: method.name(),
         report,
         setup_seconds,
         solve_seconds: begin.elapsed().as_secs_f64(),
@@ -404,12 +407,13 @@ fn direct<'a, S: System, F: Factorization + 'a>(
 fn not_set_up<S: System>(
     system: &S,
     (points, start): (&[DVec3], &[DVec3]),
-    failure: Failure,
-    setup_seconds: f64,
+    method: &'static str,
+    (failure, setup_seconds): (Failure, f64),
 ) -> Solution {
     let errors: Errors = Rows::new(points.len()).errors(system, points, start);
     Solution {
         points: start.to_vec(),
+        method,
         report: Report { outcome: failure.outcome, iterations: 0, history: vec![errors], detail: Some(failure.detail) },
         setup_seconds,
         solve_seconds: 0.0,

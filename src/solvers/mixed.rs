@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3A};
 use super::chebyshev::{Recurrence, promised_iterations};
 use super::iteration::{Errors, Outcome, Report, Stop};
 use super::system::Rows;
-use super::wavefront::Wavefront;
+use super::wavefront::{Scratch, Wavefront};
 use crate::assemble::Operator;
 use crate::pages::filled;
 use crate::parallel;
@@ -33,6 +33,28 @@ const STEP: f64 = 1.0 / 16.0;
 /// Residuals of this many times ε·max‖p‖ are rounding.
 const FLOOR: f64 = 16.0;
 
+/// The arrays that a solution takes besides the control points, to be used again for further points.
+#[derive(Clone, Debug)]
+pub struct Workspace {
+    rows: Rows,
+    residual: Vec<Vec3A>,
+    correction: Vec<Vec3A>,
+    scratch: Scratch<Vec3A>,
+}
+
+impl Workspace {
+    /// Three arrays of N points in single precision, one of the faces that are summed.
+    pub fn new(operator: &Operator) -> Self {
+        let n = operator.len();
+        Workspace {
+            rows: Rows::new(n),
+            residual: filled(n, Vec3A::ZERO),
+            correction: filled(n, Vec3A::ZERO),
+            scratch: Wavefront::new(operator).scratch(),
+        }
+    }
+}
+
 /// Solves `A V = P` from V = P, for eigenvalues up to 1. The interval of the iterations starts at the [usual
 /// λ_min](Operator::usual_lambda_min), and is stretched by what each correction was seen to gain, to the proven bound at
 /// the most. (Eigenvalues below the
@@ -44,20 +66,39 @@ const FLOOR: f64 = 16.0;
 /// # Panics
 /// If there is not one point a vertex.
 pub fn solve(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, Report) {
-    assert_eq!(points.len(), operator.len(), "one point a vertex");
-    // Within the thread pool, so that the many short parallel loops need not be handed over to it.
-    rayon::scope(|_| in_pool(operator, points, stop))
+    let mut control = Vec::new();
+    let report = solve_from(operator, points, &mut control, &mut Workspace::new(operator), stop);
+    (control, report)
 }
 
-fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, Report) {
-    let n = points.len();
+/// As [`solve`], from V = `control`, which becomes the solution; an empty one stands for V = P. Allocates no array of N
+/// points, unless `control` is empty.
+///
+/// # Panics
+/// If there is not one point a vertex, or the workspace is that of another operator.
+pub fn solve_from(
+    operator: &Operator,
+    points: &[DVec3],
+    control: &mut Vec<DVec3>,
+    workspace: &mut Workspace,
+    stop: &Stop,
+) -> Report {
+    let n = operator.len();
+    assert!(points.len() == n && (control.is_empty() || control.len() == n), "one point a vertex");
+    assert_eq!(workspace.residual.len(), n, "the workspace of this operator");
+    // Within the thread pool, so that the many short parallel loops need not be handed over to it.
+    rayon::scope(|_| in_pool(operator, points, control, workspace, stop))
+}
+
+fn in_pool(
+    operator: &Operator,
+    points: &[DVec3],
+    control: &mut Vec<DVec3>,
+    workspace: &mut Workspace,
+    stop: &Stop,
+) -> Report {
     let wavefront = Wavefront::new(operator);
-    let mut rows = Rows::new(n);
-    // Empty stands for V = P.
-    let mut control: Vec<DVec3> = Vec::new();
-    let mut residual = filled(n, Vec3A::ZERO);
-    let mut correction = filled(n, Vec3A::ZERO);
-    let mut scratch = wavefront.scratch();
+    let Workspace { rows, residual, correction, scratch } = workspace;
     // Residuals in units of the tolerance are far from the ends of single precision's range.
     let unit = if stop.tolerance > 0.0 { stop.tolerance } else { 1.0 };
     let least = operator.bounds().lambda_min.clamp(LOWEST, 1.0);
@@ -71,9 +112,9 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
     let outcome = loop {
         let recurrence = Recurrence::new(interval);
         let first = recurrence.coefficients().1 as f32;
-        let current = if control.is_empty() { points } else { &control };
+        let current: &[DVec3] = if control.is_empty() { points } else { &*control };
         let errors = rows
-            .product(operator, current, &mut residual, &mut correction, |i, ax, r, d, tally| {
+            .product(operator, current, residual, correction, |i, ax, r, d, tally| {
                 prefetch(points, i + POINTS_AHEAD);
                 prefetch(std::slice::from_ref(r), POINTS_AHEAD);
                 prefetch(std::slice::from_ref(d), POINTS_AHEAD);
@@ -98,25 +139,24 @@ fn in_pool(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, R
                     interval = (a.min(interval.0), 1.0);
                     Recurrence::new(interval).coefficients().1 as f32 / first
                 };
-                parallel::change(&mut correction, |_, d| *d *= rescale);
+                parallel::change(correction, |_, d| *d *= rescale);
             } else if gain > PROGRESS {
                 break Outcome::Stagnated;
             }
         }
         count = iterations_for(interval, stop.tolerance / errors.max).min(stop.max_iterations - iterations);
-        wavefront.iterate(Recurrence::new(interval), count, &residual, &mut correction, &mut scratch);
+        wavefront.iterate(Recurrence::new(interval), count, residual, correction, scratch);
         iterations += count;
         if control.is_empty() {
-            control = parallel::collect(points.len(), |i| points[i] + unit * correction[i].as_dvec3());
+            *control = parallel::collect(points.len(), |i| points[i] + unit * correction[i].as_dvec3());
         } else {
-            parallel::change(&mut control, |i, v| *v += unit * correction[i].as_dvec3());
+            parallel::change(control, |i, v| *v += unit * correction[i].as_dvec3());
         }
     };
     if control.is_empty() {
-        control = points.to_vec();
+        *control = points.to_vec();
     }
-    let report = Report { outcome, iterations, history, detail: None };
-    (control, report)
+    Report { outcome, iterations, history, detail: None }
 }
 
 /// Iterations of the coming correction, of those that reduce the error to its `factor`: all, or an even share of

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use limitlab::assemble::LimitSystem;
-use limitlab::interpolate::automatic::control_points;
+use limitlab::interpolate::interpolate;
 use limitlab::mesh::Surface;
 use limitlab::schemes::{Masks, Scheme};
 use limitlab::solvers::{Method, Outcome, Stop, run};
@@ -155,7 +155,7 @@ fn lengths_whose_squares_are_lost_never_converge() {
             let told = !report.history.iter().any(|e| e.max <= stop.tolerance);
             assert!(report.outcome != Outcome::Converged && told, "{name} at {unit:e}: {report:?}");
         }
-        let found = control_points(&surface.with_positions(points), Scheme::Loop, &stop).unwrap();
+        let found = interpolate(&surface.with_positions(points), Scheme::Loop, &stop.into()).unwrap();
         assert_ne!(found.report.outcome, Outcome::Converged, "{unit:e}");
     }
 }

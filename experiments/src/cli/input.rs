@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use super::{CommonFlags, StopFlags};
 use limitlab::assemble::LimitSystem;
 use limitlab::error::{Error, Result, short};
-use limitlab::interpolate::automatic::require_memory;
+use limitlab::interpolate::solver::require_memory;
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::io::{self, Loaded, has_mesh_ending};
 use limitlab::mesh::noise::{Noise, move_vertices};

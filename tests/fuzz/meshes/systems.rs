@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use limitlab::assemble::{LimitSystem, Operator};
-use limitlab::interpolate::automatic::{Automatic, control_points};
+use limitlab::interpolate::interpolate;
 use limitlab::mesh::Surface;
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::curve::along_curve;
@@ -151,8 +151,8 @@ pub fn solutions_agree(case: &Case, surface: &Surface, scheme: Scheme) {
 
 fn automatic(surface: &Surface, scheme: Scheme, stop: &Stop) -> (Vec<DVec3>, Outcome) {
     on_any_threads(|| {
-        let Automatic { points, report, .. } = control_points(surface, scheme, stop).unwrap();
-        (points, report.outcome)
+        let found = interpolate(surface, scheme, &(*stop).into()).unwrap();
+        (found.points, found.report.outcome)
     })
 }
 

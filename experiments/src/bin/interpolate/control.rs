@@ -6,18 +6,15 @@ use std::time::Instant;
 use glam::DVec3;
 use limitlab::Result;
 use limitlab::analysis::advice::Failed;
-use limitlab::analysis::comparison::{automatic, with_spectrum};
-use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::Operator;
 use limitlab::error::Error;
-use limitlab::interpolate::automatic::control_points;
-use limitlab::interpolate::subset::Restriction;
 use limitlab::interpolate::zheng_cai::{self, PhaseOne, Sweep};
+use limitlab::interpolate::{Options, Tolerance, interpolate_watched};
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::order::Order;
 use limitlab::solvers::gauss_seidel::by_colours;
 use limitlab::solvers::system::Rows;
-use limitlab::solvers::{Errors, Method, Outcome, Report, Solution, Step, Stop, run_watched};
+use limitlab::solvers::{Errors, Method, Outcome, Report, Step, Stop};
 use limitlab_experiments::cli::{Input, Progress};
 
 use super::wishes::Wishes;
@@ -67,100 +64,49 @@ fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Contr
     {
         return by_colour(arguments, input, wishes, method, &stop);
     }
-    let mut chosen = match arguments.method {
-        Choice::Solver(method) => Some(method),
-        _ => None,
-    };
-    if arguments.method == Choice::Auto && wishes.interpolated.is_none() {
-        if let Some(control) = fastest(arguments, input, wishes, &stop)? {
-            return Ok(control);
+    let order;
+    let method = match arguments.method {
+        Choice::Solver(method) => {
+            order = arguments.order.order(input.surface.mesh(), input.surface.incidence());
+            Some(method.in_order(Some(&order)))
         }
-        // A factorization tells a nearly singular matrix, on which iterations may make no progress for long, from a
-        // singular one.
-        chosen = Some(Method::Ldlt);
-    }
-    let start = Instant::now();
-    let system = input.system()?;
-    let part = match &wishes.interpolated {
-        Some(marks) => Some(Restriction::new(&system, marks)?),
-        None => None,
+        Choice::Auto | Choice::TwoPhase | Choice::Halstead | Choice::Keeping(_) => None,
     };
-    let solved = part.as_ref().map_or(&system, |p| &p.system);
-    let assemble = input.check_seconds + start.elapsed().as_secs_f64();
-    let mut method = chosen.unwrap_or_else(|| automatic(solved));
-    let start = Instant::now();
-    let order = arguments.order.order(input.surface.mesh(), input.surface.incidence());
-    let order = part.as_ref().map_or_else(|| order.clone(), |p| p.order(&order));
-    let progress = Progress::toward("solving", arguments.common.quiet);
-    let solve = |method: Method| -> Result<Solution> {
-        let method = with_spectrum(solved, method.in_order(Some(&order)), &|| spectrum(solved))?;
-        let mut start = None;
-        let watch = &mut |step: &Step| {
-            // In digits: from the first error seen to the tolerance.
-            let error = step.errors.max;
-            let digits = |e: f64| (e / stop.tolerance).ln();
-            progress.part(1.0 - digits(error) / digits(*start.get_or_insert(error)));
-            let iteration = step.iteration;
-            let error = input.frame.scale() * error;
-            progress.message(format!("{method}, iteration {iteration}: max error {error:.2e}"));
-            ControlFlow::Continue(())
-        };
-        let points = input.surface.positions();
-        Ok(match &part {
-            Some(part) => part.solve(&system, points, method, &stop, watch),
-            None => run_watched(&system, points, method, &stop, watch),
-        })
+    let Stop { tolerance, max_iterations } = stop;
+    let interpolated = wishes.interpolated.as_deref();
+    let options = Options { method, tolerance: Tolerance::Absolute(tolerance), max_iterations, interpolated };
+    // The chain of auto tells nothing before its end.
+    let progress = match method {
+        Some(_) => Progress::toward("solving", arguments.common.quiet),
+        None => Progress::open("solving", arguments.common.quiet),
     };
-    let mut solution = solve(method)?;
-    let outcome = solution.report.outcome;
-    if arguments.method == Choice::Auto && no_progress(outcome) {
-        method = Method::Ldlt;
-        solution = solve(method)?;
-    }
+    let mut start = None;
+    let watch = &mut |step: &Step| {
+        // In digits: from the first error seen to the tolerance.
+        let error = step.errors.max;
+        let digits = |e: f64| (e / tolerance).ln();
+        progress.part(1.0 - digits(error) / digits(*start.get_or_insert(error)));
+        let (iteration, error) = (step.iteration, input.frame.scale() * error);
+        progress.message(format!("iteration {iteration}: max error {error:.2e}"));
+        ControlFlow::Continue(())
+    };
+    let found = interpolate_watched(&input.surface, input.scheme, &options, watch).map_err(|e| input.named(e))?;
     drop(progress);
-    check(arguments, input, wishes, method, &solution.report, &stop)?;
+    check(arguments, input, wishes, found.method, &found.report, &stop)?;
     Ok(Control {
-        method: method.name(),
-        points: solution.points,
-        // The start on a subset is what one PIA step makes of V = P.
-        iterations: solution.report.iterations + usize::from(part.is_some()),
-        status: solution.report.outcome.name(),
-        errors: solution.report.last(),
-        tolerance: stop.tolerance,
-        seconds: Seconds { assemble, solve: start.elapsed().as_secs_f64(), ..Seconds::default() },
-    })
-}
-
-/// Whether an iteration ended without getting nearer.
-fn no_progress(outcome: Outcome) -> bool {
-    matches!(outcome, Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown)
-}
-
-/// All vertices, by the library's choice of order, operator and method; `None` if that makes no progress, and a
-/// solution may exist all the same.
-fn fastest(arguments: &Arguments, input: &Input, wishes: &Wishes, stop: &Stop) -> Result<Option<Control>> {
-    let progress = Progress::open("solving", arguments.common.quiet);
-    let found = control_points(&input.surface, input.scheme, stop).map_err(|e| input.named(e))?;
-    drop(progress);
-    if no_progress(found.report.outcome)
-        && failed(arguments, input, wishes, &found.report, stop).unreachable().is_none()
-    {
-        return Ok(None);
-    }
-    check(arguments, input, wishes, found.method, &found.report, stop)?;
-    Ok(Some(Control {
-        method: found.method.name(),
-        points: found.points,
-        iterations: found.report.iterations,
+        method: found.method,
+        // The start on some vertices only is what one PIA step makes of V = P.
+        iterations: found.report.iterations + usize::from(interpolated.is_some()),
         status: found.report.outcome.name(),
         errors: found.report.last(),
-        tolerance: stop.tolerance,
+        tolerance,
         seconds: Seconds {
             assemble: input.check_seconds + found.setup_seconds,
             solve: found.solve_seconds,
             ..Seconds::default()
         },
-    }))
+        points: found.points,
+    })
 }
 
 /// All vertices, by sweeps that relax those of one colour at once, without a stored matrix.
@@ -176,7 +122,7 @@ fn by_colour(arguments: &Arguments, input: &Input, wishes: &Wishes, method: Meth
     let points = numbering.there(surface.positions());
     let (control, report) = by_colours(&operator, &points, omega, stop);
     drop(progress);
-    check(arguments, input, wishes, method, &report, stop)?;
+    check(arguments, input, wishes, method.name(), &report, stop)?;
     Ok(Control {
         method: method.name(),
         points: numbering.back(&control),
@@ -239,7 +185,7 @@ fn check(
     arguments: &Arguments,
     input: &Input,
     wishes: &Wishes,
-    method: Method,
+    method: &str,
     report: &Report,
     stop: &Stop,
 ) -> Result<()> {

@@ -5,7 +5,7 @@ use glam::DVec3;
 use limitlab::Result;
 use limitlab::analysis::lines::{Preconditioner, Regularity, count};
 use limitlab::assemble::LimitSystem;
-use limitlab::interpolate::automatic::control_points;
+use limitlab::interpolate::interpolate;
 use limitlab::mesh::noise::move_vertices;
 use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Surface, builtin};
@@ -146,7 +146,7 @@ fn row(name: &str, coarse: &Surface, levels: usize) -> Result<Vec<Cell>> {
     let scaled = |r: &[DVec3]| r.iter().zip(&system.h).map(|(r, h)| *r * *h).collect();
     let plain = count(&system, points, &stop, scaled)?;
     let lines = count(&system, points, &stop, |r| preconditioner.apply(r))?;
-    let auto = control_points(&surface, Scheme::CatmullClark, &stop)?;
+    let auto = interpolate(&surface, Scheme::CatmullClark, &stop.into())?;
     let iterations = auto.report.iterations;
     let irregular = 1.0 - regularity.share();
     Ok(vec![

@@ -19,7 +19,7 @@ use serde_json::json;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::{LimitSystem, Operator};
 use limitlab::error::{Error, Result};
-use limitlab::interpolate::automatic::control_points;
+use limitlab::interpolate::interpolate;
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
@@ -431,7 +431,7 @@ fn timed(
 fn file_to_file([from, to]: &[PathBuf; 2], scheme: Scheme, tol: f64) -> Result<Outcome> {
     let surface = Surface::new(io::read(from)?.mesh)?;
     let stop = Stop { tolerance: tol * surface.diagonal(), max_iterations: 10_000 };
-    let found = control_points(&surface, scheme, &stop)?;
+    let found = interpolate(&surface, scheme, &stop.into())?;
     let (iterations, status) = (found.report.iterations, found.report.outcome.name());
     io::write(to, &Mesh::new(found.points, surface.into_mesh().faces), None)?;
     Ok(Outcome { iterations, status, solve_seconds: found.solve_seconds })
@@ -449,7 +449,7 @@ fn go(mesh: Mesh, scheme: Scheme, way: Way, estimate: f64, tol: f64) -> Result<O
         // Not from faces in memory.
         Way::Files => return Ok(None),
         Way::Auto => {
-            let found = control_points(&Surface::new(mesh)?, scheme, &stop)?;
+            let found = interpolate(&Surface::new(mesh)?, scheme, &stop.into())?;
             Outcome {
                 iterations: found.report.iterations,
                 status: found.report.outcome.name(),

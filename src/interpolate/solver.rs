@@ -1,0 +1,394 @@
+//! The front door: from a surface and a scheme to the control mesh whose limit surface passes through its vertices.
+//!
+//! [`interpolate`] does it once, [`Interpolator`] again and again for points that move. Unless a method is asked for,
+//! both follow one chain, `auto`:
+//!
+//! 1. [Chebyshev in single precision with double-precision corrections](crate::solvers::mixed) on the [matrix-free
+//!    operator](Operator). It needs no inner products, its iterations share passes over memory, and it moves half the
+//!    bytes. The interval starts at what λ_min usually is, or at the proven bound where that is higher; a correction that
+//!    gains less than promised stretches it, down to the proven bound at the most.
+//! 2. Where that makes no progress (λ_min below 10⁻⁴, a singular matrix), conjugate gradients on the same operator from
+//!    V = P: their count grows with √κ only, and they need no interval.
+//! 3. Where these make none either, and the points have no part that no control mesh reaches, LDLᵀ: a factorization tells
+//!    a nearly singular matrix from a singular one.
+//!
+//! *Order.* A large mesh whose vertices lie [scattered](crate::mesh::curve::is_scattered) in memory has been renumbered
+//! along a space-filling curve by [`Surface`]. From [`ORDERED`] vertices on, the rows of the operator are [breadth
+//! first](in_fronts), which gives it the narrow band that groups of iterations need. Below, all arrays stay in cache in
+//! any order, and rows are [grouped by kind](in_kinds) only; so they are for mixed faces under Nasri and Zheng-Cai, where
+//! iterations are too few to pay for the search. Results come back in the order of the surface.
+//!
+//! *Some vertices only.* With V_j = P_j at the others the unknown is X = V − P, zero there: their rows of the operator are
+//! fixed, and A_SS X_S = (P − A P)_S is solved by the same chain.
+//!
+//! Direct methods lose at every size tried, by `reports/scaling.md`.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use glam::DVec3;
+
+use super::subset::{Restriction, nothing};
+use crate::analysis::advice::Failed;
+use crate::analysis::comparison::with_spectrum;
+use crate::analysis::spectrum::spectrum;
+use crate::assemble::{LimitSystem, Operator};
+use crate::error::{Error, Result};
+use crate::memory::require;
+use crate::mesh::fronts::{in_fronts, in_kinds};
+use crate::mesh::order::Numbering;
+use crate::mesh::{Mesh, Surface, diagonal};
+use crate::parallel;
+use crate::schemes::Scheme;
+use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
+use crate::solvers::mixed::{self, Workspace};
+use crate::solvers::system::Rows;
+use crate::solvers::{Iterate, Method, Outcome, Report, Solution, Step, Stop, run_watched, solve};
+
+/// From this many vertices on, the rows of the operator are breadth first. Tuned.
+pub const ORDERED: usize = 200_000;
+/// From this usual λ_min on (Nasri's), a score of iterations suffice, and on mixed faces that order does not pay. Tuned.
+const FEW: f64 = 0.25;
+
+/// How near the limit points have to come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tolerance {
+    /// In parts of the diagonal of the bounding box.
+    Relative(f64),
+    /// In the units of the points.
+    Absolute(f64),
+}
+
+/// What is asked of [`interpolate`]. `Options::default()` is `auto` for all vertices, to 10⁻¹⁰ of the diagonal.
+///
+/// ```
+/// use limitlab::interpolate::{Options, Tolerance};
+/// use limitlab::solvers::Method;
+/// let options = Options { method: Some(Method::Cg), tolerance: Tolerance::Absolute(1e-6), ..Options::default() };
+/// assert_eq!(options.max_iterations, 10_000);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options<'a> {
+    /// `auto` unless one is named; open parameters come from the spectrum.
+    pub method: Option<Method<'a>>,
+    /// max_i ‖p_i − (A v)_i‖₂ at the end.
+    pub tolerance: Tolerance,
+    pub max_iterations: usize,
+    /// One mark a vertex: those interpolated. The other control points stay at their points. All unless told.
+    pub interpolated: Option<&'a [bool]>,
+}
+
+impl Default for Options<'_> {
+    fn default() -> Self {
+        let tolerance = Tolerance::Relative(1e-10);
+        Options { method: None, tolerance, max_iterations: 10_000, interpolated: None }
+    }
+}
+
+impl From<Stop> for Options<'_> {
+    fn from(stop: Stop) -> Self {
+        let Stop { tolerance, max_iterations } = stop;
+        Options { tolerance: Tolerance::Absolute(tolerance), max_iterations, ..Options::default() }
+    }
+}
+
+impl Options<'_> {
+    /// The stopping rule on these points.
+    ///
+    /// # Errors
+    /// A relative tolerance where all points coincide.
+    pub fn stop(&self, points: &[DVec3]) -> Result<Stop> {
+        let tolerance = match self.tolerance {
+            Tolerance::Absolute(tolerance) => tolerance,
+            Tolerance::Relative(part) => match diagonal(points) {
+                extent if extent > 0.0 => part * extent,
+                _ => {
+                    let what =
+                        "all points coincide, so no tolerance can be relative to their extent: give an absolute one";
+                    return Err(Error::Computation(what.into()));
+                }
+            },
+        };
+        Ok(Stop { tolerance, max_iterations: self.max_iterations })
+    }
+}
+
+/// Solves `A V = P` for the vertices P of a surface. How the run ended is in the solution's report: a run that did not
+/// converge is no error.
+///
+/// # Errors
+/// Faces or a boundary that the scheme is not defined on; memory; no vertex to interpolate; those of
+/// [`Options::stop`] and [`with_spectrum`].
+///
+/// # Panics
+/// If there is not one mark a vertex.
+///
+/// ```
+/// use limitlab::interpolate::{Options, interpolate};
+/// use limitlab::mesh::{Surface, builtin};
+/// use limitlab::schemes::Scheme;
+/// use limitlab::solvers::Outcome;
+///
+/// let surface = Surface::new(builtin::builtin("quad-sphere:3")?)?;
+/// let found = interpolate(&surface, Scheme::CatmullClark, &Options::default())?;
+/// assert_eq!((found.report.outcome, found.method), (Outcome::Converged, "chebyshev"));
+/// let control = surface.with_positions(found.points);
+/// let limits = Scheme::CatmullClark.refinement().limit_positions(&control)?;
+/// assert!(limits[7].distance(surface.positions()[7]) < 1e-9);
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn interpolate(surface: &Surface, scheme: Scheme, options: &Options) -> Result<Solution> {
+    interpolate_watched(surface, scheme, options, &mut |_| ControlFlow::Continue(()))
+}
+
+/// As [`interpolate`], with a watch that sees every iterate of a method that is named; on some vertices only it sees
+/// X = V − P.
+///
+/// # Errors
+/// As [`interpolate`].
+///
+/// # Panics
+/// As [`interpolate`].
+pub fn interpolate_watched(
+    surface: &Surface,
+    scheme: Scheme,
+    options: &Options,
+    watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
+) -> Result<Solution> {
+    let stop = options.stop(surface.positions())?;
+    let marks = options.interpolated;
+    if let Some(method) = options.method {
+        return by_method(surface, scheme, marks, method, &stop, watch);
+    }
+    require_memory(surface.mesh())?;
+    let start = Instant::now();
+    let mut interpolator = Interpolator::new(surface, scheme, marks)?;
+    let setup_seconds = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let mut points = Vec::new();
+    let (method, report) = interpolator.solve_into(surface.positions(), &mut points, &stop);
+    let solve_seconds = start.elapsed().as_secs_f64();
+    let found = Solution { points, method, report, setup_seconds, solve_seconds, fill: None };
+    let unreachable = || Failed::new((surface, scheme), marks, None, &found.report, &stop).unreachable().is_some();
+    if !no_progress(found.report.outcome) || unreachable() {
+        return Ok(found);
+    }
+    drop(interpolator);
+    let direct = by_method(surface, scheme, marks, Method::Ldlt, &stop, watch)?;
+    Ok(Solution { setup_seconds: setup_seconds + solve_seconds + direct.setup_seconds, ..direct })
+}
+
+/// Whether an iteration ended without getting nearer.
+fn no_progress(outcome: Outcome) -> bool {
+    matches!(outcome, Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown)
+}
+
+/// By one method on the stored matrix.
+fn by_method(
+    surface: &Surface,
+    scheme: Scheme,
+    marks: Option<&[bool]>,
+    method: Method,
+    stop: &Stop,
+    watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
+) -> Result<Solution> {
+    let start = Instant::now();
+    let system = LimitSystem::new(surface, scheme)?;
+    let part = marks.map(|marks| Restriction::new(&system, marks)).transpose()?;
+    let solved = part.as_ref().map_or(&system, |part| &part.system);
+    let method = with_spectrum(solved, method, &|| spectrum(solved))?;
+    let seconds = start.elapsed().as_secs_f64();
+    let points = surface.positions();
+    let mut solution = match &part {
+        Some(part) => part.solve(&system, points, method, stop, watch),
+        None => run_watched(&system, points, method, stop, watch),
+    };
+    solution.setup_seconds += seconds;
+    Ok(solution)
+}
+
+/// Refuses a mesh whose topology, operator and iterates memory has no room for. The numbers are measured.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub fn require_memory(mesh: &Mesh) -> Result<()> {
+    let corners = mesh.faces.corners().len();
+    // Lists of neighbours, where faces are not all of one size.
+    let mixed = if mesh.faces.uniform_size().is_none() { 24 } else { 0 };
+    let bytes = 64 * mesh.len() as u64 + (32 + mixed) * corners as u64;
+    require(bytes, || format!("the work on {} vertices and {corners} corners", mesh.len()), "use a smaller mesh")
+}
+
+/// Interpolation for points that move: the operator, the order of its rows and all arrays are kept from one set of points
+/// to the next.
+///
+/// ```
+/// use limitlab::interpolate::Interpolator;
+/// use limitlab::mesh::{Surface, builtin};
+/// use limitlab::schemes::Scheme;
+/// use limitlab::solvers::{Outcome, Stop};
+///
+/// let surface = Surface::new(builtin::builtin("icosphere:3")?)?;
+/// let mut interpolator = Interpolator::new(&surface, Scheme::Loop, None)?;
+/// let stop = Stop { tolerance: 1e-10, max_iterations: 1000 };
+/// let mut points = surface.positions().to_vec();
+/// let mut control = Vec::new();
+/// let cold = interpolator.solve(&points, &mut control, &stop);
+/// // A point moves: on from the control points that are there.
+/// points[5] *= 1.01;
+/// let warm = interpolator.solve(&points, &mut control, &stop);
+/// assert!(cold.outcome == Outcome::Converged && warm.outcome == Outcome::Converged);
+/// assert!(warm.iterations < cold.iterations);
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Interpolator {
+    operator: Operator,
+    /// The order of the rows, where that is not the surface's.
+    numbering: Option<Numbering>,
+    /// By row: those interpolated, where some are not.
+    free: Option<Vec<bool>>,
+    rows: Rows,
+    workspace: Workspace,
+    /// In the order of the rows, as far as they are needed: P, what A X has to be on some vertices, and the iterate.
+    points: Vec<DVec3>,
+    right: Vec<DVec3>,
+    iterate: Vec<DVec3>,
+}
+
+impl Interpolator {
+    /// For the faces of a surface, and all of its vertices or those marked. O(corners).
+    ///
+    /// # Errors
+    /// As [`Operator::new`]; no vertex marked.
+    ///
+    /// # Panics
+    /// If there is not one mark a vertex.
+    pub fn new(surface: &Surface, scheme: Scheme, interpolated: Option<&[bool]>) -> Result<Self> {
+        if let Some(marks) = interpolated {
+            assert_eq!(marks.len(), surface.len(), "one mark a vertex");
+            if !marks.contains(&true) {
+                return Err(nothing());
+            }
+        }
+        let (faces, incidence) = match surface.renumbered() {
+            Some(inside) => (&inside.faces, &inside.incidence),
+            None => (surface.faces(), surface.incidence()),
+        };
+        // Among mixed faces the search costs twice as much.
+        let few = scheme.usual_lambda_min() >= FEW && faces.uniform_size().is_none();
+        let rows = if surface.len() >= ORDERED && !few {
+            Some(in_fronts(faces, incidence))
+        } else {
+            in_kinds(faces, incidence)
+        };
+        let marks = interpolated.map(|marks| match surface.renumbered() {
+            Some(inside) => inside.numbering.there(marks),
+            None => marks.to_vec(),
+        });
+        let operator = Operator::inside(surface, scheme, rows.as_ref(), marks.as_deref())?;
+        let free = marks.map(|marks| rows.as_ref().map_or(marks.clone(), |rows| rows.there(&marks)));
+        let numbering = match (surface.renumbered(), rows) {
+            (Some(inside), Some(rows)) => Some(Numbering::new(rows.there(inside.numbering.order()))),
+            (Some(inside), None) => Some(inside.numbering.clone()),
+            (None, rows) => rows,
+        };
+        let workspace = Workspace::new(&operator);
+        let [points, right, iterate] = [const { Vec::new() }; 3];
+        Ok(Interpolator {
+            rows: Rows::new(surface.len()),
+            operator,
+            numbering,
+            free,
+            workspace,
+            points,
+            right,
+            iterate,
+        })
+    }
+
+    /// Solves `A V = P`, by the first two steps of the chain, for P = `points` from V = `control`, which becomes the
+    /// solution; an empty one stands for V = P. From the second set of points on no array of N points is allocated, unless
+    /// the second step is needed.
+    ///
+    /// # Panics
+    /// If there is not one point a vertex in both.
+    pub fn solve(&mut self, points: &[DVec3], control: &mut Vec<DVec3>, stop: &Stop) -> Report {
+        self.solve_into(points, control, stop).1
+    }
+
+    /// As [`solve`](Self::solve), with the name of the method that came to the end.
+    fn solve_into(&mut self, points: &[DVec3], control: &mut Vec<DVec3>, stop: &Stop) -> (&'static str, Report) {
+        let n = self.operator.len();
+        assert!(points.len() == n && (control.is_empty() || control.len() == n), "one point a vertex");
+        let cold = control.is_empty();
+        if self.numbering.is_none() && self.free.is_none() {
+            return chain(&self.operator, points, control, &mut self.workspace, stop);
+        }
+        let points: &[DVec3] = match &self.numbering {
+            Some(numbering) => {
+                self.points.resize(n, DVec3::ZERO);
+                numbering.there_into(points, &mut self.points);
+                &self.points
+            }
+            None => points,
+        };
+        match &self.numbering {
+            _ if cold => self.iterate.clear(),
+            Some(numbering) => {
+                self.iterate.resize(n, DVec3::ZERO);
+                numbering.there_into(control, &mut self.iterate);
+            }
+            None => self.iterate.clone_from(control),
+        }
+        let (method, mut report) = match &self.free {
+            None => chain(&self.operator, points, &mut self.iterate, &mut self.workspace, stop),
+            Some(free) => {
+                self.right.resize(n, DVec3::ZERO);
+                self.rows.residual(&self.operator, points, points, &mut self.right, |i, e, right, _| {
+                    *right = if free[i] { e } else { DVec3::ZERO };
+                });
+                if !cold {
+                    parallel::change(&mut self.iterate, |i, x| *x = if free[i] { *x - points[i] } else { DVec3::ZERO });
+                }
+                let found = chain(&self.operator, &self.right, &mut self.iterate, &mut self.workspace, stop);
+                parallel::change(&mut self.iterate, |i, x| *x += points[i]);
+                found
+            }
+        };
+        if let Some(free) = &self.free {
+            // The mean is that of the vertices in question.
+            let share = n as f64 / free.iter().filter(|free| **free).count() as f64;
+            report.history.iter_mut().for_each(|errors| errors.mean *= share);
+        }
+        match &self.numbering {
+            Some(numbering) => {
+                if cold {
+                    // Memory that is there already: fresh pages cost more than the copy.
+                    *control = std::mem::take(&mut self.points);
+                }
+                numbering.back_into(&self.iterate, control);
+            }
+            None => control.clone_from(&self.iterate),
+        }
+        (method, report)
+    }
+}
+
+/// The first two steps.
+fn chain(
+    operator: &Operator,
+    points: &[DVec3],
+    control: &mut Vec<DVec3>,
+    workspace: &mut Workspace,
+    stop: &Stop,
+) -> (&'static str, Report) {
+    let report = mixed::solve_from(operator, points, control, workspace, stop);
+    if !matches!(report.outcome, Outcome::Stagnated | Outcome::Diverged) {
+        return ("chebyshev", report);
+    }
+    let mut cg = ConjugateGradient::new(operator, points, Preconditioner::weights(operator));
+    let report = solve(&mut cg, stop, &mut |_| ControlFlow::Continue(()));
+    control.copy_from_slice(cg.points());
+    ("cg", report)
+}
