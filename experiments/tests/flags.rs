@@ -33,7 +33,7 @@ const ON_MESHES: &[Flag] = &[
 const STOP: &[Flag] =
     &[("--tol", "1e-3|1e-8|0.5|10|0|-1|nan"), ("--tol-absolute", "1e-3|1e-6|inf"), ("--max-iter", "0|1|50|-5")];
 const FOLDER: &[Flag] = &[("--out", "out|new/folder|closed.off|")];
-const METHODS: &str = "lu|jacobi,pia|sor,ssor,gauss-seidel|cg,pcg-ic0|pia,pia||no-such";
+const METHODS: &str = "lu|jacobi,pia|sor,ssor,gauss-seidel|cg,pcg-ic0|pia,pia||no-such|auto,cg";
 const ORDERS: &str = "file|reverse|bfs|rcm|morton|valence|multicolour|random:3|no-such";
 
 const PROGRAMS: &[Program] = &[

@@ -26,4 +26,4 @@ pub mod surface;
 pub mod thall;
 pub mod zheng_cai;
 
-pub use solver::{Interpolator, Options, Tolerance, interpolate, interpolate_watched};
+pub use solver::{Interpolator, Options, Tolerance, interpolate, interpolate_watched, solve_stored};

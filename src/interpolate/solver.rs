@@ -43,7 +43,7 @@ use crate::schemes::Scheme;
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::mixed::{self, Workspace};
 use crate::solvers::system::Rows;
-use crate::solvers::{Iterate, Method, Outcome, Report, Solution, Step, Stop, run_watched, solve};
+use crate::solvers::{Iterate, Method, Outcome, Report, Solution, Step, Stop, run, run_watched, solve};
 
 /// From this many vertices on, the rows of the operator are breadth first. Tuned.
 pub const ORDERED: usize = 200_000;
@@ -176,6 +176,15 @@ pub fn interpolate_watched(
     drop(interpolator);
     let direct = by_method(surface, scheme, marks, Method::Ldlt, &stop, watch)?;
     Ok(Solution { setup_seconds: setup_seconds + solve_seconds + direct.setup_seconds, ..direct })
+}
+
+/// The last two steps of the chain on a stored system of any origin: conjugate gradients, LDLᵀ where they make no progress.
+///
+/// # Panics
+/// If there is not one point a vertex.
+pub fn solve_stored(system: &LimitSystem, points: &[DVec3], stop: &Stop) -> Solution {
+    let found = run(system, points, Method::Cg, stop);
+    if no_progress(found.report.outcome) { run(system, points, Method::Ldlt, stop) } else { found }
 }
 
 /// Whether an iteration ended without getting nearer.

@@ -11,7 +11,7 @@ use limitlab::analysis::spectrum::spectrum;
 use limitlab::mesh::order::Order;
 use limitlab::solvers::Method;
 use limitlab_experiments::cli::{self, CommonFlags, List, MeshFlags, OutputFlags, Problem, Progress, StopFlags};
-use limitlab_experiments::studies::comparison as study;
+use limitlab_experiments::studies::comparison::{self as study, Asked};
 
 /// Runs every method on the same system from the same start V = P, and prints iterations, errors, observed and
 /// predicted rate, and the seconds of set-up and solve apart.
@@ -24,9 +24,9 @@ struct Arguments {
     /// Mesh files (.obj, .off, .ply), built-in names, or folders with M.mtx, H.mtx and P.mtx; torus:32x32 with --noise 0.1 unless told
     #[arg(value_name = "MESH|SYSTEM_DIR")]
     meshes: Vec<String>,
-    /// Methods, separated by commas; all unless told
+    /// Methods, separated by commas, auto among them; all unless told
     #[arg(long, value_name = "NAME,…")]
-    method: Option<List<Method<'static>>>,
+    method: Option<List<Asked>>,
     /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
@@ -80,16 +80,24 @@ fn run(arguments: &Arguments) -> Result<()> {
 /// The rows, their errors in the units of the files.
 fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<Row<'a>>> {
     let Problem { system, points, .. } = problem;
-    let methods = match &arguments.method {
+    let asked = match &arguments.method {
         Some(list) => list.0.clone(),
-        None => Method::ALL.to_vec(),
+        None => Method::ALL.into_iter().map(Asked::Method).chain([Asked::Auto]).collect(),
     };
+    let method = |asked: &Asked| if let Asked::Method(method) = *asked { Some(method) } else { None };
+    let methods: Vec<Method> = asked.iter().filter_map(method).collect();
+    let auto = asked.contains(&Asked::Auto);
     let spectrum = spectrum(system)?;
     let order_name = arguments.order.to_string();
     let lines = comparison::entries(system, &spectrum, &methods, Some(&problem.order), &order_name)?;
-    let progress = Progress::new(&problem.subject.name, lines.len(), arguments.common.quiet);
+    let count = lines.len() + usize::from(auto);
+    let progress = Progress::new(&problem.subject.name, count, arguments.common.quiet);
     let done = &mut || progress.step();
     let mut rows = comparison::compare(system, &spectrum, points, &lines, &[], &problem.stop, done)?;
+    if auto {
+        rows.push(study::auto_row(problem.auto()?));
+        progress.step();
+    }
     for errors in rows.iter_mut().flat_map(|row| &mut row.solution.report.history) {
         *errors = *errors * problem.scale;
     }

@@ -10,11 +10,13 @@ use super::{CommonFlags, Input, MeshFlags, StopFlags};
 use limitlab::assemble::LimitSystem;
 use limitlab::assemble::matrix_market::{self, is_missing};
 use limitlab::error::{Error, Result};
-use limitlab::mesh::diagonal;
+use limitlab::interpolate::{interpolate, solve_stored};
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::order::Order;
 use limitlab::mesh::validate::Boundary;
-use limitlab::solvers::Stop;
+use limitlab::mesh::{Surface, diagonal};
+use limitlab::schemes::Scheme;
+use limitlab::solvers::{Solution, Stop};
 
 /// What a program's results are about, in words and in JSON: a mesh under a scheme, or a folder.
 pub struct Subject {
@@ -89,11 +91,24 @@ pub struct Problem {
     pub stop: Stop,
     /// The order of in-place sweeps.
     pub order: Vec<u32>,
+    /// What the system is of, where it is that of a mesh.
+    pub surface: Option<(Surface, Scheme)>,
     /// Lengths in the units of the files are this many times those here.
     pub scale: f64,
 }
 
 impl Problem {
+    /// By `auto`: the whole chain on a mesh, conjugate gradients and LDLᵀ on a system without one.
+    ///
+    /// # Errors
+    /// As [`interpolate`].
+    pub fn auto(&self) -> Result<Solution> {
+        match &self.surface {
+            Some((surface, scheme)) => interpolate(surface, *scheme, &self.stop.into()),
+            None => Ok(solve_stored(&self.system, &self.points, &self.stop)),
+        }
+    }
+
     /// The diagonal of the bounding box of the points.
     pub fn diagonal(&self) -> f64 {
         diagonal(&self.points)
@@ -149,7 +164,7 @@ impl MeshFlags {
     /// # Errors
     /// As these two; a relative tolerance where all points coincide; an order by a mesh that is not there.
     pub fn problem(&self, name: &str, stop: &StopFlags, order: Order, common: &CommonFlags) -> Result<Problem> {
-        let Some(given) = self.given(name)? else { return of_mesh(&self.input(name, common)?, stop, order) };
+        let Some(given) = self.given(name)? else { return of_mesh(self.input(name, common)?, stop, order) };
         let Some(numbers) = order.of_numbers(given.system.len()) else {
             return Err(Error::mesh(
                 name,
@@ -161,6 +176,7 @@ impl MeshFlags {
         Ok(Problem {
             stop: given.stop(stop)?,
             order: numbers,
+            surface: None,
             scale: given.frame.scale(),
             subject: given.subject,
             system: given.system,
@@ -169,7 +185,7 @@ impl MeshFlags {
     }
 }
 
-fn of_mesh(input: &Input, stop: &StopFlags, order: Order) -> Result<Problem> {
+fn of_mesh(input: Input, stop: &StopFlags, order: Order) -> Result<Problem> {
     Ok(Problem {
         stop: input.stop(stop)?,
         subject: input.subject(),
@@ -177,5 +193,6 @@ fn of_mesh(input: &Input, stop: &StopFlags, order: Order) -> Result<Problem> {
         points: input.surface.positions().to_vec(),
         order: order.order(input.surface.mesh(), input.surface.incidence()),
         scale: input.frame.scale(),
+        surface: Some((input.surface, input.scheme)),
     })
 }

@@ -1,10 +1,48 @@
 //! The table, the picture and the JSON rows of a comparison of methods.
 
+use std::str::FromStr;
+
 use serde_json::{Value, json};
 
 use crate::cli::number;
 use crate::report::{Column, Figure, LinePlot, Scale, Series, Table};
 use limitlab::analysis::comparison::Row;
+use limitlab::analysis::own::Named;
+use limitlab::solvers::{Method, Solution};
+use limitlab::{Error, Result};
+
+/// A method that may be asked for, or the chain that chooses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Asked {
+    Auto,
+    Method(Method<'static>),
+}
+
+impl FromStr for Asked {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        match name {
+            AUTO => Ok(Asked::Auto),
+            _ => name.parse().map(Asked::Method).map_err(|e: Error| Error::Unknown(format!("{e}, {AUTO}"))),
+        }
+    }
+}
+
+const AUTO: &str = "auto";
+
+/// The row of `auto`, whose parameter is the method that came to the end. Its history has an entry for each correction, so
+/// that no rate is observed.
+pub fn auto_row(solution: Solution) -> Row<'static> {
+    Row {
+        method: Named::Own(AUTO.into()),
+        variant: "",
+        parameter: solution.method.into(),
+        solution,
+        observed_rate: None,
+        predicted_rate: None,
+    }
+}
 
 /// One row a method; `about` says which system, start and tolerance. What an outcome has for a reason is a note.
 pub fn table(id: String, title: String, about: String, rows: &[Row]) -> Table {
@@ -55,7 +93,10 @@ pub fn table(id: String, title: String, about: String, rows: &[Row]) -> Table {
 pub fn figure(title: String, unit: &str, rows: &[Row]) -> Figure {
     let series = rows
         .iter()
-        .filter(|row| !row.method.is_direct())
+        // A history by corrections has no place over iterations.
+        .filter(|row| {
+            !row.method.is_direct() && row.solution.report.history.len() == row.solution.report.iterations + 1
+        })
         .map(|row| {
             let name = match row.parameter.as_str() {
                 "" => row.method.to_string(),

@@ -3,10 +3,11 @@
 use limitlab::Result;
 use limitlab::analysis::comparison::entries;
 use limitlab::analysis::spectrum::spectrum;
+use limitlab::interpolate::interpolate;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::anderson::WINDOW;
 use limitlab::solvers::method::{SOR_OMEGA, SSOR_OMEGA};
-use limitlab::solvers::{Method, Stop, run as solve};
+use limitlab::solvers::{Method, Outcome, Stop, run as solve};
 use limitlab_experiments::report::{Cell, Column, Figure, LinePlot, Scale, Series, Table};
 
 use crate::context::{Context, Item, Subject};
@@ -83,6 +84,7 @@ fn empty_tables() -> Vec<Table> {
         .map(|tolerance| {
             let mut columns = vec![Column::key("mesh"), Column::key("scheme"), Column::text("vertices")];
             columns.extend(COLUMNS.map(|(method, variant)| Column::count(column_name(method, variant))));
+            columns.push(Column::count("auto"));
             let mut table = Table::new(
                 format!("{}--{tolerance:e}", ALL.id),
                 format!("Iterations of every method to {tolerance:e}"),
@@ -92,7 +94,8 @@ fn empty_tables() -> Vec<Table> {
                 "Updates of all vertices until max_i ‖p_i − (A v)_i‖ ≤ {tolerance:e} of the bounding box's diagonal; \
                  start V = P, file order for in-place sweeps, at most {LIMIT} iterations. A direct method makes one: \
                  the solve. jacobi and w-pia run at their best ω, sor at ω = {SOR_OMEGA}, ssor and pcg-ssor at \
-                 {SSOR_OMEGA}; anderson keeps {WINDOW} differences, heavy-ball has an estimated interval. Where the tolerance was not reached, the cell says how the run ended. Meshes of at \
+                 {SSOR_OMEGA}; anderson keeps {WINDOW} differences, heavy-ball has an estimated interval; auto counts the \
+                 iterations of all corrections in mixed precision together. Where the tolerance was not reached, the cell says how the run ended. Meshes of at \
                  most {LARGEST} vertices."
             ));
             table
@@ -137,6 +140,14 @@ fn one(context: &Context, subject: &Subject, scheme: Scheme, tables: &mut [Table
             let name = format!("{} ({})", line.method, line.parameter);
             series.push(Series::history(name, errors));
         }
+    }
+    for (row, tolerance) in rows.iter_mut().zip(TOLERANCES) {
+        let stop = Stop { tolerance: tolerance * size, max_iterations: LIMIT };
+        let report = interpolate(&subject.surface, scheme, &stop.into())?.report;
+        row.push(match report.outcome {
+            Outcome::Converged => report.iterations.into(),
+            other => other.name().into(),
+        });
     }
     for (table, row) in tables.iter_mut().zip(rows) {
         table.push(row);
