@@ -1,38 +1,92 @@
 //! The one error type of the library: each message is a single line that names the place and a way out.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crate::memory::megabytes;
 use crate::mesh::validate::Validation;
 
 /// What data or the machine can do to a computation. Broken contracts of the library panic instead.
-#[derive(Debug, thiserror::Error)]
+///
+/// Both formats are the one line, so that a `main` that returns an error prints what a person can use.
+#[derive(thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The operating system refused: opening, reading, writing, renaming.
     #[error("{}: cannot {action}: {source}", path.display())]
     Io {
+        /// The file or folder.
         path: PathBuf,
         /// What was tried, as a verb phrase: "read", "create the folder".
         action: &'static str,
+        /// The operating system's own error.
         source: std::io::Error,
     },
     /// A file's text or bytes are not what its format says, at a line where there is one.
     #[error("{}{}: {what}", path.display(), at_line(*line))]
-    Parse { path: PathBuf, line: Option<usize>, what: String },
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1; `None` where the place is not a line.
+        line: Option<usize>,
+        /// What is wrong there, as the rest of the message.
+        what: String,
+    },
     /// A mesh with defects: all of them.
     #[error("{}", .0.summary_line())]
     Defects(Box<Validation>),
-    /// A mesh that was read but cannot be used: defects, a scheme that refuses it, a boundary.
+    /// The first face that is no triangle, under a scheme that is defined on these alone.
+    #[error("face {face} has {corners} corners, and {scheme} is defined on triangles only; triangulate the mesh")]
+    NotTriangles {
+        /// The number of the face, from 0.
+        face: usize,
+        /// How many corners it has.
+        corners: usize,
+        /// The scheme or the refinement by name.
+        scheme: &'static str,
+    },
+    /// A boundary, where whole faces around every vertex are needed.
+    #[error("{edges} boundary edges, and {scheme} needs whole faces around every vertex; close the holes")]
+    Open {
+        /// The number of boundary edges.
+        edges: usize,
+        /// The scheme by name, or what else needs a closed mesh.
+        scheme: &'static str,
+    },
+    /// A result that 32-bit indices do not reach.
+    #[error("{what}, which 32-bit indices do not reach; {advice}")]
+    TooLarge {
+        /// The result and its size, as a clause.
+        what: String,
+        /// A way out, as an imperative.
+        advice: &'static str,
+    },
+    /// Normals or shape handles, which act on a refined surface.
+    #[error("{what} a surface after {needed} refinements or more")]
+    TooFewLevels {
+        /// What acts on the surface, with its verb, as the start of the message.
+        what: &'static str,
+        /// The least number of refinements.
+        needed: usize,
+    },
+    /// A mesh that was read but cannot be used, by name, or given data about its vertices.
     #[error("{mesh}: {what}")]
-    Mesh { mesh: String, what: String },
+    Mesh {
+        /// The name of the mesh, or of the data about its vertices.
+        mesh: String,
+        /// What is wrong, with the place and a way out.
+        what: String,
+    },
     /// A computation that needs more memory than is available: found before the work.
     #[error("{what} needs {} of memory, of which {} are available; {advice}", megabytes(*needed), megabytes(*available))]
     Memory {
+        /// The computation, as the subject of a sentence.
         what: String,
         /// Bytes.
         needed: u64,
         /// Bytes.
         available: u64,
+        /// A way out, as an imperative.
         advice: &'static str,
     },
     /// A matrix of somebody else that cannot be taken over: not square, unsorted, too large, not symmetric, no positive
@@ -64,6 +118,12 @@ impl Error {
     /// An [`Error::Mesh`] about the mesh called `mesh`.
     pub fn mesh(mesh: impl Into<String>, what: impl Into<String>) -> Self {
         Error::Mesh { mesh: mesh.into(), what: what.into() }
+    }
+}
+
+impl fmt::Debug for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
     }
 }
 

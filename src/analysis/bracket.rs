@@ -82,8 +82,11 @@ pub struct Bracket {
     /// What was computed: rings of faces around the exceptional vertices, patches, kinds of them, vertices of all
     /// kinds together.
     pub rings: usize,
+    /// Disjoint patches, each around one exceptional vertex or several close to each other.
     pub patches: usize,
+    /// Kinds of patches; those that a renumbering maps onto each other are of one kind.
     pub kinds: usize,
+    /// Vertices of one patch of each kind, added up.
     pub vertices: usize,
 }
 

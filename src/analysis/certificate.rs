@@ -95,6 +95,7 @@ pub fn certify(system: &LimitSystem, operator: Operator, end: End, estimate: f64
 /// How many eigenvalues lie below a shift.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inertia {
+    /// Eigenvalues less than the shift σ, with multiplicity.
     pub below: usize,
     /// max ‖(LDLᵀ − (S − σ))x‖/‖x‖ over random x: what the count is a count of is S perturbed by a matrix of about
     /// this norm.

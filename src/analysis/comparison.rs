@@ -18,19 +18,24 @@ use crate::solvers::{Accelerated, Method, Solution, Stop, run};
 /// A method with its parameter in words: a line of a comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry<'a> {
+    /// With its open parameters set, as by [`with_spectrum`].
     pub method: Method<'a>,
     /// Which of the method's lines it is, without numbers.
     pub variant: &'static str,
+    /// Its numbers, the order it sweeps in and its variant, separated by commas; may be empty.
     pub parameter: String,
 }
 
 /// What came of it.
 #[derive(Clone, Debug)]
 pub struct Row<'a> {
+    /// One of the methods here, or of the caller's own.
     pub method: Named<'a>,
     /// Empty for methods of the caller's own.
     pub variant: &'static str,
+    /// As in the [`Entry`], or as the caller's own method tells it.
     pub parameter: String,
+    /// Control points, history of errors and times of the run from V = P.
     pub solution: Solution,
     /// Factor per iteration fitted to the history's tail; `None` for direct methods and short histories.
     pub observed_rate: Option<f64>,

@@ -14,7 +14,9 @@ pub const LARGEST: usize = 600;
 /// All eigenvalues of A and of D⁻¹A, ascending. Both matrices are similar to symmetric ones, so all are real.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Eigenvalues {
+    /// The N eigenvalues of A.
     pub a: Vec<f64>,
+    /// The N eigenvalues of D⁻¹A.
     pub jacobi: Vec<f64>,
 }
 

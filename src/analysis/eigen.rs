@@ -43,13 +43,16 @@ const MEMORY: usize = 4 << 30;
 /// Which end of the spectrum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
+    /// The least eigenvalue and those next above it.
     Lowest,
+    /// The greatest eigenvalue and those next below it.
     Highest,
 }
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug)]
 pub struct Request {
+    /// The end to count from, inwards.
     pub end: End,
     /// Eigenpairs, counted with multiplicity.
     pub count: usize,
@@ -62,6 +65,7 @@ pub struct Request {
 /// An approximate eigenvalue with what is known of its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eigenvalue {
+    /// A Ritz value of S, or a computed eigenvalue where the computation was dense.
     pub value: f64,
     /// ‖S x − λ x‖₂ of the unit vector x: an eigenvalue lies within this distance (proven).
     pub residual: f64,
@@ -73,6 +77,7 @@ pub struct Eigenvalue {
 /// Eigenpairs from the asked end inwards.
 #[derive(Clone, Debug)]
 pub struct Eigenpairs {
+    /// As many as were asked for, multiple ones repeated, the extreme one first.
     pub values: Vec<Eigenvalue>,
     /// The unit vectors, one after the other.
     pub vectors: Vec<Vec<f64>>,
@@ -85,7 +90,9 @@ pub struct Eigenpairs {
 /// Values that count as one eigenvalue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cluster {
+    /// The one nearest to the end of the spectrum.
     pub value: f64,
+    /// Computed values in the cluster; there may be more unless it is `complete`.
     pub multiplicity: usize,
     /// The last cluster may go on beyond what was computed.
     pub complete: bool,

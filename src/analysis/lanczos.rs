@@ -16,6 +16,7 @@ use crate::solvers::system::{STRIP, System};
 /// A Ritz value with what is known of its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ritz {
+    /// θ, an eigenvalue of the projected tridiagonal matrix; within the spectrum but for rounding.
     pub value: f64,
     /// ‖S x − λ x‖₂ of its unit Ritz vector x: an eigenvalue lies within this distance.
     pub residual: f64,
@@ -34,6 +35,7 @@ pub struct Limits {
     /// T|θ| while the steps grew by an eighth, and at least eight. (The residual keeps a group of nearly equal
     /// values, which the error estimate takes for one, from passing as its mean.)
     pub tolerance: f64,
+    /// Lanczos steps at most, of one product with S each.
     pub max_steps: usize,
     /// Ritz values in which the start takes part with less weight do not count.
     pub least_weight: f64,
@@ -44,15 +46,20 @@ pub struct Limits {
 /// The ends that a process waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
+    /// The least eigenvalue alone.
     Lowest,
+    /// The greatest eigenvalue alone.
     Highest,
+    /// The least and the greatest eigenvalue.
     Both,
 }
 
 /// The result of a Lanczos process.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Run {
+    /// The least Ritz value of sufficient weight.
     pub low: Ritz,
+    /// The greatest Ritz value of sufficient weight.
     pub high: Ritz,
     /// Products with S.
     pub steps: usize,
@@ -67,8 +74,10 @@ const NEIGHBOURS: usize = 24;
 
 /// A matrix B that is self-adjoint in the inner product `Σ g_i x_i y_i`.
 pub trait SelfAdjoint: Sync {
+    /// The order N of the matrix.
     fn len(&self) -> usize;
 
+    /// Whether the matrix has no rows.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -103,7 +112,9 @@ impl SelfAdjoint for Csr {
 /// A, self-adjoint with the weights 1/h_i, or D⁻¹A, with m_ii = a_ii/h_i.
 #[derive(Debug)]
 pub struct Matrix<'a, T> {
+    /// Gives the products with A, the diagonal of A and the weights h_i.
     pub system: &'a T,
+    /// Whether the matrix is A or D⁻¹A.
     pub which: Which,
 }
 

@@ -1,12 +1,12 @@
 //! Why a method converges, stalls or fails: spectra, predicted and observed rates, ω sweeps.
 //! This room knows no plotting.
 
-pub mod advice;
 pub mod bracket;
 pub mod certificate;
 pub mod comparison;
 pub mod dense;
 pub mod eigen;
+pub mod failed;
 pub mod interval;
 pub mod lanczos;
 pub mod lines;

@@ -37,13 +37,17 @@ use crate::solvers::{Outcome, Stop, System, solve};
 /// One order, or the summary of the random ones, at one ω.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
+    /// The order as on the command line, such as `random:3`; `greedy` for Gauss-Southwell.
     pub order: String,
+    /// The relaxation factor; 1 is Gauss-Seidel.
     pub omega: f64,
     /// The spectral radius of the error matrix; `None` for the greedy method, which has none.
     pub rho: Option<f64>,
+    /// How the run from V = P ended.
     pub outcome: Outcome,
     /// Sweeps; for the greedy method, updates over N.
     pub iterations: f64,
+    /// max_i ‖p_i − (A v)_i‖₂ at the end, in mesh units.
     pub max_error: f64,
 }
 
@@ -105,10 +109,13 @@ pub fn order_study(
 /// How far the rows of random orders spread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
+    /// The relaxation factor of these rows.
     pub omega: f64,
+    /// The number of random orders, at least 1.
     pub runs: usize,
     /// Least, mean, greatest.
     pub rho: [f64; 3],
+    /// Sweeps: least, mean, greatest.
     pub iterations: [f64; 3],
 }
 
@@ -134,9 +141,11 @@ pub fn random_spread(rows: &[Row], omega: f64) -> Option<Spread> {
 /// The result of a greedy run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Greedy {
+    /// The control points V at the end.
     pub points: Vec<DVec3>,
     /// Updates of single vertices.
     pub updates: usize,
+    /// Converged, diverged, or stopped by the limit on updates.
     pub outcome: Outcome,
     /// Of the true residual at the end.
     pub max_error: f64,

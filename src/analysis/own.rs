@@ -41,9 +41,11 @@ pub type Start<'s> =
 /// ```
 #[derive(Clone)]
 pub struct Own<'s> {
+    /// What the method is called in reports.
     pub name: String,
     /// What else its row says: numbers, variants; may be empty.
     pub parameter: String,
+    /// Makes the iteration; its time counts as set-up.
     pub start: Start<'s>,
 }
 
@@ -152,6 +154,7 @@ pub enum Named<'a> {
 }
 
 impl Named<'_> {
+    /// The name of the method, or the one that the caller gave.
     pub fn name(&self) -> &str {
         match self {
             Named::Ours(method) => method.name(),

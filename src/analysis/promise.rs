@@ -26,13 +26,18 @@ pub struct Promise {
 /// Iterations after which max_i ‖e_i‖₂ is at most the tolerance, by proof; infinite where the bound for λ_min is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counts {
+    /// PIA, which is ω = 1.
     pub pia: f64,
+    /// W-PIA at [`Promise::omega_w_pia`].
     pub w_pia: f64,
+    /// Thall's iteration, damped Jacobi at ω = ½.
     pub thall: f64,
+    /// Chebyshev iteration on the proven interval of A.
     pub chebyshev: f64,
 }
 
 impl Promise {
+    /// What these bounds imply, by arithmetic alone.
     pub fn new(b: &SpectralBounds) -> Self {
         let a = Extremes { min: b.lambda_min, max: b.lambda_max };
         let jacobi = Extremes { min: b.jacobi_lambda_min, max: b.jacobi_lambda_max };

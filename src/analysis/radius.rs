@@ -28,6 +28,7 @@ const DENSE: usize = 300;
 /// A spectral radius with what is known of its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpectralRadius {
+    /// The largest modulus of an eigenvalue, a factor per iteration; infinite if an iterate overflows.
     pub value: f64,
     /// ‖E x − μ x‖ of the unit Ritz vector of the dominant μ; the error of |μ| is of this size times the eigenvalue's
     /// condition (the matrix is not normal). Rounding level where the computation was dense.

@@ -20,7 +20,9 @@ use crate::solvers::{Accelerated, Method};
 /// A component on which A is singular.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SingularComponent {
+    /// The least number of its vertices.
     pub first_vertex: usize,
+    /// How many vertices it has.
     pub vertices: usize,
     /// The mean of ±p_i over the component, signed by the colouring: the constant part of the error that no control
     /// points can remove. In mesh units.
@@ -34,6 +36,7 @@ pub struct Singularity {
     pub set: SingularSet,
     /// Connected components of the mesh.
     pub components: usize,
+    /// Components on which A is singular, by first vertex; one null vector each.
     pub singular: Vec<SingularComponent>,
     /// The null vectors, all in one: ±1 on singular components, 0 elsewhere. Restricted to one component it is
     /// that component's null vector, of A and of D⁻¹A.
@@ -58,6 +61,7 @@ pub enum Prediction {
 }
 
 impl Prediction {
+    /// What the method does, in words.
     pub fn name(self) -> &'static str {
         match self {
             Prediction::Converges => "converges",
@@ -120,6 +124,7 @@ impl Singularity {
         self.singular.len()
     }
 
+    /// Whether A has a null vector.
     pub fn is_singular(&self) -> bool {
         !self.singular.is_empty()
     }
@@ -212,6 +217,7 @@ pub fn numerical_kernel_dimension(system: &LimitSystem) -> Result<usize> {
 /// A slow mode: an eigenvector of A or D⁻¹A at an end of the spectrum.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mode {
+    /// The eigenvalue of A or D⁻¹A, with its error.
     pub eigenvalue: Eigenvalue,
     /// The eigenvector at the vertices, of largest entry 1: what a control net's error looks like.
     pub values: Vec<f64>,

@@ -23,7 +23,9 @@ use crate::solvers::system::Rows;
 /// The smallest and the largest eigenvalue of a matrix with a real spectrum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extremes {
+    /// λ_min; for a singular matrix rounding may make it slightly negative.
     pub min: f64,
+    /// λ_max.
     pub max: f64,
 }
 
@@ -62,7 +64,9 @@ impl Extremes {
 /// The ends of the spectra of A and of D⁻¹A.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spectrum {
+    /// Of A, which decides PIA, Chebyshev, the heavy ball and conjugate gradients.
     pub a: Extremes,
+    /// Of D⁻¹A, D = diag A, which decides Jacobi relaxation and preconditioning by the diagonal.
     pub jacobi: Extremes,
 }
 
@@ -89,12 +93,15 @@ const EXCITED: f64 = 1e-20;
 /// An end of a spectrum and how well it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
+    /// The computed eigenvalue.
     pub value: f64,
     /// ‖S x − λ x‖₂ of a unit vector x: an eigenvalue lies within this distance of the value.
     pub residual: f64,
     /// The estimated error of the value as the end of the spectrum.
     pub error: f64,
+    /// How it was found, and so how far to trust it.
     pub source: Source,
+    /// `None` where it was not decided.
     pub multiplicity: Option<Multiplicity>,
 }
 
@@ -102,6 +109,7 @@ pub struct Estimate {
 /// proof, or by counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Multiplicity {
+    /// Equal eigenvalues at the end of the spectrum.
     pub count: usize,
     /// What counts as equal: relative to the value.
     pub within: f64,
@@ -123,6 +131,7 @@ pub enum Source {
 }
 
 impl Source {
+    /// One word in lower case, for output.
     pub fn name(self) -> &'static str {
         match self {
             Source::Dense => "dense",
@@ -137,9 +146,13 @@ impl Source {
 /// The four ends of the spectra of A and D⁻¹A.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ends {
+    /// The least eigenvalue of A.
     pub lambda_min: Estimate,
+    /// The greatest eigenvalue of A.
     pub lambda_max: Estimate,
+    /// The least eigenvalue of D⁻¹A.
     pub jacobi_lambda_min: Estimate,
+    /// The greatest eigenvalue of D⁻¹A.
     pub jacobi_lambda_max: Estimate,
     /// Products of a matrix with one vector; 0 where all was dense.
     pub applications: usize,
@@ -164,6 +177,7 @@ impl Ends {
         ]
     }
 
+    /// Whether no end is [`Source::Unconverged`].
     pub fn converged(&self) -> bool {
         [self.lambda_min, self.lambda_max, self.jacobi_lambda_min, self.jacobi_lambda_max]
             .iter()

@@ -15,9 +15,13 @@ use crate::solvers::{Errors, Method, Outcome, Stop, run};
 /// A method at one ω.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
+    /// As given with the grid; what ran is this method at `omega`.
     pub method: Method<'static>,
+    /// The relaxation factor.
     pub omega: f64,
+    /// How the run from V = P ended.
     pub outcome: Outcome,
+    /// Updates of all vertices made.
     pub iterations: usize,
     /// The spectral radius of the error matrix.
     pub predicted_rho: f64,
@@ -32,16 +36,22 @@ pub struct Row {
 /// The thresholds of one relaxation: of the matrix (for every start) and of the data (for V₀ = P).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
+    /// Jacobi, Thall, PIA or W-PIA, as given with the grid.
     pub method: Method<'static>,
+    /// The ends of the spectrum of D⁻¹A for Jacobi and Thall, of A for PIA and W-PIA.
     pub matrix: Extremes,
+    /// The same of the part of the spectrum that the data excite; `None` if V = P is the solution.
     pub data: Option<Extremes>,
 }
 
 /// A sweep's result on one system.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
+    /// The ends of the spectra of A and D⁻¹A.
     pub spectrum: Spectrum,
+    /// In the order of the grids; SOR has none.
     pub thresholds: Vec<Thresholds>,
+    /// In the order of the grids; fewer than asked for while the sweep runs.
     pub rows: Vec<Row>,
 }
 

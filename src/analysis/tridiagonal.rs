@@ -4,14 +4,18 @@
 /// T with the diagonal `alphas` and the off-diagonal `betas`, one shorter.
 #[derive(Clone, Copy, Debug)]
 pub struct Tridiagonal<'a> {
+    /// k ≥ 1 diagonal entries.
     pub alphas: &'a [f64],
+    /// k − 1 off-diagonal entries.
     pub betas: &'a [f64],
 }
 
 /// The two ends of a unit eigenvector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VectorEnds {
+    /// Its square is the weight of the start vector where T comes from a Lanczos process.
     pub first: f64,
+    /// Its modulus times the next β is the residual of the Ritz value there.
     pub last: f64,
 }
 

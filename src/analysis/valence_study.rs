@@ -19,7 +19,9 @@ use crate::schemes::Scheme;
 /// The spectra of infinite regular meshes: A and D⁻¹A of valence 4 in quads or 6 in triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
+    /// The least and the greatest value of the symbol of A; the greatest is 1.
     pub a: (f64, f64),
+    /// The same of D⁻¹A: those of A over its constant diagonal entry.
     pub jacobi: (f64, f64),
 }
 
@@ -32,13 +34,17 @@ pub fn regular_band(scheme: Scheme) -> Band {
 /// What one valence does.
 #[derive(Clone, Debug)]
 pub struct Row {
+    /// The valence of the two extraordinary vertices of the [`star_mesh`].
     pub valence: usize,
+    /// The number of vertices N of that mesh.
     pub vertices: usize,
     /// All eigenvalues, ascending: for histograms.
     pub a: Vec<f64>,
+    /// The same of D⁻¹A.
     pub jacobi: Vec<f64>,
     /// Eigenvalues outside the regular band by more than 1e-9.
     pub separated_a: usize,
+    /// The same of D⁻¹A, outside its band.
     pub separated_jacobi: usize,
     /// The mode of the least eigenvalue of A, which slows PIA.
     pub slow_pia: Located,
@@ -51,11 +57,13 @@ pub struct Row {
 /// A mode, and where it lives.
 #[derive(Clone, Debug)]
 pub struct Located {
+    /// Its eigenvalue and eigenvector.
     pub mode: Mode,
     /// The part of Σx² (of the error itself) at the two extraordinary vertices and the vertices of their faces.
     pub near_star: f64,
     /// The vertex of the largest entry and its valence.
     pub peak: usize,
+    /// The valence of `peak`.
     pub peak_valence: usize,
 }
 

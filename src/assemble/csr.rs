@@ -36,26 +36,32 @@ impl Pattern {
         pattern
     }
 
+    /// The number of rows N.
     pub fn len(&self) -> usize {
         self.offsets.len() - 1
     }
 
+    /// Whether there are no rows.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
+    /// Where the entries of row `i` lie in [`columns`](Self::columns) and in the values of a matrix.
     pub fn range(&self, i: usize) -> std::ops::Range<usize> {
         self.offsets[i] as usize..self.offsets[i + 1] as usize
     }
 
+    /// The columns of row `i`, ascending.
     pub fn row(&self, i: usize) -> &[u32] {
         &self.columns[self.range(i)]
     }
 
+    /// Where each row starts in [`columns`](Self::columns), and the end: N + 1 numbers.
     pub fn offsets(&self) -> &[u32] {
         &self.offsets
     }
 
+    /// The columns of all entries, row after row.
     pub fn columns(&self) -> &[u32] {
         &self.columns
     }
@@ -106,18 +112,22 @@ impl Csr {
         self.pattern.len()
     }
 
+    /// Whether there are no rows.
     pub fn is_empty(&self) -> bool {
         self.pattern.is_empty()
     }
 
+    /// Which entries are stored.
     pub fn pattern(&self) -> &Pattern {
         &self.pattern
     }
 
+    /// The values of all stored entries, row after row.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
+    /// The values of row `i`, in ascending order of columns.
     pub fn row_values(&self, i: usize) -> &[f64] {
         &self.values[self.pattern.range(i)]
     }

@@ -130,6 +130,7 @@ impl Operator {
         self.stencil.codes.rows()
     }
 
+    /// Whether there are no vertices.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -183,10 +183,10 @@ impl<'a> Rows<'a> {
         let mut lengths = self.greatest_lengths();
         let total: u64 = lengths.iter().map(|&l| u64::from(l)).sum();
         if u32::try_from(total).is_err() {
-            return Err(Error::Computation(format!(
-                "the matrix would have {total} entries, more than 32-bit indices reach; use a smaller mesh or one \
-                 without very large faces"
-            )));
+            return Err(Error::TooLarge {
+                what: format!("the matrix would have {total} entries"),
+                advice: "use a smaller mesh or one without very large faces",
+            });
         }
         // A column and a value of M and of A each, and numbers for every row.
         let bytes = total * 20 + lengths.len() as u64 * 24;

@@ -125,10 +125,9 @@ impl<'a> Source<'a> {
                 Kind::Edges => *n,
                 Kind::Polygons => among_polygons * n,
             };
-            end = end.checked_add(length).ok_or_else(|| {
-                Error::Computation(
-                    "the operator would have more neighbours than 32-bit indices reach; use a smaller mesh".into(),
-                )
+            end = end.checked_add(length).ok_or_else(|| Error::TooLarge {
+                what: "the operator would have more than 2³² − 1 neighbours".into(),
+                advice: "use a smaller mesh",
             })?;
             offsets.push(end);
         }

@@ -11,11 +11,14 @@ use super::polygons::Polygons;
 /// What an operator acts on: three right-hand sides of one vertex, interleaved, in doubles (24 bytes) or singles
 /// (16 bytes, one vector register); or a single one, for eigenvectors.
 pub trait Point: Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + AddAssign {
+    /// The neutral element of the sum.
     const ZERO: Self;
     /// A weight as the kernel multiplies by it.
     type Weight: Copy + Send + Sync;
 
+    /// A weight in the precision of the kernel.
     fn weight(w: f64) -> Self::Weight;
+    /// The point, or number, times a weight.
     fn times(self, w: Self::Weight) -> Self;
     /// The weights by valence in this precision.
     fn rings(stencil: &Stencil) -> &Rings<Self::Weight>;

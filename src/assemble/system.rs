@@ -10,7 +10,7 @@ use super::rows::Rows;
 use crate::error::{Error, Result};
 use crate::mesh::{Faces, Surface};
 use crate::parallel;
-use crate::schemes::{Masks, Scheme, SingularSet};
+use crate::schemes::{Masks, Scheme};
 
 /// The limit system `A V = P` of one mesh: `A = H·M` explicitly, with both factors.
 ///
@@ -91,6 +91,7 @@ impl LimitSystem {
         self.h.len()
     }
 
+    /// Whether there are no vertices.
     pub fn is_empty(&self) -> bool {
         self.h.is_empty()
     }
@@ -107,36 +108,14 @@ impl LimitSystem {
 
 /// Refuses faces and boundaries that `scheme` is not defined on.
 pub(super) fn check(surface: &Surface, scheme: Scheme) -> Result<()> {
-    let (faces, open) = (surface.faces(), !surface.is_closed());
-    if let Some(f) = scheme.first_unsuitable_face(faces) {
-        // On an open mesh no other scheme would do.
-        return Err(Error::Computation(format!(
-            "face {f} has {} corners, and the scheme {scheme} is defined on triangles only; triangulate the mesh{}",
-            faces.face(f).len(),
-            if open { String::new() } else { format!(" or use --scheme {}", names(|s| !s.needs_triangles())) }
-        )));
+    let faces = surface.faces();
+    if let Some(face) = scheme.first_unsuitable_face(faces) {
+        return Err(Error::NotTriangles { face, corners: faces.face(face).len(), scheme: scheme.name() });
     }
-    if open && !scheme.edges_only() {
-        let triangles = faces.uniform_size() == Some(3);
-        return Err(Error::Computation(format!(
-            "{} boundary edges, and the masks of {scheme} need whole faces around every vertex; close the holes{}",
-            surface.boundary_edges(),
-            match names(|s| triangles && s.edges_only() && s.singular_set() == SingularSet::Never) {
-                none if none.is_empty() => none,
-                names => format!(", or use --boundary as-interior with --scheme {names}"),
-            }
-        )));
+    if !surface.is_closed() && !scheme.edges_only() {
+        return Err(Error::Open { edges: surface.boundary_edges(), scheme: scheme.name() });
     }
     Ok(())
-}
-
-/// The names of some schemes, to choose one from.
-fn names(which: impl Fn(Scheme) -> bool) -> String {
-    let names: Vec<&str> = Scheme::ALL.into_iter().filter(|&s| which(s)).map(Scheme::name).collect();
-    match names.split_last() {
-        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
-        _ => names.concat(),
-    }
 }
 
 /// The number of edges at every vertex: the valence n of the masks, on a boundary too.

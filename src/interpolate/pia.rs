@@ -9,6 +9,7 @@ use crate::solvers::{Errors, Method, Outcome, Stop, run};
 /// A run of the paper's algorithm, counted as its Table 1 counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passes {
+    /// How the run ended: converged if the errors got within the tolerance in time.
     pub outcome: Outcome,
     /// Updates of all vertices made.
     pub updates: usize,

@@ -29,8 +29,8 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::subset::{Restriction, nothing};
-use crate::analysis::advice::Failed;
 use crate::analysis::comparison::with_spectrum;
+use crate::analysis::failed::Failed;
 use crate::analysis::spectrum::spectrum;
 use crate::assemble::{LimitSystem, Operator};
 use crate::error::{Error, Result};
@@ -73,6 +73,7 @@ pub struct Options<'a> {
     pub method: Option<Method<'a>>,
     /// max_i ‖p_i − (A v)_i‖₂ at the end.
     pub tolerance: Tolerance,
+    /// The most iterations of each method that is tried.
     pub max_iterations: usize,
     /// One mark a vertex: those interpolated. The other control points stay at their points. All unless told.
     pub interpolated: Option<&'a [bool]>,
@@ -169,7 +170,7 @@ pub fn interpolate_watched(
     let (method, report) = interpolator.solve_into(surface.positions(), &mut points, &stop);
     let solve_seconds = start.elapsed().as_secs_f64();
     let found = Solution { points, method, report, setup_seconds, solve_seconds, fill: None };
-    let unreachable = || Failed::new((surface, scheme), marks, None, &found.report, &stop).unreachable().is_some();
+    let unreachable = || Failed::new((surface, scheme), marks, false, &found.report, &stop).unreachable().is_some();
     if !no_progress(found.report.outcome) || unreachable() {
         return Ok(found);
     }

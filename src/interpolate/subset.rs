@@ -17,6 +17,7 @@ use crate::{Error, Result};
 /// stays so. (Row sums are at most 1 here.)
 #[derive(Clone, Debug)]
 pub struct Restriction {
+    /// A_SS with its factors H_S and M_SS; the bounds are those of the whole A.
     pub system: LimitSystem,
     /// The interpolated vertices, ascending: row k of the system belongs to `vertices[k]`.
     pub vertices: Vec<u32>,

@@ -28,6 +28,7 @@ pub struct Request<'a> {
 /// The refined mesh.
 #[derive(Clone, Debug)]
 pub struct SurfaceMesh {
+    /// The mesh after the refinements asked for, its vertices at their limit points if these were wanted.
     pub surface: Surface,
     /// One a vertex if they were wanted; zero where the surface has none.
     pub normals: Option<Vec<DVec3>>,
@@ -125,8 +126,7 @@ fn primal(control: Surface, scheme: Refinement, request: &Request) -> Result<Sur
     let wants_limits = request.limit || request.normals;
     if given.handles.is_some() {
         return Err(Error::Computation(format!(
-            "shape handles scale the type-V faces of Doo-Sabin surfaces, and {scheme} has none: use --scheme zheng-cai \
-             or nasri"
+            "shape handles scale the type-V faces of Doo-Sabin surfaces, and {scheme} has none: use zheng-cai or nasri"
         )));
     }
     let Some(normals) = given.normals else {
@@ -135,7 +135,7 @@ fn primal(control: Surface, scheme: Refinement, request: &Request) -> Result<Sur
     if scheme.class() != Class::Primal {
         return Err(Error::Computation(format!(
             "given normals turn the rings of vertices that stay, or tilt the faces of Doo-Sabin surfaces, and {scheme} has \
-             neither: use --scheme zheng-cai, nasri or catmull-clark"
+             neither: use zheng-cai, nasri or catmull-clark"
         )));
     }
     let needed = request.rotation.levels + 1;
@@ -148,6 +148,6 @@ fn primal(control: Surface, scheme: Refinement, request: &Request) -> Result<Sur
     Ok(SurfaceMesh { normals_set: rotated.turned.len(), ..SurfaceMesh::plain(surface) })
 }
 
-fn too_few(what: &str, levels: usize) -> Error {
-    Error::Computation(format!("{what} a refined mesh: use --subdivide {levels} or more"))
+fn too_few(what: &'static str, needed: usize) -> Error {
+    Error::TooFewLevels { what, needed }
 }

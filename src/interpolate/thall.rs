@@ -174,7 +174,9 @@ pub(super) fn angle(a: DVec3, b: DVec3) -> f64 {
 /// A medial atom: the ball of centre `position` and radius `radius` that touches the boundary at its involutes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MedialAtom {
+    /// The centre of the ball.
     pub position: DVec3,
+    /// The radius, in mesh units; negative if fitted to normals that point to the centre.
     pub radius: f64,
 }
 

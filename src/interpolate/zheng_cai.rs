@@ -31,6 +31,7 @@ pub enum Sweep<'a> {
 /// When phase one ends, and how it goes on until then.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhaseOne<'a> {
+    /// Whether vertices are updated in place, and in what order, or all at once.
     pub sweep: Sweep<'a>,
     /// The paper's ITE_MAX.
     pub max_iterations: usize,
@@ -100,6 +101,7 @@ impl Constraints<'_> {
 /// The auxiliary mesh of phase one.
 #[derive(Clone, Debug)]
 pub struct Auxiliary {
+    /// The given faces with the vertices V of phase one; those not interpolated stay where they were.
     pub surface: Surface,
     /// The largest update of each sweep, in the units of the mesh.
     pub updates: Vec<f64>,
@@ -210,6 +212,7 @@ impl<'a> LocalSystem<'a> {
 /// interpolated points.
 #[derive(Clone, Debug)]
 pub struct FirstRefinement {
+    /// The corrected mesh: faces of type F first, then E, then V.
     pub surface: Surface,
     /// The type-V face of vertex v is face `first_vertex_face + v`.
     pub first_vertex_face: usize,
@@ -287,7 +290,9 @@ impl FirstRefinement {
 /// What phase one and two make together.
 #[derive(Clone, Debug)]
 pub struct TwoPhase {
+    /// Phase one: the moved vertices.
     pub auxiliary: Auxiliary,
+    /// Phase two: the first refinement with its corrected type-V faces.
     pub first: FirstRefinement,
 }
 

@@ -8,7 +8,9 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DefectKind {
+    /// The mesh has no vertices.
     NoVertices,
+    /// The mesh has no faces.
     NoFaces,
     /// A face names a vertex that does not exist. No topology is built, and defects that need one are not told.
     IndexOutOfRange,
@@ -59,12 +61,15 @@ impl DefectKind {
 /// One defect and its place. Vertices and faces are numbered from 0, lines of the file from 1.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Defect {
+    /// What is wrong.
     pub kind: DefectKind,
+    /// The face, or the first of those on the edge; `None` where a vertex or the whole mesh is at fault.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub face: Option<u32>,
     /// The second of the two faces that disagree about their orientation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other_face: Option<u32>,
+    /// The vertex, the index that names none, or the first end of an edge.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vertex: Option<u32>,
     /// The second end of an edge.

@@ -27,6 +27,7 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// P = P': centre 0, scale 1.
     pub const IDENTITY: Frame = Frame { centre: DVec3::ZERO, scale: 1.0 };
 
     /// The frame in which finite `points` have an ordinary size and origin: the identity for most. O(n).
@@ -72,6 +73,7 @@ impl Frame {
         }
     }
 
+    /// Whether P = P': centre 0, scale 1.
     pub fn is_identity(&self) -> bool {
         *self == Frame::IDENTITY
     }

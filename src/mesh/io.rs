@@ -19,6 +19,7 @@ use crate::{Error, Result};
 pub struct Loaded {
     /// The path as it was given.
     pub name: String,
+    /// Positions and faces as in the file, numbered from 0; not validated.
     pub mesh: Mesh,
     /// Where each vertex and face stands; `None` for binary files.
     pub lines: Option<Lines>,
@@ -32,7 +33,9 @@ pub struct Loaded {
 /// The 1-based line of each vertex and of each face; lines beyond 2³² − 1 are given as that number.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Lines {
+    /// One line a vertex.
     pub vertices: Vec<u32>,
+    /// One line a face.
     pub faces: Vec<u32>,
 }
 

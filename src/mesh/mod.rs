@@ -43,7 +43,9 @@ const CHUNK: usize = 1 << 16;
 /// Nothing is checked on construction: the validator reports every defect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
+    /// One point a vertex; their unit of length is what is called mesh units.
     pub positions: Vec<DVec3>,
+    /// The faces, as indices into the positions.
     pub faces: Faces,
 }
 
@@ -158,6 +160,7 @@ impl Faces {
         self.count
     }
 
+    /// Whether there are no faces.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
@@ -177,6 +180,7 @@ impl Faces {
         }
     }
 
+    /// The faces in order, each as its vertices.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &[u32]> + '_ {
         (0..self.count).map(|f| self.face(f))
     }
@@ -190,10 +194,12 @@ impl Faces {
         self.uniform_offsets.get_or_init(|| (0..=self.count).map(|f| (size * f) as u32).collect())
     }
 
+    /// The vertex of every corner, face after face.
     pub fn corners(&self) -> &[u32] {
         &self.corners
     }
 
+    /// The vertex of every corner, to renumber vertices in place; the sizes of faces stay.
     pub fn corners_mut(&mut self) -> &mut [u32] {
         &mut self.corners
     }
@@ -205,6 +211,7 @@ impl Faces {
 }
 
 impl Mesh {
+    /// A mesh of these parts, unchecked.
     pub fn new(positions: Vec<DVec3>, faces: Faces) -> Self {
         Mesh { positions, faces }
     }
@@ -214,6 +221,7 @@ impl Mesh {
         self.positions.len()
     }
 
+    /// Whether there are no vertices.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }

@@ -17,7 +17,9 @@ use crate::{Error, Result};
 /// A Gaussian displacement of all vertices: `--noise A[:SEED]`, seed 1 unless told.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
+    /// The standard deviation of each coordinate, in mean edge lengths; 0 or more.
     pub amplitude: f64,
+    /// The seed of the generator; the same seed gives the same displacements.
     pub seed: u64,
 }
 

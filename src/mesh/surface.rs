@@ -117,22 +117,27 @@ impl Surface {
         Surface { mesh, connectivity: Arc::clone(&self.connectivity) }
     }
 
+    /// Positions and faces.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
+    /// Positions and faces, without their topology.
     pub fn into_mesh(self) -> Mesh {
         self.mesh
     }
 
+    /// The faces, in the numbering of the mesh that was given.
     pub fn faces(&self) -> &Faces {
         &self.mesh.faces
     }
 
+    /// One point a vertex, in mesh units.
     pub fn positions(&self) -> &[DVec3] {
         &self.mesh.positions
     }
 
+    /// The points, to be moved; nothing checks that they stay finite.
     pub fn positions_mut(&mut self) -> &mut [DVec3] {
         &mut self.mesh.positions
     }

@@ -41,6 +41,7 @@ impl Scatter {
 /// How the faces hang together. Half-edge `c` leaves corner `c` for the next corner of its face.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topology {
+    /// The corners at every vertex and the face of every corner.
     pub incidence: Arc<Incidence>,
     twin: Vec<u32>,
     edges: usize,

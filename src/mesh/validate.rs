@@ -16,7 +16,7 @@ use crate::{Error, Result};
 /// Vertices or corners of one task.
 const CHUNK: usize = 4096;
 
-/// What to make of boundary edges: `--boundary refuse | as-interior`.
+/// What to make of boundary edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Boundary {
     /// An open mesh is invalid.
@@ -51,18 +51,23 @@ impl fmt::Display for Boundary {
 /// The size and shape of a mesh whose indices are good.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
+    /// The number of vertices, isolated ones included.
     pub vertices: usize,
+    /// The number of edges, each counted once whatever its number of face sides.
     pub edges: usize,
+    /// The number of faces.
     pub faces: usize,
     /// Isolated vertices are not components here.
     pub components: usize,
     /// V − E + F, isolated vertices included.
     pub euler_characteristic: i64,
+    /// The number of edges with a single face side.
     pub boundary_edges: usize,
     /// `None` where an edge with more than two sides, or a misoriented one, leaves the loops undefined.
     pub boundary_loops: Option<usize>,
     /// The number of edges at a vertex, isolated vertices aside; 0 and 0 for a mesh without faces.
     pub min_valence: usize,
+    /// The greatest of these numbers; the former is the least.
     pub max_valence: usize,
     /// Corners of the largest face.
     pub max_face_size: usize,
@@ -109,6 +114,7 @@ impl Serialize for Validation {
 }
 
 impl Validation {
+    /// Whether there are no defects; remarks do not count.
     pub fn is_valid(&self) -> bool {
         self.defects.is_empty()
     }
@@ -147,6 +153,14 @@ impl Validation {
         format!("{}; {}", groups.join("; "), self.advice(first.kind))
     }
 
+    /// Whether the first kind of defects is a boundary, and the mesh would be valid, and one of triangles, if boundary vertices
+    /// were [treated as interior](Boundary::AsInterior).
+    pub fn boundary_could_be_interior(&self) -> bool {
+        let open = self.defects.first().is_some_and(|d| d.kind == DefectKind::BoundaryEdge);
+        let triangles = self.counts.as_ref().is_some_and(|c| c.max_face_size == 3);
+        open && triangles && !self.totals().contains_key(&DefectKind::LowValence)
+    }
+
     fn advice(&self, kind: DefectKind) -> String {
         match kind {
             DefectKind::NoVertices => "give a mesh with vertices and faces".into(),
@@ -171,15 +185,7 @@ impl Validation {
             DefectKind::NonManifoldVertex => "split such a vertex into one for each umbrella of faces".into(),
             DefectKind::IsolatedVertex => "remove vertices that no face uses".into(),
             DefectKind::LowValence => "give such vertices three edges or more, or remove them".into(),
-            DefectKind::BoundaryEdge => {
-                let only_triangles = self.counts.as_ref().is_some_and(|c| c.max_face_size == 3);
-                let as_interior = only_triangles && !self.totals().contains_key(&DefectKind::LowValence);
-                let close = "close the holes or stitch the faces";
-                match as_interior {
-                    true => format!("{close}, or use --boundary as-interior with --scheme loop or sqrt3"),
-                    false => close.into(),
-                }
-            }
+            DefectKind::BoundaryEdge => "close the holes or stitch the faces".into(),
         }
     }
 }

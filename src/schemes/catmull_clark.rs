@@ -164,7 +164,7 @@ pub fn limit_mask(n: usize) -> [f64; 3] {
 /// opposite corner of each face replaced by 4c_F − v − e_j − e_{j+1} (Thall Eq. 14).
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary.
+/// [`Error::Open`](crate::Error::Open).
 pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
     require_closed(surface)?;
@@ -202,7 +202,7 @@ pub fn tangent_mask(n: usize) -> Vec<[f64; 2]> {
 /// The tangents of the limit surface at all vertices.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary.
+/// [`Error::Open`](crate::Error::Open).
 pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
     require_closed(surface)?;

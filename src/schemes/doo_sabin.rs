@@ -140,7 +140,7 @@ pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
 /// centroids of the type-V faces, (1/n) Σ of the vertex's corner points.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary.
+/// [`Error::Open`](crate::Error::Open).
 pub fn limit_positions(rule: Rule, surface: &Surface) -> Result<Vec<DVec3>> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
     require_closed(surface)?;
@@ -157,7 +157,7 @@ pub fn limit_positions(rule: Rule, surface: &Surface) -> Result<Vec<DVec3>> {
 /// The unit normals of the limit surface at the [`limit_positions`]; zero where [`Tangents::normal`] is.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary.
+/// [`Error::Open`](crate::Error::Open).
 pub fn limit_normals(rule: Rule, surface: &Surface) -> Result<Vec<DVec3>> {
     let mesh = surface.mesh();
     let limits = limit_positions(rule, surface)?;

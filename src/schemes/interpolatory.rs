@@ -19,7 +19,7 @@ pub(super) struct RegularMask {
 }
 
 /// The limit points of all vertices: the vertices themselves.
-pub(super) fn vertices(name: &str, surface: &Surface) -> Result<Vec<DVec3>> {
+pub(super) fn vertices(name: &'static str, surface: &Surface) -> Result<Vec<DVec3>> {
     let mesh = surface.mesh();
     require_triangles(surface, name)?;
     Ok(mesh.positions.clone())

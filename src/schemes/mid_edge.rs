@@ -106,7 +106,7 @@ pub fn limit_mask(n: usize) -> [f64; 2] {
 /// The limit points of all vertices: the centroids of their faces after a step, which all further ones keep.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary.
+/// [`Error::Open`](crate::Error::Open).
 pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
     require_closed(surface)?;
     Ok(blend_with_neighbors(surface, limit_mask))

@@ -13,7 +13,7 @@
 //! | [`butterfly`] | modified Butterfly, Zorin, Schröder & Sweldens 1996 | triangles | yes |
 //! | [`labsik_greiner`] | interpolatory √3, Labsik & Greiner 2000 | triangles | yes |
 //!
-//! Meshes are closed: an open one is refused with an [`Error::Mesh`](crate::Error::Mesh). A step takes time and memory
+//! Meshes are closed: an open one is refused with an [`Error::Open`](crate::Error::Open). A step takes time and memory
 //! proportional to the mesh, with flat arrays only, in parallel: every new point is gathered from the old ones, with
 //! the same result for any number of threads; new faces, and their topology, come from index arithmetic on half-edges.
 //!

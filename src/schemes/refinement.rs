@@ -61,12 +61,19 @@ pub(super) struct RefinementRules {
 /// A stationary refinement that needs nothing but the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Refinement {
+    /// Catmull & Clark 1978, on polygons of any size; quads after a step.
     CatmullClark,
+    /// Loop 1987, on triangles, with Loop's own weights at extraordinary vertices.
     Loop,
+    /// Doo & Sabin 1978, on polygons of any size.
     DooSabin,
+    /// √3, Kobbelt 2000, on triangles.
     Sqrt3,
+    /// Modified Butterfly, Zorin, Schröder & Sweldens 1996, on triangles.
     Butterfly,
+    /// Interpolatory √3, Labsik & Greiner 2000, on triangles.
     LabsikGreiner,
+    /// Mid-edge, Peters & Reif 1997, on polygons of any size.
     MidEdge,
 }
 
@@ -112,8 +119,7 @@ impl Refinement {
     /// One step: positions and faces. The scheme's own `refine` says how the result is numbered.
     ///
     /// # Errors
-    /// [`Error::Mesh`] for a boundary or, where the scheme needs triangles, another face; a result too large for 32-bit
-    /// indices.
+    /// [`Error::Open`]; [`Error::NotTriangles`] where the scheme needs these; [`Error::TooLarge`].
     pub fn refine(self, surface: &Surface) -> Result<Mesh> {
         (self.rules().refine)(surface)
     }
@@ -143,7 +149,7 @@ impl Refinement {
     /// memory has no room. O(levels).
     ///
     /// # Errors
-    /// [`Error::Computation`] or [`Error::Memory`] with the numbers of faces and vertices.
+    /// [`Error::TooLarge`] or [`Error::Memory`] with the numbers of faces and vertices.
     pub fn check_size(self, mesh: &Mesh, levels: usize) -> Result<()> {
         let count = |n: usize| n as u64;
         let mut size = Size {
@@ -164,10 +170,10 @@ impl Refinement {
         let Size { vertices, faces, corners } = size;
         let what = || format!("the surface after {levels} refinements with {faces} faces and {vertices} vertices");
         if corners > u64::from(u32::MAX) {
-            return Err(Error::Computation(format!(
-                "a surface after {levels} refinements has {faces} faces or more, which 32-bit indices do not reach: \
-                 refine fewer levels"
-            )));
+            return Err(Error::TooLarge {
+                what: format!("a surface after {levels} refinements has {faces} faces or more"),
+                advice: "refine fewer levels",
+            });
         }
         require(bytes, what, "refine fewer levels")?;
         Ok(())

@@ -39,10 +39,12 @@ pub(crate) struct Circulant {
 /// On which closed meshes with valences of 3 and more the matrix A is singular.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SingularSet {
+    /// On none of them.
     Never,
     /// Where the edge graph of a connected component is bipartite and, if a valence is given, all of its vertices have
     /// that one. The null vector is the ±1 colouring.
     Bipartite {
+        /// The valence that all vertices of the component must have; `None` if any will do.
         valence: Option<usize>,
     },
 }
@@ -106,8 +108,11 @@ pub enum Scheme {
 /// How the papers name the three matrices of a scheme: `system = diagonal · symmetric`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PaperNames {
+    /// The letter of A.
     pub system: &'static str,
+    /// The letter of H.
     pub diagonal: &'static str,
+    /// The letter of M.
     pub symmetric: &'static str,
 }
 
@@ -117,6 +122,7 @@ impl PaperNames {
 }
 
 impl Scheme {
+    /// All of them, in the order in which messages list them.
     pub const ALL: [Scheme; 6] =
         [Scheme::CatmullClark, Scheme::Loop, Scheme::Sqrt3, Scheme::Nasri, Scheme::ZhengCai, Scheme::MidEdge];
 

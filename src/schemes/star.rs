@@ -22,26 +22,15 @@ pub(crate) fn require_closed(surface: &Surface) -> Result<()> {
     if surface.is_closed() {
         return Ok(());
     }
-    let topology = surface.topology();
-    let place = topology.boundary_half_edges().first().map_or_else(String::new, |&c| {
-        let vertex = surface.faces().corners()[c as usize];
-        format!(", the first from vertex {vertex} of face {}", topology.incidence.face_of(c))
-    });
-    refuse(format!(
-        "open: {} boundary edges{place}; subdivision needs a closed mesh: fill the holes",
-        topology.boundary_edges()
-    ))
+    Err(Error::Open { edges: surface.boundary_edges(), scheme: "subdivision" })
 }
 
 /// Refuses a mesh that is not closed or has a face that is no triangle, naming the first such face.
-pub(crate) fn require_triangles(surface: &Surface, scheme: &str) -> Result<()> {
+pub(crate) fn require_triangles(surface: &Surface, scheme: &'static str) -> Result<()> {
     require_closed(surface)?;
     let faces = surface.faces();
     match find_first(faces.len(), |f| faces.range(f).len() != 3) {
-        Some(f) => refuse(format!(
-            "face {f} has {} corners, but {scheme} needs triangles: split the faces or use catmull-clark",
-            faces.face(f).len()
-        )),
+        Some(face) => Err(Error::NotTriangles { face, corners: faces.face(face).len(), scheme }),
         None => Ok(()),
     }
 }
@@ -51,12 +40,9 @@ pub(crate) fn require_triangles(surface: &Surface, scheme: &str) -> Result<()> {
 pub(crate) fn require_room(mesh: &Mesh, factor: usize) -> Result<()> {
     let corners = factor * mesh.faces.corners().len();
     if corners < NONE as usize {
-        Ok(())
-    } else {
-        refuse(format!(
-            "a further refinement has {corners} corners, more than 32-bit indices can number: refine less often"
-        ))
+        return Ok(());
     }
+    Err(Error::TooLarge { what: format!("a further refinement has {corners} corners"), advice: "refine less often" })
 }
 
 pub(crate) fn refuse<T>(what: String) -> Result<T> {
@@ -222,7 +208,9 @@ fn places(circle: &[DVec2], place: usize) -> [DVec2; 2] {
 /// beyond the mask's own scale; on a regular star they are perpendicular and of the same length.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tangents {
+    /// The tangent by the cosine mask.
     pub cosine: DVec3,
+    /// The tangent by the sine mask, a quarter turn counter-clockwise from the other on a regular star.
     pub sine: DVec3,
     /// Σ |weight|·|vector|: what the tangents would measure without cancellation.
     reach: f64,

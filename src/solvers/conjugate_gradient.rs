@@ -17,7 +17,10 @@ pub enum Preconditioner {
     /// Diagonal: z = s ∘ e, with the H⁻¹ of the residual H⁻¹e taken into s.
     Scaling(Vec<f64>),
     /// A symmetric SOR sweep from zero.
-    Ssor { omega: f64 },
+    Ssor {
+        /// The relaxation factor, 0 < ω < 2.
+        omega: f64,
+    },
     /// Incomplete Cholesky of M without fill.
     IncompleteCholesky(IncompleteCholesky),
 }

@@ -27,7 +27,9 @@ impl std::ops::Mul<f64> for Errors {
 /// `max_iterations` updates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
+    /// The bound of the maximum error, in mesh units; one that is not finite is never met.
     pub tolerance: f64,
+    /// The most updates of all vertices; the start is measured before the first.
     pub max_iterations: usize,
 }
 
@@ -70,6 +72,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// The name in messages and reports, in lower case with hyphens.
     pub fn name(self) -> &'static str {
         match self {
             Outcome::Converged => "converged",
@@ -92,6 +95,7 @@ impl fmt::Display for Outcome {
 /// What a run leaves besides the control points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
+    /// How the run ended.
     pub outcome: Outcome,
     /// Updates of all vertices made.
     pub iterations: usize,
@@ -112,8 +116,11 @@ impl Report {
 /// What the watch sees after the errors of an iterate are known, first for the start.
 #[derive(Clone, Copy, Debug)]
 pub struct Step<'a> {
+    /// The number of updates made; 0 for the start.
     pub iteration: usize,
+    /// The errors of this iterate.
     pub errors: Errors,
+    /// The iterate itself, one point a vertex.
     pub points: &'a [DVec3],
 }
 
@@ -122,6 +129,7 @@ pub struct Step<'a> {
 pub struct Failure {
     /// [`Outcome::Singular`] or [`Outcome::Breakdown`].
     pub outcome: Outcome,
+    /// The reason in words, such as the pivot that vanishes.
     pub detail: String,
 }
 

@@ -46,21 +46,43 @@ pub enum Method<'a> {
     /// Sparse M = LDLᵀ.
     Ldlt,
     /// Damped Jacobi.
-    Jacobi { omega: Option<f64> },
+    Jacobi {
+        /// The damping; converges for 0 < ω < 2/λ_max(D⁻¹A).
+        omega: Option<f64>,
+    },
     /// Jacobi with ω = ½.
     Thall,
     /// Gauss-Seidel (GS-PIA), in a vertex order.
-    GaussSeidel { order: Option<&'a [u32]> },
+    GaussSeidel {
+        /// `order[k]` is the vertex relaxed k-th; `None` stands for the order of the rows.
+        order: Option<&'a [u32]>,
+    },
     /// Successive over-relaxation, in a vertex order.
-    Sor { omega: f64, order: Option<&'a [u32]> },
+    Sor {
+        /// The relaxation factor; converges for 0 < ω < 2 where A is non-singular.
+        omega: f64,
+        /// `order[k]` is the vertex relaxed k-th; `None` stands for the order of the rows.
+        order: Option<&'a [u32]>,
+    },
     /// Symmetric SOR, in a vertex order and back.
-    Ssor { omega: f64, order: Option<&'a [u32]> },
+    Ssor {
+        /// The relaxation factor; converges for 0 < ω < 2 where A is non-singular.
+        omega: f64,
+        /// `order[k]` is the vertex relaxed k-th; `None` stands for the order of the rows.
+        order: Option<&'a [u32]>,
+    },
     /// Progressive iterative approximation: ω = 1.
     Pia,
     /// PIA with a weight.
-    WPia { omega: Option<f64> },
+    WPia {
+        /// The weight; converges for 0 < ω < 2/λ_max(A).
+        omega: Option<f64>,
+    },
     /// Chebyshev iteration on A, for the eigenvalues in an interval.
-    Chebyshev { interval: Option<(f64, f64)> },
+    Chebyshev {
+        /// (λ_min, λ_max) with 0 < λ_min ≤ λ_max: the eigenvalues of A that the iteration is made for.
+        interval: Option<(f64, f64)>,
+    },
     /// Conjugate gradients (CG-PIA), preconditioned by H: they see the spectrum of A.
     Cg,
     /// Conjugate gradients on M as it is.
@@ -68,22 +90,39 @@ pub enum Method<'a> {
     /// Conjugate gradients preconditioned by diag(M)⁻¹.
     PcgJacobi,
     /// Conjugate gradients preconditioned by a symmetric SOR sweep.
-    PcgSsor { omega: f64 },
+    PcgSsor {
+        /// The relaxation factor of the sweep, 0 < ω < 2.
+        omega: f64,
+    },
     /// Conjugate gradients preconditioned by incomplete Cholesky without fill.
     PcgIc0,
     /// Anderson acceleration with the last `window` differences.
-    Anderson { of: Accelerated, window: usize },
+    Anderson {
+        /// The relaxation that is accelerated.
+        of: Accelerated,
+        /// The most differences kept, from 1 to [`MOST`](super::anderson::MOST).
+        window: usize,
+    },
     /// PIA with momentum, for the eigenvalues in an interval.
-    HeavyBall { interval: Option<(f64, f64)> },
+    HeavyBall {
+        /// (λ_min, λ_max) with 0 < λ_min ≤ λ_max: the eigenvalues of A that the iteration is made for.
+        interval: Option<(f64, f64)>,
+    },
 }
 
 /// The relaxation that Anderson's acceleration is of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Accelerated {
     /// PIA; unless told, with ω = 1/λ_max: 1 for a scheme's matrix.
-    Pia { omega: Option<f64> },
+    Pia {
+        /// The weight ω > 0 of the relaxation.
+        omega: Option<f64>,
+    },
     /// Jacobi, or Thall's masks.
-    Jacobi { omega: Option<f64> },
+    Jacobi {
+        /// The damping; ½ for Thall's masks.
+        omega: Option<f64>,
+    },
 }
 
 impl<'a> Method<'a> {
@@ -225,6 +264,7 @@ pub struct Solution {
     pub points: Vec<DVec3>,
     /// The name of the method that found it.
     pub method: &'static str,
+    /// How the run ended, its iterations and the history of its errors.
     pub report: Report,
     /// Factorization or preconditioner, memory included.
     pub setup_seconds: f64,

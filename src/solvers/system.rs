@@ -15,6 +15,7 @@ pub trait System: Sync {
     /// The number of unknown points N.
     fn len(&self) -> usize;
 
+    /// Whether there are no unknowns.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -161,7 +162,9 @@ impl Tally {
 /// The combined result of a pass: error norms and an inner product.
 #[derive(Clone, Copy, Debug)]
 pub struct Totals {
+    /// The maximum and the mean length of the vectors counted by [`Tally::error`].
     pub errors: Errors,
+    /// The sum of the terms given to [`Tally::dot`].
     pub dot: f64,
 }
 
@@ -175,6 +178,7 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// Passes over `n` rows.
     pub fn new(n: usize) -> Self {
         Rows { tallies: vec![Tally::default(); n.div_ceil(CHUNK)], n, shared: Vec::new() }
     }

@@ -1,5 +1,6 @@
 //! Meshes that a scheme refuses, and open ones under the papers' treatment of the boundary.
 
+use limitlab::Error;
 use limitlab::assemble::LimitSystem;
 use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Faces, Mesh, Surface};
@@ -9,10 +10,12 @@ use crate::common::formulas::assemble;
 use crate::common::meshes::*;
 use crate::common::tol;
 
-fn refused(surface: &Surface, scheme: Scheme) -> String {
-    let line = LimitSystem::new(surface, scheme).unwrap_err().to_string();
-    assert!(!line.contains('\n'), "{line}");
-    line
+/// The error, whose two formats are one line.
+fn refused(surface: &Surface, scheme: Scheme) -> Error {
+    let error = LimitSystem::new(surface, scheme).unwrap_err();
+    let line = error.to_string();
+    assert!(!line.contains('\n') && line == format!("{error:?}"), "{line}");
+    error
 }
 
 #[test]
@@ -24,10 +27,14 @@ fn loop_and_sqrt3_name_the_first_face_that_is_no_triangle() {
                 assert!(LimitSystem::new(&surface, scheme).is_ok());
                 continue;
             };
-            let line = refused(&surface, scheme);
+            let error = refused(&surface, scheme);
             let size = surface.faces().face(first).len();
-            assert!(line.contains(&format!("face {first} has {size} corners")), "{line}");
-            assert!(line.contains("--scheme catmull-clark"), "{line}");
+            assert!(
+                error.to_string().starts_with(&format!("face {first} has {size} corners, and {scheme} is")),
+                "{error}"
+            );
+            let Error::NotTriangles { face, corners, scheme: name } = error else { panic!("{error}") };
+            assert_eq!((face, corners, name), (first, size, scheme.name()));
         }
     }
 }
@@ -57,12 +64,12 @@ fn vertices_that_are_joined_twice_are_refused() {
 
 #[test]
 fn an_open_mesh_needs_masks_of_edges_alone() {
-    let line = Surface::new(open_torus()).unwrap_err().to_string();
-    assert!(line.contains("--boundary as-interior"), "{line}");
+    let Error::Defects(report) = Surface::new(open_torus()).unwrap_err() else { panic!("an open mesh") };
+    assert!(report.boundary_could_be_interior());
     let surface = Surface::examined(open_torus(), None, Boundary::AsInterior).unwrap();
     for scheme in [Scheme::CatmullClark, Scheme::Nasri, Scheme::ZhengCai] {
-        let line = refused(&surface, scheme);
-        assert!(line.contains("boundary edges") && line.contains("--boundary as-interior"), "{line}");
+        let error = refused(&surface, scheme);
+        assert!(matches!(error, Error::Open { edges, .. } if edges == surface.boundary_edges()), "{error}");
     }
     for scheme in [Scheme::Loop, Scheme::Sqrt3] {
         let system = LimitSystem::new(&surface, scheme).unwrap();

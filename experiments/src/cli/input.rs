@@ -8,7 +8,7 @@ use clap::Args;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::{CommonFlags, StopFlags};
+use super::{CommonFlags, StopFlags, advice};
 use limitlab::assemble::LimitSystem;
 use limitlab::error::{Error, Result, short};
 use limitlab::interpolate::solver::require_memory;
@@ -135,7 +135,7 @@ impl MeshFlags {
         let Loaded { mesh, lines, .. } = loaded;
         let mut surface = Surface::examined(mesh, numbers(&lines), self.boundary).map_err(|report| {
             report.remarks.iter().for_each(|remark| common.remark(format_args!("{name}: {remark}")));
-            Error::mesh(name, report.summary_line())
+            Error::mesh(name, advice::of_defects(&report))
         })?;
         for remark in surface.remarks() {
             common.remark(format_args!("{name}: {remark}"));
@@ -274,8 +274,12 @@ impl Input {
         LimitSystem::new(&self.surface, self.scheme).map_err(|e| self.named(e))
     }
 
-    /// An error of a computation with the mesh's name.
+    /// An error of a computation with the mesh's name, and the flags that help.
     pub fn named(&self, error: Error) -> Error {
-        Error::mesh(&self.name, error.to_string())
+        let what = match error {
+            Error::Mesh { what, .. } => what,
+            error => advice::of_error(&error, &self.surface),
+        };
+        Error::mesh(&self.name, what)
     }
 }

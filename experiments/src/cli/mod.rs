@@ -1,5 +1,6 @@
 //! What the programs share: flags, MESH names, exit status, progress. This room knows no formulas.
 
+pub mod advice;
 mod input;
 mod json;
 mod problem;

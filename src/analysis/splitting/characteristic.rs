@@ -14,8 +14,11 @@ use crate::mesh::{Faces, Mesh};
 /// A planar control net about one extraordinary vertex or face.
 #[derive(Clone, Debug)]
 pub struct Net {
+    /// The scheme that refines it.
     pub scheme: LocalScheme,
+    /// Sectors n about the middle vertex or face.
     pub valence: usize,
+    /// Rings of control points about the middle.
     pub rings: usize,
     /// In the order of [`Layout`].
     pub points: Vec<DVec2>,

@@ -12,13 +12,16 @@ use crate::error::Result;
 /// The leading eigenvalues of S̃ = R·S·S on three rings at one α.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
+    /// The valence n of the vertex.
     pub valence: usize,
+    /// The blend parameter α; the claim is about 0 ≤ α ≤ 2.
     pub alpha: f64,
     /// λ_1 … λ_4, by falling modulus, with multiplicity; λ_0 = 1 is left out.
     pub lambda: [Complex<f64>; 4],
     /// The frequencies k ≤ n/2 of the blocks that λ_1 and, after the pair of frequency 1 is taken out, the next
     /// largest belong to.
     pub leading_frequency: usize,
+    /// The frequency of the largest modulus beside λ_0 and the leading pair of frequency 1.
     pub next_frequency: usize,
     /// |leading eigenvalue of frequency 1| less the largest other modulus (but 1): positive where that pair leads.
     pub margin: f64,
@@ -31,7 +34,9 @@ pub struct Condition {
 /// An α at which [`Condition::holds`] changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
+    /// The valence n of the vertex.
     pub valence: usize,
+    /// The blend parameter α, between 0 and 2, to 1e-12.
     pub alpha: f64,
     /// Whether the condition holds just above.
     pub holds_above: bool,

@@ -13,9 +13,13 @@ use crate::mesh::Mesh;
 /// both in the order of [`Layout`](super::star::Layout): middle, then orbit by orbit, n sectors each.
 #[derive(Clone, Debug)]
 pub struct SplittingMatrix {
+    /// The scheme whose refinement it is.
     pub scheme: LocalScheme,
+    /// Sectors n about the middle vertex or face.
     pub valence: usize,
+    /// Rings of control points that it acts on.
     pub rings: usize,
+    /// S itself, dense and N × N; every row has the sum 1.
     pub entries: DMatrix<f64>,
 }
 

@@ -12,13 +12,17 @@ use crate::error::Result;
 /// What the local matrix of one valence is like, computed, and its deviations from the closed forms.
 #[derive(Clone, Debug)]
 pub struct Row {
+    /// The scheme whose local matrix it is.
     pub scheme: LocalScheme,
+    /// Sectors n about the middle vertex or face.
     pub valence: usize,
+    /// The fewest rings on which the matrix closes.
     pub rings: usize,
     /// All N, by falling modulus.
     pub eigenvalues: Vec<Complex<f64>>,
     /// λ_1, largest modulus after λ_0 = 1.
     pub lambda_subdominant: Complex<f64>,
+    /// λ_1 in closed form; `None` for the blend with α ≠ 0.
     pub lambda_subdominant_formula: Option<f64>,
     /// max |computed − formula| over all eigenvalues, both sorted.
     pub eigenvalue_error: Option<f64>,
@@ -32,6 +36,7 @@ pub struct Row {
     pub tangent_mask_distance: Option<f64>,
     /// max ‖S·X − X·(XᵀSX)‖ over all invariant subspaces, right and left.
     pub residual_right: f64,
+    /// max ‖SᵀY − Y·(YᵀSᵀY)‖ over the left ones.
     pub residual_left: f64,
     /// λ_0 = 1 > λ_1 = λ_2 > λ_3, the pair real and of frequency 1.
     pub pair_leads: bool,

@@ -18,12 +18,16 @@ pub const VALENCES: std::ops::RangeInclusive<usize> = 3..=100;
 /// A scheme seen at one extraordinary vertex; of Doo-Sabin, at an extraordinary face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LocalScheme {
+    /// Catmull-Clark, at a vertex among quads.
     CatmullClark,
+    /// Loop, at a vertex among triangles.
     Loop,
+    /// Doo-Sabin, at a face of n corners among quads.
     DooSabin,
     /// The blend of Lin & Luo with the same α everywhere: 0 is Kobbelt's √3 scheme, 1 the interpolatory one.
     /// One round is two steps, turned back by one sector: S̃ = R·S·S.
     Sqrt3 {
+        /// The blend parameter α, from 0 to 2.
         alpha: f64,
     },
     /// The interpolatory √3 scheme of Labsik & Greiner, two steps turned back as of `Sqrt3`.

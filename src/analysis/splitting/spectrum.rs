@@ -22,7 +22,9 @@ pub const LEAD: f64 = 1e-7;
 /// An eigenvalue with the frequency k ≤ n/2 of its block. For 0 < k < n/2 its conjugate belongs to block n−k.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
+    /// The eigenvalue λ, in general complex.
     pub value: Complex<f64>,
+    /// k: how often the phase of the eigenvector turns in going once around the star.
     pub frequency: usize,
 }
 

@@ -20,19 +20,26 @@ use crate::schemes::catmull_clark::tangent_constant;
 pub struct Entry {
     /// Where in the paper.
     pub place: &'static str,
+    /// The valence n of the star.
     pub valence: usize,
     /// Which number there.
     pub item: String,
+    /// The number in the paper, divided by the common divisor where one is printed.
     pub printed: f64,
+    /// The same from our matrix; for c_2 and c_3 from the formula of the paper.
     pub computed: f64,
 }
 
 /// A printed mask and its relative distance ‖v − QQᵀv‖/‖v‖ from the computed left eigenspace of λ_2 = λ_3.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Membership {
+    /// Where in the paper.
     pub place: &'static str,
+    /// The valence n of the star.
     pub valence: usize,
+    /// What the mask is called there, such as `m_2`.
     pub mask: String,
+    /// From 0, a member of the eigenspace, to 1, orthogonal to it.
     pub distance: f64,
     /// The same with all edge weights multiplied by A_n.
     pub distance_scaled: f64,
@@ -41,8 +48,11 @@ pub struct Membership {
 /// Which way m_2 × m_3 points, for a star in the plane counter-clockwise in the paper's order: positive is outward.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Orientation {
+    /// Where in the paper.
     pub place: &'static str,
+    /// The valence n of the star.
     pub valence: usize,
+    /// Whether m_2 and m_3 are those printed or those by the formulas.
     pub masks: &'static str,
     /// m_2 × m_3 over |m_2|·|m_3| on the star e_j = cis(2πj/n), f_j = √2·cis(2π(j−½)/n).
     pub sine: f64,
@@ -51,8 +61,11 @@ pub struct Orientation {
 /// All of Thall's local matrices and masks against computed ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ThallTables {
+    /// Matrices, eigenvalues, limit masks and tangent masks, number by number.
     pub entries: Vec<Entry>,
+    /// Tangent masks and left eigenvectors at valences 3 and 4.
     pub memberships: Vec<Membership>,
+    /// At valences 3 and 4, each as printed and by the formulas.
     pub orientations: Vec<Orientation>,
 }
 

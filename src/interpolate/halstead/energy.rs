@@ -24,7 +24,9 @@ use crate::schemes::Refinement;
 /// How much of each energy the fairness holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights {
+    /// The factor of ∫ S_uu² + 2S_uv² + S_vv²: finite, 0 or more.
     pub thin_plate: f64,
+    /// The factor of ∫ S_u² + S_v²: finite; positive in [`fit`](super::fit()), so that its system is regular.
     pub membrane: f64,
 }
 
@@ -37,7 +39,9 @@ impl Default for Weights {
 /// The two energies: squared mesh units, for a unit square of parameters a quad of the first refinement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energies {
+    /// ∫ S_uu² + 2S_uv² + S_vv², the second-order energy, unweighted.
     pub thin_plate: f64,
+    /// ∫ S_u² + S_v², the first-order energy, unweighted.
     pub membrane: f64,
 }
 
@@ -55,6 +59,7 @@ pub struct Fairness {
     pub fine: Surface,
     /// Quadratic forms in the fine control points, on one pattern.
     pub thin_plate: Csr,
+    /// The form of the membrane energy, symmetric and positive semi-definite as the other.
     pub membrane: Csr,
 }
 

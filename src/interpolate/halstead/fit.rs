@@ -24,6 +24,7 @@ use crate::{Error, Result};
 pub struct Fit {
     /// The control mesh two refinements below the given one; original vertices come first.
     pub surface: Surface,
+    /// The energies of its surface, unweighted.
     pub energies: Energies,
     /// The distances of the limit points from the given ones, in mesh units, over the interpolated vertices.
     pub errors: Errors,
@@ -72,8 +73,7 @@ pub fn fit(fairness: &Fairness, points: &[DVec3], wishes: &Constraints, weights:
     wishes.check(points.len())?;
     if wishes.handles.is_some() {
         return Err(Error::Computation(
-            "shape handles scale the type-V faces of Doo-Sabin surfaces, and the fairest surface is none: use --scheme \
-             zheng-cai or nasri"
+            "shape handles scale the type-V faces of Doo-Sabin surfaces, and the fairest surface is none: use zheng-cai or nasri"
                 .into(),
         ));
     }
@@ -299,9 +299,9 @@ impl Kkt {
                 values.push(value);
                 shifted.push(value + shift);
             }
-            let end = u32::try_from(columns.len()).map_err(|_| {
-                let what = "the mesh is too large for the fairness system: use another method";
-                Error::Computation(what.into())
+            let end = u32::try_from(columns.len()).map_err(|_| Error::TooLarge {
+                what: "the fairness system has more than 2³² − 1 entries".into(),
+                advice: "use another method",
             })?;
             offsets.push(end);
         }

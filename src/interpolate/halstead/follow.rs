@@ -16,12 +16,15 @@ use crate::{Error, Result};
 /// One iterate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
+    /// The number of updates made; 0 for the start.
     pub iteration: usize,
     /// Interpolation error, in mesh units.
     pub errors: Errors,
+    /// The energies of its surface, unweighted.
     pub energies: Energies,
     /// The angle between the surface's normals at the given points and the wanted ones, in radians.
     pub deviation_max: f64,
+    /// The mean of the same angles over the vertices, in radians.
     pub deviation_mean: f64,
 }
 

@@ -5,6 +5,7 @@ use glam::DVec3;
 /// Whether the last point is followed by the first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ends {
+    /// A closed polygon: indices are taken modulo the number of points.
     Closed,
     /// A point more is put beyond each end, mirrored at it: P_{−1} = 2P_0 − P_1. So the ends stay whatever their α is,
     /// and lines are reproduced. The paper has no rule for ends.

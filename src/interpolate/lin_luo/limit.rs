@@ -30,6 +30,7 @@ const STEADY: f64 = 1e-9;
 /// Points of the limit surface and its unit normals there, one a vertex.
 #[derive(Clone, Debug)]
 pub struct Limits {
+    /// The limit points, in mesh units; where α = 1 the vertices themselves.
     pub positions: Vec<DVec3>,
     /// Zero where the surface has no tangent plane: a star whose normal modes shrink no faster than its tangential
     /// ones comes to a point. That is so at valence 3 for α > 0.80, at others for α near 2, and in degenerate stars.

@@ -59,9 +59,11 @@ pub struct Popping {
     pub volume_ratio: f64,
     /// The distance of the vertices from where they were, over the diagonal of the bounding box.
     pub vertex_mean: f64,
+    /// The largest of these distances; the former is their mean.
     pub vertex_max: f64,
     /// The distance of the triangles' centres from where they were, over the same diagonal.
     pub center_mean: f64,
+    /// The largest of these; the former is their mean.
     pub center_max: f64,
     /// The mean of the latter along the triangles' normals: positive outward.
     pub center_outward: f64,

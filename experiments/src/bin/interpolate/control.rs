@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use limitlab::Result;
-use limitlab::analysis::advice::Failed;
+use limitlab::analysis::failed::Failed;
 use limitlab::assemble::Operator;
 use limitlab::error::Error;
 use limitlab::interpolate::zheng_cai::{self, PhaseOne, Sweep};
@@ -15,7 +15,7 @@ use limitlab::mesh::order::Order;
 use limitlab::solvers::gauss_seidel::by_colours;
 use limitlab::solvers::system::Rows;
 use limitlab::solvers::{Errors, Method, Outcome, Report, Step, Stop};
-use limitlab_experiments::cli::{Input, Progress};
+use limitlab_experiments::cli::{Input, Progress, advice};
 
 use super::wishes::Wishes;
 use super::{Arguments, Choice};
@@ -172,12 +172,9 @@ fn limit_errors(input: &Input, marks: Option<&[bool]>, control: &[DVec3]) -> Res
 }
 
 fn failed(arguments: &Arguments, input: &Input, wishes: &Wishes, report: &Report, stop: &Stop) -> Failed {
-    let asked = match arguments.method {
-        Choice::Solver(method) => Some(method),
-        _ => None,
-    };
+    let chosen = matches!(arguments.method, Choice::Solver(_));
     let system = (&input.surface, input.scheme);
-    Failed::new(system, wishes.interpolated.as_deref(), asked, report, stop)
+    Failed::new(system, wishes.interpolated.as_deref(), chosen, report, stop)
 }
 
 /// A run that did not converge gives no control mesh.
@@ -203,7 +200,7 @@ fn check(
             report.iterations,
             unit * report.last().max,
             unit * stop.tolerance,
-            failed(arguments, input, wishes, report, stop).advice(unit)
+            advice::of_failed(&failed(arguments, input, wishes, report, stop), unit)
         ),
     ))
 }

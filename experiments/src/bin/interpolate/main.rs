@@ -219,8 +219,8 @@ fn run(arguments: &Arguments) -> Result<()> {
     refinement.check_size(input.surface.mesh(), arguments.shape.subdivide.into()).map_err(|e| input.named(e))?;
     let wishes = Wishes::read(&arguments.shape, &input)?;
     let named = |e: Error| match e {
-        Error::Computation(what) | Error::Mesh { what, .. } => Error::mesh(&input.name, what),
-        other => other,
+        Error::Io { .. } | Error::Parse { .. } | Error::Memory { .. } => e,
+        other => input.named(other),
     };
     let mut result = match (&wishes.alpha, arguments.method) {
         (Some(alpha), _) => unified(arguments, &input, alpha).map_err(named)?,

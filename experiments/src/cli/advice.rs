@@ -1,0 +1,129 @@
+//! Errors of the library and failed runs in the words of the programs: with the flags that help on the mesh at hand.
+
+use limitlab::analysis::failed::Failed;
+use limitlab::error::Error;
+use limitlab::mesh::Surface;
+use limitlab::mesh::validate::Validation;
+use limitlab::schemes::{Masks, Scheme, SingularSet};
+use limitlab::solvers::Outcome;
+
+/// What a singular system leaves to do, whatever the points.
+const ANOTHER_SYSTEM: &str = "use --scheme nasri, which is never singular, or --scheme catmull-clark with --method \
+                              halstead, whose control mesh is two refinements finer";
+
+/// The defects of a mesh, and the flags that would do without mending them.
+pub fn of_defects(report: &Validation) -> String {
+    let line = report.summary_line();
+    match report.boundary_could_be_interior() {
+        true => format!("{line}, or use --boundary as-interior with --scheme loop or sqrt3"),
+        false => line,
+    }
+}
+
+/// An error of a computation on `surface`.
+pub fn of_error(error: &Error, surface: &Surface) -> String {
+    let with = |flags: String| format!("{error}{flags}");
+    match error {
+        // On an open mesh no other scheme would do.
+        Error::NotTriangles { .. } if surface.is_closed() => {
+            with(format!(" or use --scheme {}", names(|s| !s.needs_triangles())))
+        }
+        Error::Open { .. } if surface.faces().uniform_size() == Some(3) => {
+            let regular = |s: Scheme| s.edges_only() && s.singular_set() == SingularSet::Never;
+            with(format!(", or use --boundary as-interior with --scheme {}", names(regular)))
+        }
+        Error::TooFewLevels { needed, .. } => with(format!(": use --subdivide {needed} or more")),
+        other => other.to_string(),
+    }
+}
+
+/// The names of some schemes, to choose one from.
+fn names(which: impl Fn(Scheme) -> bool) -> String {
+    let names: Vec<&str> = Scheme::ALL.into_iter().filter(|&s| which(s)).map(Scheme::name).collect();
+    match names.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        _ => names.concat(),
+    }
+}
+
+/// After a run that did not converge: something to do that is not what has just failed. `unit` is what a length of one
+/// measures in the units of the mesh.
+pub fn of_failed(failed: &Failed, unit: f64) -> String {
+    if let Some(component) = failed.unreachable() {
+        return format!(
+            "the points have a part that no control mesh reaches, {:.3e} at each of the {} vertices of the \
+             component of vertex {}, which has {}, so that the matrix is singular; {ANOTHER_SYSTEM}",
+            unit * component.unreachable.length(),
+            component.vertices,
+            component.first_vertex,
+            failed.verdict.set.condition().unwrap_or_default()
+        );
+    }
+    let reachable = unit * 2.0 * failed.max_error;
+    let chosen = failed.chosen;
+    match failed.outcome {
+        Outcome::MaxIterations if chosen => "the iterations ran out: raise --max-iter, or use --method auto".into(),
+        Outcome::MaxIterations => "the iterations ran out: raise --max-iter".into(),
+        Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown if failed.is_rounding() => {
+            format!(
+                "the error is the rounding of such coordinates, whose last digit is {:.1e}, and the tolerance lies \
+                 below: use --tol-absolute {reachable:.0e}",
+                unit * failed.last_digit
+            )
+        }
+        Outcome::Singular if chosen => {
+            "the matrix is singular, but these points have a control mesh: use --method auto".into()
+        }
+        _ if chosen => "use --method auto".into(),
+        _ => match failed.verdict.set {
+            SingularSet::Bipartite { .. } => format!("the matrix is singular, or nearly so; {ANOTHER_SYSTEM}"),
+            SingularSet::Never => format!(
+                "the error that can be reached is larger than the tolerance: use --tol-absolute {reachable:.0e}"
+            ),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use limitlab::assemble::LimitSystem;
+    use limitlab::mesh::validate::Boundary;
+    use limitlab::mesh::{Faces, Mesh, builtin};
+
+    use super::*;
+
+    fn refused(surface: &Surface, scheme: Scheme) -> String {
+        of_error(&LimitSystem::new(surface, scheme).unwrap_err(), surface)
+    }
+
+    fn opened(name: &str) -> Mesh {
+        let mesh = builtin::builtin(name).unwrap();
+        let faces = Faces::from_lists(mesh.faces.iter().skip(1));
+        Mesh::new(mesh.positions, faces)
+    }
+
+    #[test]
+    fn flags_are_those_that_help_on_the_mesh_at_hand() {
+        let cube = Surface::new(builtin::cube()).unwrap();
+        let others = " or use --scheme catmull-clark, nasri, zheng-cai or mid-edge";
+        assert!(refused(&cube, Scheme::Loop).ends_with(others), "{}", refused(&cube, Scheme::Loop));
+
+        let report = Surface::examined(opened("icosphere:1"), None, Boundary::Refuse).unwrap_err();
+        let line = of_defects(&report);
+        assert!(
+            line.ends_with("stitch the faces, or use --boundary as-interior with --scheme loop or sqrt3"),
+            "{line}"
+        );
+        let open = Surface::examined(opened("icosphere:1"), None, Boundary::AsInterior).unwrap();
+        let line = refused(&open, Scheme::CatmullClark);
+        assert!(line.ends_with("close the holes, or use --boundary as-interior with --scheme loop or sqrt3"), "{line}");
+        assert!(LimitSystem::new(&open, Scheme::Loop).is_ok());
+
+        // Of quads: no scheme would do, and none is named.
+        let report = Surface::examined(opened("torus:5x4"), None, Boundary::Refuse).unwrap_err();
+        assert!(of_defects(&report).ends_with("stitch the faces"));
+        let open = Surface::examined(opened("torus:5x4"), None, Boundary::AsInterior).unwrap();
+        assert!(refused(&open, Scheme::CatmullClark).ends_with("close the holes"));
+        assert!(refused(&open, Scheme::Loop).ends_with("triangulate the mesh"));
+    }
+}
