@@ -1,5 +1,7 @@
 //! Reading and writing meshes, with tobj on the same OBJ file: `cargo bench --bench files`.
 
+#![allow(missing_docs, reason = "the functions that criterion's macro writes")]
+
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use limitlab::mesh::{builtin::builtin, io, noise::add_noise};
 

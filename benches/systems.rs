@@ -3,6 +3,8 @@
 //! One irregular quad sphere, Catmull-Clark, three right-hand sides. The number of vertices is 100 000 unless the
 //! environment variable `LIMITLAB_BENCH_VERTICES` says otherwise.
 
+#![allow(missing_docs, reason = "the functions that criterion's macro writes")]
+
 #[path = "../experiments/src/bin/scaling/baseline.rs"]
 mod baseline;
 
@@ -16,7 +18,7 @@ use faer::{Accum, Par};
 use glam::DVec3;
 use limitlab::assemble::{Csr, LimitSystem, Operator};
 use limitlab::interpolate::interpolate;
-use limitlab::mesh::fronts::in_fronts;
+use limitlab::mesh::breadth_first::in_fronts;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::{Incidence, Mesh, Surface, Topology, builtin::builtin};
 use limitlab::schemes::Scheme;

@@ -1,4 +1,5 @@
-//! Proofs by factorization: that no eigenvalue lies beyond a given number, and how many lie below one.
+//! Spectral certificates by factorization (Sylvester's law of inertia): that no eigenvalue lies beyond a given number, and
+//! how many lie below one.
 //!
 //! S = H^½ M H^½ is similar to A (or Dm^-½ M Dm^-½, Dm = diag M, to D⁻¹A). If S − σ has a Cholesky factorization, all
 //! eigenvalues exceed σ; if LDLᵀ, its negative pivots count the eigenvalues below σ (Sylvester's law of inertia).

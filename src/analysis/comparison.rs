@@ -1,5 +1,5 @@
-//! Every method on one system, from one start, in one norm, to one tolerance, with its predicted rate beside the
-//! observed one.
+//! Comparison of methods: all on one system, from one start, in one norm, to one tolerance, with the predicted rate
+//! beside the observed one.
 
 use glam::DVec3;
 

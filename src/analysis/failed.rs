@@ -1,4 +1,4 @@
-//! Runs that did not converge: what stood in the way.
+//! Diagnosis of runs that did not converge: what stood in the way.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! How regular is a quad mesh, and does its regularity make a preconditioner that pays?
+//! Line preconditioner on quad meshes: how regular they are, and whether that pays.
 //!
 //! Where all valences are 4 and all faces quads, Catmull-Clark's symmetric matrix is a tensor product along the two
 //! families of edge lines, M = C ⊗ C with C = tridiag(1, 4, 1), and M⁻¹ is a pass of tridiagonal solves along one

@@ -1,10 +1,11 @@
 //! Why a method converges, stalls or fails: spectra, predicted and observed rates, ω sweeps.
 //! This room knows no plotting.
 
-pub mod bracket;
+pub mod a_priori;
 pub mod certificate;
 pub mod comparison;
 pub mod dense;
+pub mod dirichlet_neumann;
 pub mod eigen;
 pub mod failed;
 pub mod interval;
@@ -13,10 +14,9 @@ pub mod lines;
 pub mod order_study;
 pub mod own;
 pub mod predict;
-pub mod promise;
-pub mod radius;
 pub mod rate;
 pub mod singularity;
+pub mod spectral_radius;
 pub mod spectrum;
 pub mod splitting;
 pub mod sweep;

@@ -1,4 +1,4 @@
-//! Does the vertex order of Gauss-Seidel and SOR matter (Zheng-Cai §5)? Rates and counts over many orders, and the
+//! Vertex orders of Gauss-Seidel and SOR compared (Zheng-Cai §5): rates and counts over many orders, and the
 //! greedy sweep that always relaxes the largest residual.
 //!
 //! Measured with [`order_study`] (20 random orders) on `torus:24x24`, `quad-sphere:3`, `irregular-quad:500`,
@@ -26,7 +26,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::radius::sweep_radius;
+use super::spectral_radius::sweep_radius;
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::Surface;

@@ -1,8 +1,8 @@
-//! The rate that theory predicts for each method, as a factor per iteration.
+//! Predicted convergence rates: what theory says of each method, as a factor per iteration.
 
 use glam::DVec3;
 
-use super::radius::sweep_radius;
+use super::spectral_radius::sweep_radius;
 use super::spectrum::{Extremes, Spectrum};
 use crate::assemble::LimitSystem;
 use crate::error::Result;

@@ -1,4 +1,5 @@
-//! Whether a system is singular, why, whether the data notice, and what each method makes of it.
+//! Singularity of limit systems: whether one is singular, why, whether the data excite it, and what each method makes of
+//! it.
 //!
 //! Theory, on closed meshes with all valences ≥ 3: each scheme has its [`SingularSet`]. Under Catmull-Clark A is singular
 //! exactly when some connected component has all valences 3 and a bipartite edge graph; its null vector is the ±1

@@ -5,8 +5,8 @@ use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::bracket::{alternation_is_all, bracket};
 use super::certificate::inertia;
+use super::dirichlet_neumann::{alternation_is_all, bracket};
 use super::eigen::End;
 use super::lanczos::{Matrix, SelfAdjoint, rayleigh};
 use super::singularity::{ZERO, colour};
@@ -15,7 +15,7 @@ use crate::assemble::bounds::SpectralBounds;
 use crate::assemble::{Csr, LimitSystem};
 use crate::error::Result;
 use crate::mesh::Surface;
-use crate::mesh::fronts::in_fronts;
+use crate::mesh::breadth_first::in_fronts;
 use crate::schemes::Scheme;
 use crate::solvers::System;
 use crate::solvers::system::Rows;

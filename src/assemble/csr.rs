@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::stencil::Point;
+use super::kernel::Point;
 use crate::error::{Error, Result};
 use crate::mesh::incidence::split_rows;
 use crate::parallel;

@@ -3,16 +3,16 @@
 //! This room knows no solvers.
 
 pub mod bounds;
-mod codes;
+mod build;
 pub mod convert;
 pub mod csr;
+pub mod face_sums;
+mod gather;
+pub mod kernel;
 pub mod matrix_market;
+mod neighbours;
 pub mod operator;
 mod parts;
-pub mod polygons;
-mod rows;
-mod source;
-pub mod stencil;
 pub mod system;
 
 pub use csr::Csr;

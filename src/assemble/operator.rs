@@ -6,9 +6,9 @@ use std::sync::OnceLock;
 use glam::DVec3;
 
 use super::bounds::SpectralBounds;
-use super::codes::Neighbours;
-use super::source::Source;
-use super::stencil::{Point, Stencil, runs};
+use super::build::Source;
+use super::kernel::{Point, Stencil, runs};
+use super::neighbours::Neighbours;
 use super::system::check;
 use crate::error::Result;
 use crate::mesh::order::Numbering;
@@ -201,7 +201,7 @@ impl Operator {
     }
 
     /// Which of all sums are those of faces whose first corner is in `rows`. These start, and end, at a multiple of
-    /// [`BLOCK`](super::polygons::BLOCK), or end at the last row. A row needs the sums of rows no further before it
+    /// [`BLOCK`](super::face_sums::BLOCK), or end at the last row. A row needs the sums of rows no further before it
     /// than it [reaches](Self::reach), and none of later rows.
     pub fn sums_of(&self, rows: Range<usize>) -> Range<usize> {
         self.stencil.polygons.sums_of(rows)
@@ -251,8 +251,8 @@ impl Operator {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::breadth_first::in_fronts;
     use crate::mesh::builtin::builtin;
-    use crate::mesh::fronts::in_fronts;
 
     #[test]
     fn fixed_rows_are_zero_and_the_others_as_they_were() {

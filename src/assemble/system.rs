@@ -1,4 +1,4 @@
-//! The one assembler: any [`Masks`] over any mesh into H, M and A.
+//! Explicit assembly: any [`Masks`] over any mesh into H, M and A.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::bounds::SpectralBounds;
 use super::csr::{Csr, Pattern};
-use super::rows::Rows;
+use super::gather::Rows;
 use crate::error::{Error, Result};
 use crate::mesh::{Faces, Surface};
 use crate::parallel;

@@ -35,7 +35,7 @@ use crate::analysis::spectrum::spectrum;
 use crate::assemble::{LimitSystem, Operator};
 use crate::error::{Error, Result};
 use crate::memory::require;
-use crate::mesh::fronts::{in_fronts, in_kinds};
+use crate::mesh::breadth_first::{in_fronts, in_kinds};
 use crate::mesh::order::Numbering;
 use crate::mesh::{Mesh, Surface, diagonal};
 use crate::parallel;

@@ -1,6 +1,6 @@
 //! Vertices colour by colour, for sweeps that relax all of a colour at once.
 
-use super::fronts::breadth_first;
+use super::breadth_first::breadth_first;
 use super::order::{Numbering, colouring};
 use super::{Faces, Incidence};
 

@@ -1,4 +1,4 @@
-//! Along a space-filling curve: which meshes lie scattered through memory, and the way to bring them together.
+//! Renumbering along a space-filling curve: which meshes lie scattered through memory, and the way to bring them together.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -1,6 +1,7 @@
 //! Polygon meshes: positions and faces, topology, validation, files, built-in meshes, vertex orders.
 //! This room knows no matrices.
 
+pub mod breadth_first;
 pub mod builtin;
 pub mod colours;
 pub mod curve;
@@ -9,7 +10,6 @@ mod defect;
 mod degenerate;
 pub(crate) mod edge_numbers;
 pub mod frame;
-pub mod fronts;
 pub mod generate;
 pub mod incidence;
 pub mod io;

@@ -7,9 +7,9 @@ use std::str::FromStr;
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
+use super::breadth_first::breadth_first;
 use super::curve::morton;
 use super::cuthill_mckee::reverse_cuthill_mckee;
-use super::fronts::breadth_first;
 use super::incidence::Incidence;
 use super::{Faces, Mesh};
 use crate::parallel;

@@ -1,5 +1,5 @@
-//! Who meets whom: corners at each vertex, opposite half-edges, edges, ordered stars, components, boundary
-//! loops, Euler characteristic. Built in linear time by a counting sort, in parallel; no hashing.
+//! Half-edge connectivity of a polygon mesh: opposite half-edges, edges, ordered stars, components, boundary loops,
+//! Euler characteristic. Built in linear time by a counting sort, in parallel; no hashing.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};

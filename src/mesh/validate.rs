@@ -1,4 +1,4 @@
-//! What is wrong with a mesh, all of it at once and each defect with its place; and what is merely odd.
+//! Mesh validation: all defects at once, each with its place, and remarks on what is merely odd.
 
 use std::collections::BTreeMap;
 use std::fmt;

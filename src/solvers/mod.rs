@@ -11,7 +11,7 @@ pub mod heavy_ball;
 pub mod incomplete_cholesky;
 pub mod iteration;
 pub mod jacobi;
-pub mod local;
+pub mod local_update;
 pub mod method;
 pub mod mixed;
 pub mod pia;

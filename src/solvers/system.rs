@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::iteration::Errors;
 use crate::assemble::bounds::SpectralBounds;
-use crate::assemble::stencil::Point;
+use crate::assemble::kernel::Point;
 use crate::assemble::{LimitSystem, Operator};
 use crate::parallel;
 

@@ -5,7 +5,7 @@
 //! soon as band j + 1 of iterate k is there, long before that iterate is complete. A wave therefore advances band
 //! w − 2k of every iterate k at once; these updates touch disjoint parts of two arrays and run in parallel, and all
 //! that they touch stays in cache from one wave to the next. Where rows read [sums over
-//! faces](crate::assemble::polygons), the sums of a band are made one wave before its rows, and iterates follow each
+//! faces](crate::assemble::face_sums), the sums of a band are made one wave before its rows, and iterates follow each
 //! other three bands apart. Every number is computed from the same operands as in
 //! iterations one after the other, so results do not depend on the number of threads, nor on the length of a group
 //! of iterations (Wonnacott's time skewing, 2000).
@@ -19,8 +19,8 @@ use super::chebyshev::Recurrence;
 use super::gauss_seidel::sweep;
 use super::system::STRIP;
 use crate::assemble::Operator;
-use crate::assemble::polygons::BLOCK;
-use crate::assemble::stencil::Point;
+use crate::assemble::face_sums::BLOCK;
+use crate::assemble::kernel::Point;
 use crate::pages::filled;
 use crate::parallel;
 use crate::prefetch::{POINTS_AHEAD, prefetch};

@@ -1,7 +1,7 @@
 //! The rates that are predicted for the methods against the eigenvalues of their dense error matrices.
 
+use limitlab::analysis::a_priori::Promise;
 use limitlab::analysis::predict::predicted_rate;
-use limitlab::analysis::promise::Promise;
 use limitlab::analysis::{Extremes, Spectrum};
 use limitlab::mesh::order::Order;
 use limitlab::schemes::Scheme;

@@ -1,10 +1,10 @@
 //! Proven bounds, cheap intervals and promised counts hold.
 
 use super::{assemble, named, random_systems};
-use limitlab::analysis::bracket::element_bound;
+use limitlab::analysis::a_priori::Promise;
+use limitlab::analysis::dirichlet_neumann::element_bound;
 use limitlab::analysis::eigen::End;
 use limitlab::analysis::interval::interval;
-use limitlab::analysis::promise::Promise;
 use limitlab::analysis::singularity::Singularity;
 use limitlab::analysis::spectrum::{Operator, Source, ends, mesh_ends};
 use limitlab::analysis::{comparison, dense};

@@ -1,8 +1,8 @@
 //! Extreme eigenvalues, their multiplicities and modes, against symbols and dense eigenvalues.
 
 use super::{assemble, named, torus, torus_symbols};
-use limitlab::analysis::bracket::bracket;
 use limitlab::analysis::dense;
+use limitlab::analysis::dirichlet_neumann::bracket;
 use limitlab::analysis::eigen::{End, Request, extreme};
 use limitlab::analysis::singularity::modes;
 use limitlab::analysis::spectrum::{Operator, ends, mesh_ends, symmetric};

@@ -4,7 +4,7 @@ use super::{assemble, named};
 use glam::DVec3;
 use limitlab::analysis::dense;
 use limitlab::analysis::order_study::{self, gauss_southwell, order_study, random_spread};
-use limitlab::analysis::radius::spectral_radius;
+use limitlab::analysis::spectral_radius::spectral_radius;
 use limitlab::assemble::LimitSystem;
 use limitlab::mesh::Surface;
 use limitlab::mesh::noise::add_noise;

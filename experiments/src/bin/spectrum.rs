@@ -7,12 +7,12 @@ use glam::DVec3;
 use serde_json::{Map, Value, json};
 
 use limitlab::Result;
+use limitlab::analysis::a_priori::{Counts, Promise};
 use limitlab::analysis::certificate::{Certificate, certify};
 use limitlab::analysis::dense;
 use limitlab::analysis::eigen::End;
-use limitlab::analysis::promise::{Counts, Promise};
-use limitlab::analysis::radius::{SpectralRadius, spectral_radius};
 use limitlab::analysis::singularity::{Mode, Singularity, modes};
+use limitlab::analysis::spectral_radius::{SpectralRadius, spectral_radius};
 use limitlab::analysis::spectrum::{Ends, Estimate, Extremes, Operator, Spectrum, ends, excited, mesh_ends};
 use limitlab::assemble::LimitSystem;
 use limitlab::assemble::bounds::SpectralBounds;

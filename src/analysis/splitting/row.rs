@@ -1,4 +1,4 @@
-//! One valence of one scheme as plain numbers.
+//! Rows of the tables of splitting matrices: one valence of one scheme as plain numbers.
 
 use nalgebra::{Complex, DVector};
 use rayon::prelude::*;

@@ -7,10 +7,10 @@ use limitlab::Result;
 use limitlab::analysis::interval::interval;
 use limitlab::analysis::spectrum::Operator as Which;
 use limitlab::assemble::Operator;
-use limitlab::mesh::fronts::in_fronts;
+use limitlab::mesh::breadth_first::in_fronts;
 use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::Scheme;
-use limitlab::solvers::local::{Editor, decay};
+use limitlab::solvers::local_update::{Editor, decay};
 use limitlab::solvers::{Stop, mixed};
 use limitlab_experiments::report::{Column, Table};
 

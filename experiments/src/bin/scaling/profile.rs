@@ -5,8 +5,8 @@ use std::time::Instant;
 use glam::{DVec3, Vec3A};
 use limitlab::Result;
 use limitlab::assemble::{LimitSystem, Operator};
+use limitlab::mesh::breadth_first::in_fronts;
 use limitlab::mesh::colours::in_colours;
-use limitlab::mesh::fronts::in_fronts;
 use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::chebyshev::{Chebyshev, Recurrence};
@@ -173,7 +173,7 @@ fn iterations<S: System>(system: &S, points: &[DVec3]) -> f64 {
     })
 }
 
-fn waves<P: limitlab::assemble::stencil::Point>(wavefront: &Wavefront, r: &[P]) -> f64 {
+fn waves<P: limitlab::assemble::kernel::Point>(wavefront: &Wavefront, r: &[P]) -> f64 {
     let recurrence = Recurrence::new((0.1, 1.0));
     let mut x = r.to_vec();
     let mut scratch = wavefront.scratch();

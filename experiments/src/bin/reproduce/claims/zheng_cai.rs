@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::analysis::order_study::order_study;
-use limitlab::analysis::radius::sweep_radius;
+use limitlab::analysis::spectral_radius::sweep_radius;
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::subset::Restriction;
 use limitlab::interpolate::zheng_cai::{Constraints, PhaseOne, interpolate};

@@ -230,7 +230,7 @@ pub fn element_bound(surface: &Surface, scheme: Scheme, operator: Operator, end:
 /// If the Lanczos process of a patch meets numbers that are not finite.
 ///
 /// ```
-/// use limitlab::analysis::bracket::bracket;
+/// use limitlab::analysis::dirichlet_neumann::bracket;
 /// use limitlab::analysis::{eigen::End, spectrum::Operator};
 /// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Surface, builtin};

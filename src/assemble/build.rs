@@ -1,10 +1,10 @@
-//! From faces to the rows of the matrix-free [`Operator`](super::Operator).
+//! Construction of the matrix-free [`Operator`](super::Operator): from faces to rows.
 
 use std::ops::Range;
 
-use super::codes::Codes;
-use super::polygons::Polygons;
-use super::stencil::{Kind, Ring, Rings};
+use super::face_sums::Polygons;
+use super::kernel::{Kind, Ring, Rings};
+use super::neighbours::Codes;
 use crate::error::{Error, Result};
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::order::Numbering;

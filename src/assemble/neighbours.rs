@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::stencil::{Kind, Point, Ring};
+use super::kernel::{Kind, Point, Ring};
 use crate::mesh::incidence::split_rows;
 use crate::pages::large;
 use crate::parallel;

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use glam::Vec3A;
 
-use super::stencil::{Kind, Point};
+use super::kernel::{Kind, Point};
 use crate::mesh::incidence::split_rows;
 use crate::mesh::order::Numbering;
 use crate::mesh::topology::NONE;

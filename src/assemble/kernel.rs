@@ -1,12 +1,12 @@
-//! Rows of A from connectivity alone: which neighbours, with weights that follow from valence and face size. The
-//! kernel of the matrix-free [`Operator`](super::Operator), for double and for single precision.
+//! Kernel of the matrix-free [`Operator`](super::Operator), for double and for single precision: rows of A from
+//! connectivity alone, with weights that follow from valence and face size.
 
 use std::ops::{Add, AddAssign, Range, Sub};
 
 use glam::{DVec3, Vec3A};
 
-use super::codes::{Code, Codes, Row, Window, Windows};
-use super::polygons::Polygons;
+use super::face_sums::Polygons;
+use super::neighbours::{Code, Codes, Row, Window, Windows};
 
 /// What an operator acts on: three right-hand sides of one vertex, interleaved, in doubles (24 bytes) or singles
 /// (16 bytes, one vector register); or a single one, for eigenvectors.

@@ -1,4 +1,4 @@
-//! What the proven bounds promise before any computation: ω intervals that are safe, rates, iteration counts.
+//! A-priori estimates, from the proven bounds alone: ω intervals that are safe, rates, iteration counts.
 
 use glam::DVec3;
 
