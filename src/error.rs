@@ -61,6 +61,14 @@ pub enum Error {
         /// A way out, as an imperative.
         advice: &'static str,
     },
+    /// What is asked of a scheme that has nothing of the kind, and the schemes that have.
+    #[error("{what}: use {}", one_of(schemes))]
+    NotOffered {
+        /// Why not.
+        what: String,
+        /// By name.
+        schemes: &'static [&'static str],
+    },
     /// Normals or shape handles, which act on a refined surface.
     #[error("{what} a surface after {needed} refinements or more")]
     TooFewLevels {
@@ -131,6 +139,14 @@ impl fmt::Debug for Error {
 pub fn short(x: f64) -> String {
     let plain = x == 0.0 || !x.is_finite() || (1e-5..1e15).contains(&x.abs());
     if plain { x.to_string() } else { format!("{x:e}") }
+}
+
+/// `a, b or c`.
+pub fn one_of(names: &[&str]) -> String {
+    match names.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        _ => names.concat(),
+    }
 }
 
 fn at_line(line: Option<usize>) -> String {

@@ -122,7 +122,7 @@ pub enum Source {
     Dense,
     /// A vector attains a proven bound.
     Proven,
-    /// Proven bounds on both sides, around a few exceptional vertices ([`bracket`](mod@super::bracket)).
+    /// Proven bounds on both sides, around a few exceptional vertices ([`bracket`]).
     Bracketed,
     /// The Lanczos process.
     Lanczos,
@@ -227,7 +227,7 @@ pub fn ends(system: &LimitSystem) -> Result<Ends> {
 }
 
 /// As [`ends`], for large meshes: the matrix is not stored; an end that belongs to modes around a few exceptional
-/// vertices is enclosed there ([`bracket`](mod@super::bracket)), with its multiplicity; other ends come from Lanczos
+/// vertices is enclosed there ([`bracket`]), with its multiplicity; other ends come from Lanczos
 /// processes on the [`Operator`](crate::assemble::Operator) in an order of its own. Up to 20 000 vertices the
 /// eigenvalues at these are counted, and none is missed beyond, by factorizations of the whole matrix.
 ///

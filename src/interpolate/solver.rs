@@ -318,12 +318,16 @@ impl Interpolator {
     }
 
     /// Solves `A V = P`, by the first two steps of the chain, for P = `points` from V = `control`, which becomes the
-    /// solution; an empty one stands for V = P. From the second set of points on no array of N points is allocated, unless
+    /// solution; one that is empty, or holds what is not finite, stands for V = P. From the second set of points on no array of N points is allocated, unless
     /// the second step is needed.
     ///
     /// # Panics
     /// If there is not one point a vertex in both.
     pub fn solve(&mut self, points: &[DVec3], control: &mut Vec<DVec3>, stop: &Stop) -> Report {
+        // What a failed solution left is no start.
+        if !parallel::all(control.len(), |v| control[v].is_finite()) {
+            control.clear();
+        }
         self.solve_into(points, control, stop).1
     }
 

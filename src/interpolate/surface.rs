@@ -125,18 +125,22 @@ fn primal(control: Surface, scheme: Refinement, request: &Request) -> Result<Sur
     let given = &request.constraints;
     let wants_limits = request.limit || request.normals;
     if given.handles.is_some() {
-        return Err(Error::Computation(format!(
-            "shape handles scale the type-V faces of Doo-Sabin surfaces, and {scheme} has none: use zheng-cai or nasri"
-        )));
+        return Err(Error::NotOffered {
+            what: format!("shape handles scale the type-V faces of Doo-Sabin surfaces, and {scheme} has none"),
+            schemes: &["zheng-cai", "nasri"],
+        });
     }
     let Some(normals) = given.normals else {
         return Ok(SurfaceMesh::plain(refine(scheme, control, request.levels, wants_limits)?));
     };
     if scheme.class() != Class::Primal {
-        return Err(Error::Computation(format!(
-            "given normals turn the rings of vertices that stay, or tilt the faces of Doo-Sabin surfaces, and {scheme} has \
-             neither: use zheng-cai, nasri or catmull-clark"
-        )));
+        return Err(Error::NotOffered {
+            what: format!(
+                "given normals turn the rings of vertices that stay, or tilt the faces of Doo-Sabin surfaces, and {scheme} \
+                 has neither"
+            ),
+            schemes: &["zheng-cai", "nasri", "catmull-clark"],
+        });
     }
     let needed = request.rotation.levels + 1;
     if request.levels < needed {

@@ -144,6 +144,25 @@ fn an_interpolator_goes_on_from_the_control_points_that_are_there() {
 }
 
 #[test]
+fn points_that_are_not_finite_fail_once_and_leave_no_trace() {
+    let surface = noisy("irregular-poly:300");
+    let stop = Stop { tolerance: 1e-10, max_iterations: 1000 };
+    for marks in [None, Some(&every_third(surface.len())[..])] {
+        let mut interpolator = Interpolator::new(&surface, Scheme::CatmullClark, marks).unwrap();
+        let mut control = Vec::new();
+        let mut bad = surface.positions().to_vec();
+        bad[6].y = f64::NAN;
+        assert_eq!(interpolator.solve(&bad, &mut control, &stop).outcome, Outcome::Diverged);
+        bad[6].y = f64::INFINITY;
+        assert_eq!(interpolator.solve(&bad, &mut control, &stop).outcome, Outcome::Diverged);
+        let report = interpolator.solve(surface.positions(), &mut control, &stop);
+        let once = Options { interpolated: marks, ..stop.into() };
+        let fresh = interpolate(&surface, Scheme::CatmullClark, &once).unwrap();
+        assert_eq!((&report, &control), (&fresh.report, &fresh.points));
+    }
+}
+
+#[test]
 fn what_cannot_be_is_an_error_and_what_fails_is_an_outcome() {
     let flat = Surface::new(Mesh::new(vec![DVec3::ONE; 8], builtin::cube().faces)).unwrap();
     let message = interpolate(&flat, Scheme::Nasri, &Options::default()).unwrap_err().to_string();

@@ -1,7 +1,7 @@
 //! Errors of the library and failed runs in the words of the programs: with the flags that help on the mesh at hand.
 
 use limitlab::analysis::failed::Failed;
-use limitlab::error::Error;
+use limitlab::error::{Error, one_of};
 use limitlab::mesh::Surface;
 use limitlab::mesh::validate::Validation;
 use limitlab::schemes::{Masks, Scheme, SingularSet};
@@ -32,6 +32,7 @@ pub fn of_error(error: &Error, surface: &Surface) -> String {
             let regular = |s: Scheme| s.edges_only() && s.singular_set() == SingularSet::Never;
             with(format!(", or use --boundary as-interior with --scheme {}", names(regular)))
         }
+        Error::NotOffered { what, schemes } => format!("{what}: use --scheme {}", one_of(schemes)),
         Error::TooFewLevels { needed, .. } => with(format!(": use --subdivide {needed} or more")),
         other => other.to_string(),
     }
@@ -40,10 +41,7 @@ pub fn of_error(error: &Error, surface: &Surface) -> String {
 /// The names of some schemes, to choose one from.
 fn names(which: impl Fn(Scheme) -> bool) -> String {
     let names: Vec<&str> = Scheme::ALL.into_iter().filter(|&s| which(s)).map(Scheme::name).collect();
-    match names.split_last() {
-        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
-        _ => names.concat(),
-    }
+    one_of(&names)
 }
 
 /// After a run that did not converge: something to do that is not what has just failed. `unit` is what a length of one

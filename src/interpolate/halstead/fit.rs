@@ -72,10 +72,10 @@ pub fn fit(fairness: &Fairness, points: &[DVec3], wishes: &Constraints, weights:
     assert!(points.len() < fairness.fine.len(), "the given points, not the fine ones");
     wishes.check(points.len())?;
     if wishes.handles.is_some() {
-        return Err(Error::Computation(
-            "shape handles scale the type-V faces of Doo-Sabin surfaces, and the fairest surface is none: use zheng-cai or nasri"
-                .into(),
-        ));
+        return Err(Error::NotOffered {
+            what: "shape handles scale the type-V faces of Doo-Sabin surfaces, and the fairest surface is none".into(),
+            schemes: &["zheng-cai", "nasri"],
+        });
     }
     require_anchors(fairness, wishes, points.len())?;
     let normals = wishes.normals.map(unit_normals).transpose()?;
