@@ -18,6 +18,7 @@ use limitlab_experiments::report::{Animation, Figure, Table, compare};
 use serde_json::{Value as Json, json};
 
 use crate::claims::Record;
+use crate::corpus::{List, Model};
 
 /// One table or figure.
 pub struct Item {
@@ -49,6 +50,14 @@ pub struct Subject {
 }
 
 impl Subject {
+    /// A built-in mesh as it is.
+    ///
+    /// # Errors
+    /// If there is no such mesh.
+    pub fn built_in(name: &str) -> Result<Self> {
+        Ok(Subject { name: name.to_owned(), surface: Surface::new(builtin::builtin(name)?)? })
+    }
+
     /// The limit system under `scheme`.
     ///
     /// # Errors
@@ -130,11 +139,15 @@ impl Context {
         }
     }
 
-    /// A real model, `closed/NAME.off` and the like.
+    /// A real model.
     ///
     /// # Errors
-    /// If it is missing, or invalid under this treatment of the boundary.
-    pub fn model(&self, file: &str, boundary: Boundary) -> Result<Subject> {
+    /// If it is missing, or invalid under its treatment of the boundary.
+    pub fn model(&self, model: &Model) -> Result<Subject> {
+        self.read(model.file, model.boundary)
+    }
+
+    fn read(&self, file: &str, boundary: Boundary) -> Result<Subject> {
         let Some(folder) = &self.models else {
             return Err(Error::Computation(format!("{file} is a real model: run with --meshes DIR")));
         };
@@ -152,8 +165,27 @@ impl Context {
     pub fn stand_in(&self, name: &str) -> Result<Subject> {
         let mut mesh = builtin::builtin(name)?;
         add_noise(&mut mesh, STAND_IN_NOISE.amplitude, STAND_IN_NOISE.seed);
-        let surface = Surface::new(mesh)?;
-        Ok(Subject { name: name.to_owned(), surface })
+        Ok(Subject { name: name.to_owned(), surface: Surface::new(mesh)? })
+    }
+
+    /// The real model where it is at hand, else its stand-in.
+    ///
+    /// # Errors
+    /// As [`model`](Self::model).
+    pub fn subject(&self, model: &Model) -> Result<Subject> {
+        if self.real() { self.model(model) } else { self.stand_in(model.stand_in) }
+    }
+
+    /// The meshes of a list: the real models where they are at hand, else the built-in ones.
+    ///
+    /// # Errors
+    /// As [`model`](Self::model).
+    pub fn list<T: Copy>(&self, list: &List<T>) -> Result<Vec<(Subject, T)>> {
+        if self.real() {
+            list.models.iter().map(|(model, with)| Ok((self.model(model)?, *with))).collect()
+        } else {
+            list.built_in.iter().map(|(name, with)| Ok((self.stand_in(name)?, *with))).collect()
+        }
     }
 
     /// All valid closed models in order of their names, or the stand-ins `otherwise`; none with more than `most`
@@ -179,7 +211,7 @@ impl Context {
         files.sort();
         let mut subjects = Vec::new();
         for file in files {
-            let subject = self.model(&file, Boundary::Refuse)?;
+            let subject = self.read(&file, Boundary::Refuse)?;
             if subject.surface.len() <= most {
                 subjects.push(subject);
             }

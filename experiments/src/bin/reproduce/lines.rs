@@ -7,38 +7,17 @@ use limitlab::analysis::lines::{Preconditioner, Regularity, count};
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::interpolate;
 use limitlab::mesh::noise::move_vertices;
-use limitlab::mesh::validate::Boundary;
-use limitlab::mesh::{Surface, builtin};
 use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::Stop;
 use limitlab_experiments::cli::STAND_IN_NOISE;
 use limitlab_experiments::report::{Cell, Column, Table};
 
-use crate::context::{Context, Item};
+use crate::context::{Context, Item, Subject};
+use crate::corpus;
 
 pub const LINES: Item =
     Item { id: "lines", title: "Line solves along edge loops as a preconditioner for Catmull-Clark", run };
 
-/// With the number of Catmull-Clark refinements.
-const STAND_INS: [(&str, usize); 6] = [
-    ("torus:32x32", 0),
-    ("quad-sphere:4", 0),
-    ("irregular-quad:300", 0),
-    ("irregular-quad:300", 1),
-    ("irregular-quad:300", 2),
-    ("quad-sphere:7", 0),
-];
-const MODELS: [(&str, usize); 9] = [
-    ("closed/bob_334v_quad.off", 0),
-    ("closed/bob_334v_quad.off", 1),
-    ("closed/bob_334v_quad.off", 2),
-    ("closed/spot_2930v_quad.off", 0),
-    ("closed/spot_2930v_quad.off", 1),
-    ("closed/spot_2930v_quad.off", 2),
-    ("closed/horse_2400v_quad.off", 0),
-    ("closed/horse_2400v_quad.off", 1),
-    ("closed/horse_2400v_quad.off", 2),
-];
 /// Vertices of the largest mesh of a quick run.
 const QUICK: usize = 6000;
 /// Relative to the diagonal of the bounding box.
@@ -120,23 +99,24 @@ fn run(context: &mut Context) -> Result<()> {
             / (cost::SETUP + 2.0 * (cost::RESIDUAL + cost::LINES_AT_BEST) + cost::RESIDUAL),
         best = cost::LINES_AT_BEST,
     ));
-    let sources: &[(&str, usize)] = if context.real() { &MODELS } else { &STAND_INS };
-    for &(name, levels) in sources {
-        let surface = if context.real() {
-            context.model(name, Boundary::Refuse)?.surface
-        } else {
-            Surface::new(builtin::builtin(name)?)?
-        };
+    let subjects = if context.real() {
+        context.list(&corpus::LINES)?
+    } else {
+        // As they are: the noise comes after the refinements.
+        let built_in = corpus::LINES.built_in.iter();
+        built_in.map(|&(name, levels)| Ok((Subject::built_in(name)?, levels))).collect::<Result<_>>()?
+    };
+    for (subject, levels) in &subjects {
         // Every refinement makes four vertices of one, but for a few.
-        if !context.quick || surface.len() << (2 * levels) <= QUICK {
-            table.push(row(name, &surface, levels)?);
+        if !context.quick || subject.surface.len() << (2 * levels) <= QUICK {
+            table.push(row(subject, *levels)?);
         }
     }
     context.table(table)
 }
 
-fn row(name: &str, coarse: &Surface, levels: usize) -> Result<Vec<Cell>> {
-    let mut surface = Refinement::CatmullClark.refined_n(coarse, levels)?;
+fn row(subject: &Subject, levels: usize) -> Result<Vec<Cell>> {
+    let mut surface = Refinement::CatmullClark.refined_n(&subject.surface, levels)?;
     move_vertices(&mut surface, STAND_IN_NOISE.amplitude, STAND_IN_NOISE.seed);
     let system = LimitSystem::new(&surface, Scheme::CatmullClark)?;
     let stop = Stop { tolerance: TOLERANCE * surface.diagonal(), max_iterations: LIMIT };
@@ -150,7 +130,7 @@ fn row(name: &str, coarse: &Surface, levels: usize) -> Result<Vec<Cell>> {
     let iterations = auto.report.iterations;
     let irregular = 1.0 - regularity.share();
     Ok(vec![
-        name.trim_start_matches("closed/").trim_end_matches(".off").into(),
+        subject.name.as_str().into(),
         levels.to_string().into(),
         surface.len().to_string().into(),
         regularity.share().into(),

@@ -2,6 +2,7 @@
 
 mod claims;
 mod context;
+mod corpus;
 mod figures;
 mod lines;
 mod methods;

@@ -11,21 +11,11 @@ use limitlab::solvers::{Method, Outcome, Stop, run as solve};
 use limitlab_experiments::report::{Cell, Column, Figure, LinePlot, Scale, Series, Table};
 
 use crate::context::{Context, Item, Subject};
+use crate::corpus;
 
 pub const ALL: Item =
     Item { id: "all-methods", title: "Iterations of every method under every scheme on every mesh", run };
 
-const STAND_INS: [&str; 9] = [
-    "cube",
-    "icosahedron",
-    "prism:17",
-    "torus:32x32",
-    "quad-sphere:4",
-    "icosphere:3",
-    "irregular-quad:1000",
-    "irregular-tri:1000",
-    "irregular-poly:1000",
-];
 /// Meshes with convergence plots, one for every scheme they suit.
 const PLOTTED: [&str; 4] = ["irregular-quad:1000", "irregular-tri:1000", "psb_m104_horse_233v", "spot_2930v_quad"];
 /// The lines of a comparison, each a column: a method's name, and which of its lines where there are several.
@@ -64,7 +54,7 @@ const QUICK: usize = 300;
 fn run(context: &mut Context) -> Result<()> {
     let mut tables = empty_tables();
     let most = if context.quick { QUICK } else { LARGEST };
-    for subject in context.subjects(&STAND_INS, most)? {
+    for subject in context.subjects(&corpus::ALL_METHODS, most)? {
         for scheme in Scheme::ALL {
             if subject.suits(scheme) {
                 one(context, &subject, scheme, &mut tables)?;

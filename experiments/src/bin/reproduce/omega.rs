@@ -2,7 +2,6 @@
 
 use limitlab::Result;
 use limitlab::analysis::sweep::{rounding_floor, sweep};
-use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::method::SOR_OMEGA;
 use limitlab::solvers::{Method, Stop};
@@ -10,23 +9,11 @@ use limitlab_experiments::report::{Column, Table};
 use limitlab_experiments::studies::sweep as study;
 
 use crate::context::{Context, Item, Subject};
+use crate::corpus;
 
 pub const SWEEPS: Item =
     Item { id: "omega-sweeps", title: "Iterations over ω for Jacobi, PIA and SOR, predicted and measured", run };
 
-const STAND_INS: [(&str, Scheme); 5] = [
-    ("torus:32x32", Scheme::CatmullClark),
-    ("quad-sphere:4", Scheme::CatmullClark),
-    ("icosphere:3", Scheme::Loop),
-    ("irregular-quad:1000", Scheme::CatmullClark),
-    ("irregular-poly:1000", Scheme::Nasri),
-];
-const MODELS: [(&str, Scheme); 4] = [
-    ("closed/psb_m104_horse_233v.off", Scheme::Loop),
-    ("closed/spot_2930v_quad.off", Scheme::CatmullClark),
-    ("closed/spot_188v_poly.off", Scheme::CatmullClark),
-    ("closed/psb_m1630_hat_562v.off", Scheme::ZhengCai),
-];
 const METHODS: [Method<'static>; 3] =
     [Method::Jacobi { omega: None }, Method::Pia, Method::Sor { omega: SOR_OMEGA, order: None }];
 /// Relative to the diagonal of the bounding box.
@@ -58,14 +45,7 @@ fn run(context: &mut Context) -> Result<()> {
          excite, `omega_first_divergence` the first ω of the grid at which the run diverged. SOR has no closed form: \
          only its best ω on the grid is given. Each mesh has a table and a picture of its own.",
     );
-    let mut subjects: Vec<(Subject, Scheme)> = if context.real() {
-        MODELS
-            .iter()
-            .map(|(file, scheme)| Ok((context.model(file, Boundary::Refuse)?, *scheme)))
-            .collect::<Result<_>>()?
-    } else {
-        STAND_INS.iter().map(|(name, scheme)| Ok((context.stand_in(name)?, *scheme))).collect::<Result<_>>()?
-    };
+    let mut subjects = context.list(&corpus::SWEEPS)?;
     if context.quick {
         subjects.truncate(QUICK);
     }

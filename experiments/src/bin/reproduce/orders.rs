@@ -2,26 +2,16 @@
 
 use limitlab::Result;
 use limitlab::analysis::order_study::{Row, order_study, random_spread};
-use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::Stop;
 use limitlab_experiments::report::{Column, Table};
 
-use crate::context::{Context, Item, Subject};
+use crate::context::{Context, Item};
+use crate::corpus;
 
 pub const ORDERS: Item =
     Item { id: "orders", title: "Gauss-Seidel and SOR in many vertex orders (open in Zheng-Cai §5)", run };
 
-const STAND_INS: [(&str, &[Scheme]); 4] = [
-    ("torus:24x24", &[Scheme::CatmullClark, Scheme::Nasri, Scheme::ZhengCai]),
-    ("irregular-quad:500", &[Scheme::CatmullClark, Scheme::Nasri]),
-    ("icosphere:2", &[Scheme::Loop, Scheme::Sqrt3]),
-    ("irregular-tri:500", &[Scheme::Loop, Scheme::ZhengCai]),
-];
-const MODELS: [(&str, &[Scheme]); 2] = [
-    ("closed/psb_m1630_hat_562v.off", &[Scheme::ZhengCai, Scheme::Loop]),
-    ("closed/bob_334v_quad.off", &[Scheme::CatmullClark]),
-];
 const OMEGAS: [f64; 2] = [1.0, 1.1];
 const RANDOM: u64 = 20;
 /// Relative to the diagonal of the bounding box.
@@ -50,19 +40,11 @@ fn run(context: &mut Context) -> Result<()> {
          spectral radius may be the least: the error is carried along the front. Colour by colour is the best or \
          within a few sweeps of it and may run in parallel. The order is worth up to a half, never more.",
     );
-    let mut subjects: Vec<(Subject, &[Scheme])> = if context.real() {
-        MODELS
-            .iter()
-            .map(|(file, schemes)| Ok((context.model(file, Boundary::Refuse)?, *schemes)))
-            .collect::<Result<_>>()?
-    } else {
-        STAND_INS.iter().map(|(name, schemes)| Ok((context.stand_in(name)?, *schemes))).collect::<Result<_>>()?
-    };
     if context.quick {
         return Ok(());
     }
-    for (subject, schemes) in &mut subjects {
-        for &scheme in *schemes {
+    for (subject, schemes) in context.list(&corpus::ORDERS)? {
+        for &scheme in schemes {
             let system = subject.system(scheme)?;
             let stop = Stop { tolerance: TOLERANCE * subject.surface.diagonal(), max_iterations: 10_000 };
             let rows = order_study(&subject.surface, &system, &OMEGAS, RANDOM, &stop)?;

@@ -7,11 +7,11 @@
 use limitlab::Result;
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::pia::{TwoStepsBack, passes};
-use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::Scheme;
 use limitlab_experiments::report::{Column, Table};
 
 use crate::context::{Context, Item, Subject};
+use crate::corpus::{self, Model};
 
 pub const TABLE1: Item = Item { id: "pia-table1", title: "PIA Table 1: iterations and errors at 10⁻³", run };
 
@@ -48,7 +48,7 @@ impl Reading {
 /// A row: the paper's name of the model, its file, the reading, and the printed iterations, maximum and mean error.
 struct Line {
     model: &'static str,
-    file: &'static str,
+    mesh: Model,
     reading: Reading,
     printed: (usize, f64, f64),
 }
@@ -56,42 +56,12 @@ struct Line {
 const MUSHROOM: (usize, f64, f64) = (8, 0.000813821, 0.000235506);
 
 const LINES: [Line; 6] = [
-    Line {
-        model: "Horse",
-        file: "closed/psb_m104_horse_233v.off",
-        reading: Reading::Loop,
-        printed: (12, 0.000912016, 0.00022811),
-    },
-    Line {
-        model: "Bird",
-        file: "closed/psb_m32_bird_1129v.off",
-        reading: Reading::Loop,
-        printed: (9, 0.000766811, 8.8345e-5),
-    },
-    Line {
-        model: "Hand",
-        file: "closed/psb_m329_hand_6191v.off",
-        reading: Reading::Loop,
-        printed: (3, 0.000914111, 0.000164207),
-    },
-    Line {
-        model: "Boy",
-        file: "open/psb_m149_boy_17342v_raw.off",
-        reading: Reading::LoopOpen,
-        printed: (6, 0.000913795, 9.5615e-5),
-    },
-    Line {
-        model: "Mushroom",
-        file: "closed/geomview_mushroom_226v.off",
-        reading: Reading::TwoStepsBack,
-        printed: MUSHROOM,
-    },
-    Line {
-        model: "Mushroom",
-        file: "closed/geomview_mushroom_226v.off",
-        reading: Reading::CatmullClark,
-        printed: MUSHROOM,
-    },
+    Line { model: "Horse", mesh: corpus::HORSE, reading: Reading::Loop, printed: (12, 0.000912016, 0.00022811) },
+    Line { model: "Bird", mesh: corpus::BIRD, reading: Reading::Loop, printed: (9, 0.000766811, 8.8345e-5) },
+    Line { model: "Hand", mesh: corpus::HAND, reading: Reading::Loop, printed: (3, 0.000914111, 0.000164207) },
+    Line { model: "Boy", mesh: corpus::BOY, reading: Reading::LoopOpen, printed: (6, 0.000913795, 9.5615e-5) },
+    Line { model: "Mushroom", mesh: corpus::MUSHROOM, reading: Reading::TwoStepsBack, printed: MUSHROOM },
+    Line { model: "Mushroom", mesh: corpus::MUSHROOM, reading: Reading::CatmullClark, printed: MUSHROOM },
 ];
 
 /// Stand-ins of about the models' sizes.
@@ -135,11 +105,7 @@ fn run(context: &mut Context) -> Result<()> {
              26 boundary edges; its boundary vertices are treated as interior.",
         );
         for line in &LINES {
-            let boundary = match line.reading {
-                Reading::LoopOpen => Boundary::AsInterior,
-                _ => Boundary::Refuse,
-            };
-            let subject = context.model(line.file, boundary)?;
+            let subject = context.model(&line.mesh)?;
             row(&mut table, line.model, &subject, line.reading, Some(line.printed))?;
         }
     } else {

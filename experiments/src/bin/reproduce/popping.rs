@@ -2,16 +2,14 @@
 
 use limitlab::Result;
 use limitlab::interpolate::lin_luo::surface::popping;
-use limitlab::mesh::validate::Boundary;
 use limitlab_experiments::report::{Column, Figure, LinePlot, Rule, Series, Table};
 
-use crate::context::{Context, Item, Subject};
+use crate::context::{Context, Item};
+use crate::corpus;
 
 pub const POPPING: Item =
     Item { id: "popping", title: "Lin-Luo §5: how far the unified √3 surface shrinks or bulges over α", run };
 
-const STAND_INS: [&str; 3] = ["icosahedron", "icosphere:1", "irregular-tri:300"];
-const MODELS: [&str; 3] = ["closed/psb_m104_horse_233v.off", "closed/bunny_1839v.off", "closed/fox_313v.off"];
 /// α in eighths, up to 2.
 const EIGHTHS: std::ops::RangeInclusive<usize> = 0..=16;
 /// Steps: the volume is then within about 3⁻⁵ of the limit's change.
@@ -38,16 +36,12 @@ fn run(context: &mut Context) -> Result<()> {
          triangles' centres, from where they were, over the diagonal of the bounding box; `center_outward` is signed \
          along the normals. The jump that a viewer sees between mesh and surface is least where the ratio passes 1."
     ));
-    let mut subjects: Vec<Subject> = if context.real() {
-        MODELS.iter().map(|file| context.model(file, Boundary::Refuse)).collect::<Result<_>>()?
-    } else {
-        STAND_INS.iter().map(|name| context.stand_in(name)).collect::<Result<_>>()?
-    };
+    let mut subjects = context.list(&corpus::POPPING)?;
     if context.quick {
         subjects.truncate(1);
     }
     let mut series = Vec::new();
-    for subject in &subjects {
+    for (subject, ()) in &subjects {
         let mut curve = Vec::new();
         for eighths in EIGHTHS {
             let alpha = eighths as f64 / 8.0;

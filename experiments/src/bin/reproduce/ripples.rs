@@ -3,13 +3,13 @@
 use limitlab::Result;
 use limitlab::interpolate::halstead::{Fairness, Weights, fit, follow};
 use limitlab::interpolate::zheng_cai::Constraints;
-use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::Scheme;
 use limitlab::schemes::catmull_clark::limit_normals;
 use limitlab::solvers::{Method, Stop};
 use limitlab_experiments::report::{Column, Figure, LinePlot, Scale, Series, Table};
 
 use crate::context::{Context, Item};
+use crate::corpus;
 
 pub const RIPPLES: Item = Item {
     id: "ripples",
@@ -50,11 +50,7 @@ fn run(context: &mut Context) -> Result<()> {
          the converged surface: where the deviation passes through a minimum before, stopping early gives a smoother \
          surface at the price of the error shown.",
     );
-    let subject = if context.real() {
-        context.model("closed/bob_334v_quad.off", Boundary::Refuse)?
-    } else {
-        context.stand_in("quad-sphere:3")?
-    };
+    let subject = context.subject(&corpus::BOB)?;
     if context.quick {
         return Ok(());
     }

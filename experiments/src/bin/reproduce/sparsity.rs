@@ -2,22 +2,18 @@
 
 use limitlab::Result;
 use limitlab::mesh::order::{Order, inverse};
-use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::Scheme;
 use limitlab_experiments::report::{Column, Figure, SparsityPlot, Table};
 
 use crate::context::{Context, Item};
+use crate::corpus;
 
 pub const PATTERNS: Item = Item { id: "sparsity", title: "The pattern of A before and after reordering", run };
 
 const ORDERS: [Order; 4] = [Order::File, Order::Rcm, Order::Morton, Order::Random(1)];
 
 fn run(context: &mut Context) -> Result<()> {
-    let subject = if context.real() {
-        context.model("closed/spot_2930v_quad.off", Boundary::Refuse)?
-    } else {
-        context.stand_in("quad-sphere:4")?
-    };
+    let subject = context.subject(&corpus::SPOT_QUADS)?;
     let system = subject.system(Scheme::CatmullClark)?;
     let mut table = Table::new(
         PATTERNS.id,

@@ -8,6 +8,7 @@ use limitlab::solvers::{Method, Stop, run as solve};
 use limitlab_experiments::report::{Column, Figure, LinePlot, Scale, Series, Table};
 
 use crate::context::{Context, Item};
+use crate::corpus;
 
 pub const ITERATIONS: Item = Item {
     id: "thall-iterations",
@@ -15,15 +16,6 @@ pub const ITERATIONS: Item = Item {
     run,
 };
 
-const STAND_INS: [&str; 7] = [
-    "torus:32x32",
-    "quad-sphere:4",
-    "icosphere:3",
-    "irregular-quad:1000",
-    "irregular-tri:1000",
-    "irregular-poly:1000",
-    "prism:17",
-];
 /// Iterates whose error has a column.
 const SHOWN: [usize; 7] = [0, 1, 2, 3, 5, 10, 20];
 /// Relative tolerances whose iterations have a column.
@@ -57,7 +49,7 @@ fn run(context: &mut Context) -> Result<()> {
     );
     let most = if context.quick { QUICK } else { usize::MAX };
     let mut series = Vec::new();
-    for subject in context.subjects(&STAND_INS, most)? {
+    for subject in context.subjects(&corpus::THALL, most)? {
         let system = subject.system(Scheme::CatmullClark)?;
         let jacobi = spectrum(&system)?.jacobi;
         let size = subject.surface.diagonal();

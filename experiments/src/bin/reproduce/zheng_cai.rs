@@ -12,13 +12,13 @@ use glam::DVec3;
 use limitlab::Result;
 use limitlab::analysis::dense::gaussian_elimination;
 use limitlab::assemble::LimitSystem;
-use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::gauss_seidel::sweep;
 use limitlab::solvers::{Method, Stop, run as solve, run_watched};
 use limitlab_experiments::report::{Column, Table};
 
 use crate::context::{Context, Item, Subject};
+use crate::corpus;
 
 pub const SECTION_3_5: Item = Item {
     id: "zheng-cai-3-5",
@@ -36,14 +36,9 @@ const DENSE: usize = 12_000;
 const DENSE_QUICK: usize = 1000;
 
 fn run(context: &mut Context) -> Result<()> {
-    let subjects: Vec<(Subject, Option<usize>)> = if context.real() {
-        vec![
-            (context.model("closed/psb_m1630_hat_562v.off", Boundary::Refuse)?, Some(3)),
-            (context.model("closed/spot_11533v.off", Boundary::Refuse)?, None),
-        ]
-    } else {
-        vec![(context.stand_in("irregular-tri:562")?, None), (context.stand_in("irregular-tri:11540")?, None)]
-    };
+    // The paper's counts belong to its own model.
+    let printed = context.real().then_some(3);
+    let subjects = [(context.subject(&corpus::HAT)?, printed), (context.subject(&corpus::SPOT)?, None)];
     let mut columns = vec![
         Column::key("mesh"),
         Column::text("vertices"),

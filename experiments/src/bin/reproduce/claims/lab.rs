@@ -17,6 +17,7 @@ use limitlab::mesh::{Mesh, Surface, builtin, generate};
 use limitlab::solvers::{Method, Outcome, Solution, Stop, run, run_watched};
 
 use crate::context::{Context, Subject};
+use crate::corpus;
 
 /// Random meshes of [`Lab::polygons`] and [`Lab::triangles`], and the most vertices of each.
 pub const RANDOM_MESHES: usize = 300;
@@ -50,18 +51,8 @@ impl<'a> Lab<'a> {
 
     /// The closed real models, or stand-ins of several kinds, of at most [`MODEL_VERTICES`] vertices.
     pub fn subjects(&self) -> Result<&[Subject]> {
-        const STAND_INS: [&str; 8] = [
-            "torus:32x32",
-            "quad-sphere:4",
-            "icosphere:3",
-            "irregular-quad:1000",
-            "irregular-tri:1000",
-            "irregular-poly:1000",
-            "prism:17",
-            "star:12",
-        ];
         if self.subjects.get().is_none() {
-            let found = self.context.subjects(&STAND_INS, MODEL_VERTICES)?;
+            let found = self.context.subjects(&corpus::CLAIMS, MODEL_VERTICES)?;
             return Ok(self.subjects.get_or_init(|| found));
         }
         Ok(self.subjects.get().map_or(&[], Vec::as_slice))
@@ -88,7 +79,7 @@ pub fn subject(name: impl Into<String>, mesh: Mesh) -> Subject {
 
 /// A built-in mesh without noise.
 pub fn exact(name: &str) -> Result<Subject> {
-    Ok(subject(name, builtin::builtin(name)?))
+    Subject::built_in(name)
 }
 
 /// A closed mesh of quads in which vertices `n` and n + 1 have valence n.

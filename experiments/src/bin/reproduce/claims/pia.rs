@@ -8,7 +8,6 @@ use limitlab::Result;
 use limitlab::analysis::splitting::LocalScheme;
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::pia::{TwoStepsBack, passes};
-use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::loop_scheme::loop_beta;
 use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::{Method, Outcome, Stop, run_watched};
@@ -18,6 +17,7 @@ use super::lab::{
     Lab, each, ends, entries_per_vertex, exact, largest, limit_by_powers, random_points, smallest, solve_random,
 };
 use super::{Claim, pia_catmull_clark};
+use crate::corpus;
 
 const ROUNDING: f64 = 1e-12;
 
@@ -138,14 +138,14 @@ fn table_1(lab: &Lab) -> Result<Finding> {
         ));
     }
     let lines = [
-        ("Horse", "closed/psb_m104_horse_233v.off", 12, (0.000912016, 0.00022811)),
-        ("Bird", "closed/psb_m32_bird_1129v.off", 9, (0.000766811, 8.8345e-5)),
-        ("Hand", "closed/psb_m329_hand_6191v.off", 3, (0.000914111, 0.000164207)),
-        ("Boy", "open/psb_m149_boy_17342v_raw.off", 6, (0.000913795, 9.5615e-5)),
+        ("Horse", corpus::HORSE, 12, (0.000912016, 0.00022811)),
+        ("Bird", corpus::BIRD, 9, (0.000766811, 8.8345e-5)),
+        ("Hand", corpus::HAND, 3, (0.000914111, 0.000164207)),
+        ("Boy", corpus::BOY, 6, (0.000913795, 9.5615e-5)),
     ];
     let mut evidence = Vec::new();
-    for (name, file, printed, errors) in lines {
-        let subject = lab.context.model(file, Boundary::AsInterior)?;
+    for (name, model, printed, errors) in lines {
+        let subject = lab.context.model(&model)?;
         let run = passes(&subject.system(Scheme::Loop)?, subject.surface.positions(), TOLERANCE, 1000);
         evidence.push(Evidence::equal(format!("{name}: passes of the loop"), run.passes, printed as f64));
         evidence.push(Evidence::at_most(
@@ -167,7 +167,7 @@ fn mushroom(lab: &Lab) -> Result<Finding> {
         ));
     }
     let printed = (0.000813821, 0.000235506);
-    let subject = lab.context.model("closed/geomview_mushroom_226v.off", Boundary::Refuse)?;
+    let subject = lab.context.model(&corpus::MUSHROOM)?;
     let system = subject.system(Scheme::CatmullClark)?;
     let points = subject.surface.positions();
     let surface = passes(&system, points, TOLERANCE, 1000);

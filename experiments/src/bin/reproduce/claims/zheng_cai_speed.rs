@@ -5,7 +5,6 @@ use std::time::Instant;
 use limitlab::Result;
 use limitlab::analysis::dense::gaussian_elimination;
 use limitlab::interpolate::zheng_cai::{Constraints, FirstRefinement, PhaseOne, Sweep, auxiliary};
-use limitlab::mesh::validate::Boundary;
 use limitlab::schemes::Scheme;
 use limitlab::schemes::doo_sabin::Rule;
 use limitlab::solvers::{Method, Stop, run};
@@ -13,6 +12,7 @@ use limitlab::solvers::{Method, Stop, run};
 use super::finding::{Evidence, Finding, Value};
 use super::lab::{Lab, each, entries_per_vertex, exact, history, largest, median, smallest};
 use crate::context::Subject;
+use crate::corpus;
 
 const GAUSS_SEIDEL: Method = Method::GaussSeidel { order: None };
 
@@ -22,7 +22,7 @@ pub fn sweeps(lab: &Lab) -> Result<Finding> {
             "Needs a model of 562 vertices of the Princeton Shape Benchmark: run with --meshes DIR.",
         ));
     }
-    let subject = lab.context.model("closed/psb_m1630_hat_562v.off", Boundary::Refuse)?;
+    let subject = lab.context.model(&corpus::HAT)?;
     let phase = PhaseOne { max_iterations: 100, ..PhaseOne::default() };
     let found = auxiliary(&subject.surface, None, &phase)?;
     let size = subject.surface.diagonal();
@@ -43,19 +43,11 @@ pub fn sweeps(lab: &Lab) -> Result<Finding> {
 
 /// The paper's own model where it is at hand, else a stand-in of its size.
 pub fn model_562(lab: &Lab) -> Result<Subject> {
-    if lab.context.real() {
-        lab.context.model("closed/psb_m1630_hat_562v.off", Boundary::Refuse)
-    } else {
-        lab.context.stand_in("irregular-tri:562")
-    }
+    lab.context.subject(&corpus::HAT)
 }
 
 pub fn model_11540(lab: &Lab) -> Result<Subject> {
-    if lab.context.real() {
-        lab.context.model("closed/spot_11533v.off", Boundary::Refuse)
-    } else {
-        lab.context.stand_in("irregular-tri:11540")
-    }
+    lab.context.subject(&corpus::SPOT)
 }
 
 /// The shortest of `repeats` runs, in seconds.

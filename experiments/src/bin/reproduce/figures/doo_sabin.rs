@@ -13,6 +13,7 @@ use limitlab_experiments::report::{Colour, Paint, Picture, Points, ShadedMesh, V
 
 use super::{Album, CONTROL, FACES, GIVEN, Line, POINT, cage, plain, sheet, view};
 use crate::context::Subject;
+use crate::corpus;
 
 /// Doo-Sabin until facets are no longer seen.
 fn surface(first: &Surface) -> Result<ShadedMesh> {
@@ -47,7 +48,7 @@ fn panels(view: View, framed: &[DVec3], shown: Vec<(&str, ShadedMesh)>) -> Vec<P
 
 /// Fig. 3: the Doo-Sabin surface of a mesh, and the one through its vertices.
 pub fn approximation(album: &mut Album) -> Result<()> {
-    let subject = album.subject("closed/letterp_26v_poly.off", "irregular-poly:40")?;
+    let subject = album.subject(&corpus::LETTER)?;
     let approximating = Refinement::DooSabin.refined(&subject.surface)?;
     let found = two_phase(&subject, &Constraints::default())?;
     let auxiliary = found.auxiliary.surface.mesh();
@@ -76,7 +77,7 @@ pub fn approximation(album: &mut Album) -> Result<()> {
 
 /// Fig. 4: Zheng and Cai's method and Nasri's on one mesh.
 pub fn against_nasri(album: &mut Album) -> Result<()> {
-    let subject = album.subject("closed/psb_m1630_hat_562v.off", "irregular-tri:562")?;
+    let subject = album.subject(&corpus::HAT)?;
     let found = two_phase(&subject, &Constraints::default())?;
     let stop = Stop { tolerance: 1e-10 * subject.surface.diagonal(), max_iterations: 10 };
     let solution = nasri::control_points(&subject.surface, None, Method::Lu, &stop)?;
@@ -103,7 +104,7 @@ pub fn against_nasri(album: &mut Album) -> Result<()> {
 
 /// Fig. 5: a large mesh.
 pub fn large(album: &mut Album) -> Result<()> {
-    let subject = album.subject("closed/spot_11533v.off", "irregular-tri:11540")?;
+    let subject = album.subject(&corpus::SPOT)?;
     let found = two_phase(&subject, &Constraints::default())?;
     let shown = vec![
         ("(a) input", cage(subject.surface.mesh(), GIVEN)),

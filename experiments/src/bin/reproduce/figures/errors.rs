@@ -12,13 +12,14 @@ use limitlab::solvers::{Method, System};
 use limitlab_experiments::report::{ColourScale, Picture, ShadedMesh};
 
 use super::{Album, FINE_EDGE, Line, control, plain, power, sheet, view};
+use crate::corpus::{self, Model};
 
 /// Iterates of the maps.
 const SHOWN: [usize; 6] = [0, 1, 2, 5, 10, 20];
 
 /// ‖p_i − (A v)_i‖ on the mesh while PIA goes on.
 pub fn maps(album: &mut Album) -> Result<()> {
-    let subject = album.subject("closed/psb_m104_horse_233v.off", "irregular-tri:233")?;
+    let subject = album.subject(&corpus::HORSE)?;
     let system = subject.system(Scheme::Loop)?;
     let size = subject.surface.diagonal();
     let scale = ColourScale::logarithmic("error / L", (1e-6, 1e-1));
@@ -54,7 +55,7 @@ pub fn maps(album: &mut Album) -> Result<()> {
 pub fn slow_modes(album: &mut Album) -> Result<()> {
     let plain = |name: &str| plain(name, builtin::builtin(name)?);
     let mut subjects = vec![plain("truncated-octahedron")?, plain("prism:17")?, plain("torus:24x12")?];
-    subjects.push(album.subject("closed/spot_188v_poly.off", "irregular-quad:226")?);
+    subjects.push(album.subject(&Model { stand_in: "irregular-quad:226", ..corpus::SPOT_COARSE })?);
     let scale = ColourScale::signed("eigenvector / largest", 1.0);
     let mut panels = Vec::new();
     for (i, subject) in subjects.iter().enumerate() {

@@ -9,13 +9,13 @@ use limitlab_experiments::report::{Figure, Picture, Points};
 
 use super::{Album, GIVEN, Line, POINT, cage, control, limit_surface, sheet, view};
 use crate::context::Subject;
+use crate::corpus::{self, Model};
 
 /// A figure of the PIA paper.
 struct Printed {
     name: &'static str,
     caption: &'static str,
-    file: &'static str,
-    otherwise: &'static str,
+    model: Model,
     scheme: Scheme,
     /// Updates: the paper's iterations less one.
     updates: usize,
@@ -33,8 +33,7 @@ const PRINTED: [Printed; 5] = [
     Printed {
         name: "pia-3-horse",
         caption: "PIA Fig. 3 (horse): mesh and Loop surface, 12 iterations",
-        file: "closed/psb_m104_horse_233v.off",
-        otherwise: "irregular-tri:233",
+        model: corpus::HORSE,
         scheme: Scheme::Loop,
         updates: 11,
         up: DVec3::Y,
@@ -46,8 +45,7 @@ const PRINTED: [Printed; 5] = [
     Printed {
         name: "pia-4-bird",
         caption: "PIA Fig. 4 (bird): mesh and Loop surface, 9 iterations",
-        file: "closed/psb_m32_bird_1129v.off",
-        otherwise: "irregular-tri:1129",
+        model: corpus::BIRD,
         scheme: Scheme::Loop,
         updates: 8,
         up: DVec3::Y,
@@ -59,8 +57,7 @@ const PRINTED: [Printed; 5] = [
     Printed {
         name: "pia-5-hand",
         caption: "PIA Fig. 5 (hand): mesh and Loop surface, 3 iterations",
-        file: "closed/psb_m329_hand_6191v.off",
-        otherwise: "irregular-tri:6191",
+        model: corpus::HAND,
         scheme: Scheme::Loop,
         updates: 2,
         up: DVec3::NEG_Y,
@@ -72,8 +69,7 @@ const PRINTED: [Printed; 5] = [
     Printed {
         name: "pia-6-boy",
         caption: "PIA Fig. 6 (boy, holes filled): mesh and Loop surface, 6 iterations; the head alone",
-        file: "closed/psb_m149_boy_17342v_holesfilled.off",
-        otherwise: "icosphere:5",
+        model: corpus::BOY_FILLED,
         scheme: Scheme::Loop,
         updates: 5,
         up: DVec3::Y,
@@ -85,8 +81,7 @@ const PRINTED: [Printed; 5] = [
     Printed {
         name: "pia-7-mushroom",
         caption: "PIA Fig. 7 (mushroom): mesh and Catmull-Clark surface, 8 iterations",
-        file: "closed/geomview_mushroom_226v.off",
-        otherwise: "irregular-quad:226",
+        model: corpus::MUSHROOM,
         scheme: Scheme::CatmullClark,
         updates: 7,
         up: DVec3::Y,
@@ -100,7 +95,7 @@ const PRINTED: [Printed; 5] = [
 /// The mesh beside its interpolating surface.
 pub fn pia(album: &mut Album) -> Result<()> {
     for printed in &PRINTED {
-        let subject = album.subject(printed.file, printed.otherwise)?;
+        let subject = album.subject(&printed.model)?;
         let system = subject.system(printed.scheme)?;
         let (cage_mesh, error) = control(&subject, &system, Method::Pia, printed.updates);
         let surface = limit_surface(printed.scheme.refinement(), &cage_mesh)?;
@@ -156,11 +151,9 @@ fn thall_pictures(subject: &Subject, iterates: &[usize]) -> Result<(Vec<Picture>
     Ok((panels, last))
 }
 
-const THALL_MODEL: (&str, &str) = ("closed/spot_188v_poly.off", "quad-sphere:2");
-
 /// Thall's iteration: the limit surface of every iterate, with the points that it has to reach.
 pub fn thall_series(album: &mut Album) -> Result<()> {
-    let subject = album.subject(THALL_MODEL.0, THALL_MODEL.1)?;
+    let subject = album.subject(&corpus::SPOT_COARSE)?;
     let (panels, last) = thall_pictures(&subject, &SERIES)?;
     let line = Line {
         name: "thall-iterations",
@@ -174,7 +167,7 @@ pub fn thall_series(album: &mut Album) -> Result<()> {
 
 /// The same, moving.
 pub fn thall_animation(album: &mut Album) -> Result<()> {
-    let subject = album.subject(THALL_MODEL.0, THALL_MODEL.1)?;
+    let subject = album.subject(&corpus::SPOT_COARSE)?;
     let iterates: Vec<usize> = (0..=6).collect();
     let (panels, last) = thall_pictures(&subject, &iterates)?;
     let frames: Vec<Figure> = (panels.into_iter()).map(|panel| sheet(1, (94, 104), vec![panel])).collect();

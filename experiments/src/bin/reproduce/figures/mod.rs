@@ -13,13 +13,13 @@ mod sqrt3;
 use glam::DVec3;
 use limitlab::Result;
 use limitlab::assemble::LimitSystem;
-use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Mesh, Surface, diagonal};
 use limitlab::schemes::Refinement;
 use limitlab::solvers::{Method, Stop, run as solve};
 use limitlab_experiments::report::{Colour, Column, Figure, Picture, ShadedMesh, Table, View};
 
 use crate::context::{Context, Item, Subject};
+use crate::corpus::Model;
 
 pub const ALL: Item =
     Item { id: "figures", title: "Pictures of the papers' surfaces, of errors and of slow modes", run };
@@ -114,9 +114,9 @@ impl<'a> Album<'a> {
         Album { context, table }
     }
 
-    /// The real model `file`, or the built-in mesh `otherwise`.
-    fn subject(&self, file: &str, otherwise: &str) -> Result<Subject> {
-        if self.context.real() { self.context.model(file, Boundary::Refuse) } else { self.context.stand_in(otherwise) }
+    /// As [`Context::subject`].
+    fn subject(&self, model: &Model) -> Result<Subject> {
+        self.context.subject(model)
     }
 
     fn add(&mut self, line: &Line, figure: &Figure) -> Result<()> {

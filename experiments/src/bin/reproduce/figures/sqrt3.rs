@@ -9,6 +9,7 @@ use limitlab::schemes::Refinement;
 use limitlab_experiments::report::{Finish, Picture, Points, ShadedMesh};
 
 use super::{Album, FACES, GIVEN, Line, POINT, cage, sheet, view};
+use crate::corpus;
 
 /// The mesh after `steps` of the unified scheme.
 fn refined(surface: &Surface, alpha: &[f64], steps: usize) -> Result<Mesh> {
@@ -30,7 +31,7 @@ fn steps(mesh: &Mesh) -> usize {
 
 /// Fig. 5: modified Butterfly and the interpolatory √3 scheme, and beside them Labsik and Greiner's.
 pub fn against_butterfly(album: &mut Album) -> Result<()> {
-    let subject = album.subject("closed/bob_small_250v.off", "tri-torus:12x7")?;
+    let subject = album.subject(&corpus::BOB_TRIANGLES)?;
     let mesh = subject.surface.mesh();
     let view = view(DVec3::Y, 35.0, 20.0);
     let butterfly = ShadedMesh::smooth(Refinement::Butterfly.refine_n(&subject.surface, 4)?);
@@ -57,7 +58,7 @@ pub fn against_butterfly(album: &mut Album) -> Result<()> {
 
 /// Fig. 6: a bunny under the interpolatory √3 scheme, step by step.
 pub fn bunny(album: &mut Album) -> Result<()> {
-    let subject = album.subject("closed/bunny_1839v.off", "irregular-tri:1129")?;
+    let subject = album.subject(&corpus::BUNNY)?;
     let mesh = subject.surface.mesh();
     let alpha = vec![1.0; mesh.len()];
     let view = view(DVec3::Y, 0.0, 10.0);
@@ -76,11 +77,9 @@ pub fn bunny(album: &mut Album) -> Result<()> {
     album.add(&line, &sheet(3, (135, 138), panels))
 }
 
-const MODEL: (&str, &str) = ("closed/tripod_24v.off", "star:5");
-
 /// Fig. 7: the surfaces for several α, and two through some vertices only.
 pub fn parameters(album: &mut Album) -> Result<()> {
-    let subject = album.subject(MODEL.0, MODEL.1)?;
+    let subject = album.subject(&corpus::TRIPOD)?;
     let mesh = subject.surface.mesh();
     let view = view(DVec3::Y, 35.0, 25.0);
     let all = |alpha: f64| vec![alpha; mesh.len()];
@@ -119,7 +118,7 @@ pub fn parameters(album: &mut Album) -> Result<()> {
 
 /// How smooth the surfaces are: reflection lines for α = 0, ½, 1.
 pub fn reflections(album: &mut Album) -> Result<()> {
-    let subject = album.subject(MODEL.0, MODEL.1)?;
+    let subject = album.subject(&corpus::TRIPOD)?;
     let mesh = subject.surface.mesh();
     let view = view(DVec3::Y, 35.0, 25.0);
     let mut panels = Vec::new();
