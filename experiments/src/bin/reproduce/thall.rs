@@ -49,7 +49,7 @@ fn run(context: &mut Context) -> Result<()> {
     );
     let most = if context.quick { QUICK } else { usize::MAX };
     let mut series = Vec::new();
-    for subject in context.subjects(&corpus::THALL, most)? {
+    for subject in context.subjects(corpus::THALL, most)? {
         let system = subject.system(Scheme::CatmullClark)?;
         let jacobi = spectrum(&system)?.jacobi;
         let size = subject.surface.diagonal();
