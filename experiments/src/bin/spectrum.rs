@@ -352,14 +352,17 @@ fn eigenvalue_table(subject: &Subject, found: &Findings, n: usize) -> Table {
 /// The components of a mesh, and what theory says of its system.
 fn of_a_mesh(verdict: &Singularity) -> String {
     let kernel = verdict.kernel_dimension();
+    let components = |n: usize| format!("{n} {}", if n == 1 { "component" } else { "components" });
     let mut text = format!(
-        "{} components; {}",
-        verdict.components,
+        "{}; {}",
+        components(verdict.components),
         if kernel > 0 {
             format!(
-                "**singular**: {kernel} components (the first begins at vertex {}) have {}, the null vectors are \
+                "**singular**: {} (the first begins at vertex {}) {} {}, the null vectors are \
                  their ±1 colourings, and the points {} a part that no control points reach.",
+                components(kernel),
                 verdict.singular[0].first_vertex,
+                if kernel == 1 { "has" } else { "have" },
                 verdict.set.condition().unwrap_or_default(),
                 if verdict.excited { "have" } else { "do not have" }
             )
