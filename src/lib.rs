@@ -8,6 +8,8 @@
 //! The rooms, each of which uses only the ones above it: [`error`], [`output`], [`mesh`], [`schemes`],
 //! [`assemble`], [`solvers`], [`analysis`], [`interpolate`].
 
+#![cfg_attr(not(test), warn(clippy::unwrap_used))]
+
 pub mod analysis;
 pub mod assemble;
 pub mod error;

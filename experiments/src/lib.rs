@@ -6,6 +6,8 @@
 //! | [`cli`] | flags, MESH names, exit status, progress | formulas |
 //! | [`studies`] | tables and figures that more than one program makes | – |
 
+#![cfg_attr(not(test), warn(clippy::unwrap_used))]
+
 pub mod cli;
 pub mod report;
 pub mod studies;
