@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::kernel::Point;
+use super::kernel::{Point, Weight};
 use crate::error::{Error, Result};
 use crate::mesh::incidence::split_rows;
 use crate::parallel;
@@ -216,7 +216,7 @@ impl Csr {
         let range = self.pattern.range(i);
         let mut sum = P::ZERO;
         for (&j, &a) in self.pattern.columns[range.clone()].iter().zip(&self.values[range]) {
-            sum += x[j as usize].times(P::weight(a));
+            sum += x[j as usize].times(P::Weight::of(a));
         }
         sum
     }

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use glam::Vec3A;
 
-use super::kernel::{Kind, Point};
+use super::kernel::{Kind, Point, Weight};
 use crate::mesh::incidence::split_rows;
 use crate::mesh::order::Numbering;
 use crate::mesh::topology::NONE;
@@ -163,7 +163,7 @@ impl Polygons {
                 self.circulants.push(0.0);
             }
         }
-        self.single = self.double.iter().map(|t| t.map(Vec3A::weight)).collect();
+        self.single = self.double.iter().map(|t| t.map(<Vec3A as Weight>::of)).collect();
     }
 
     /// The faces at every row.
@@ -339,7 +339,7 @@ impl Polygons {
             }
         };
         let corners = &self.corners[corners];
-        let [constant, cosine] = self.weights[size].map(P::weight);
+        let [constant, cosine] = self.weights[size].map(P::Weight::of);
         if self.parts == 1 {
             for (corners, sum) in corners.chunks_exact(size).zip(sums) {
                 if far {
@@ -351,7 +351,7 @@ impl Polygons {
             }
             return;
         }
-        let turns = &P::turns(self)[self.first_turn[size] as usize..][..size];
+        let turns = &P::Weight::turns(self)[self.first_turn[size] as usize..][..size];
         for (corners, sums) in corners.chunks_exact(size).zip(sums.as_chunks_mut::<3>().0) {
             if far {
                 fetch();
@@ -383,7 +383,7 @@ impl Polygons {
     #[inline(always)]
     fn gather_run<P: Point>(&self, rows: Range<usize>, n: usize, (sums, first): (&[P], usize), out: &mut [P]) {
         let far = is_far(sums);
-        let turns = P::turns(self);
+        let turns = P::Weight::turns(self);
         let start = self.at(rows.start).start;
         for (k, out) in out.iter_mut().enumerate() {
             let e = start + k * n..start + (k + 1) * n;
@@ -420,7 +420,7 @@ impl Polygons {
             // A sum of its own, so that no face need wait for another.
             let mut part = P::ZERO;
             for (&j, &m) in corners.iter().zip(weights) {
-                part += points[(j as usize).wrapping_sub(start)].times(P::weight(m));
+                part += points[(j as usize).wrapping_sub(start)].times(P::Weight::of(m));
             }
             total += part;
         }

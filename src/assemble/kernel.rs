@@ -14,29 +14,26 @@ pub trait Point: Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + 
     /// The neutral element of the sum.
     const ZERO: Self;
     /// A weight as the kernel multiplies by it.
-    type Weight: Copy + Send + Sync;
+    type Weight: Weight;
 
-    /// A weight in the precision of the kernel.
-    fn weight(w: f64) -> Self::Weight;
     /// The point, or number, times a weight.
     fn times(self, w: Self::Weight) -> Self;
-    /// The weights by valence in this precision.
-    fn rings(stencil: &Stencil) -> &Rings<Self::Weight>;
-    /// The turns of the corners of faces in this precision.
-    fn turns(polygons: &Polygons) -> &[[Self::Weight; 2]];
 }
 
-impl Point for DVec3 {
-    const ZERO: Self = DVec3::ZERO;
-    type Weight = f64;
+/// A weight in one of the two precisions, and where the weights of that precision are kept.
+pub trait Weight: Copy + Send + Sync {
+    /// Rounded to this precision.
+    fn of(w: f64) -> Self;
+    /// The weights by valence.
+    fn rings(stencil: &Stencil) -> &Rings<Self>;
+    /// The turns of the corners of faces.
+    fn turns(polygons: &Polygons) -> &[[Self; 2]];
+}
 
+impl Weight for f64 {
     #[inline(always)]
-    fn weight(w: f64) -> f64 {
+    fn of(w: f64) -> f64 {
         w
-    }
-    #[inline(always)]
-    fn times(self, w: f64) -> Self {
-        w * self
     }
     #[inline(always)]
     fn rings(stencil: &Stencil) -> &Rings<f64> {
@@ -48,40 +45,11 @@ impl Point for DVec3 {
     }
 }
 
-impl Point for f64 {
-    const ZERO: Self = 0.0;
-    type Weight = f64;
-
+/// Single precision, the weight in every lane, so that a loop need not spread it.
+impl Weight for Vec3A {
     #[inline(always)]
-    fn weight(w: f64) -> f64 {
-        w
-    }
-    #[inline(always)]
-    fn times(self, w: f64) -> Self {
-        w * self
-    }
-    #[inline(always)]
-    fn rings(stencil: &Stencil) -> &Rings<f64> {
-        &stencil.double
-    }
-    #[inline(always)]
-    fn turns(polygons: &Polygons) -> &[[f64; 2]] {
-        polygons.double()
-    }
-}
-
-impl Point for Vec3A {
-    const ZERO: Self = Vec3A::ZERO;
-    // In every lane, so that a loop need not spread it.
-    type Weight = Vec3A;
-
-    #[inline(always)]
-    fn weight(w: f64) -> Vec3A {
+    fn of(w: f64) -> Vec3A {
         Vec3A::splat(w as f32)
-    }
-    #[inline(always)]
-    fn times(self, w: Vec3A) -> Self {
-        w * self
     }
     #[inline(always)]
     fn rings(stencil: &Stencil) -> &Rings<Vec3A> {
@@ -90,6 +58,36 @@ impl Point for Vec3A {
     #[inline(always)]
     fn turns(polygons: &Polygons) -> &[[Vec3A; 2]] {
         polygons.single()
+    }
+}
+
+impl Point for DVec3 {
+    const ZERO: Self = DVec3::ZERO;
+    type Weight = f64;
+
+    #[inline(always)]
+    fn times(self, w: f64) -> Self {
+        w * self
+    }
+}
+
+impl Point for f64 {
+    const ZERO: Self = 0.0;
+    type Weight = f64;
+
+    #[inline(always)]
+    fn times(self, w: f64) -> Self {
+        w * self
+    }
+}
+
+impl Point for Vec3A {
+    const ZERO: Self = Vec3A::ZERO;
+    type Weight = Vec3A;
+
+    #[inline(always)]
+    fn times(self, w: Vec3A) -> Self {
+        w * self
     }
 }
 
@@ -140,7 +138,13 @@ impl Rings<f64> {
         let single = |rings: &[Ring<f64>]| {
             rings
                 .iter()
-                .map(|r| Ring::new(Vec3A::weight(r.own), Vec3A::weight(r.edge), Vec3A::weight(r.across)))
+                .map(|r| {
+                    Ring::new(
+                        <Vec3A as Weight>::of(r.own),
+                        <Vec3A as Weight>::of(r.edge),
+                        <Vec3A as Weight>::of(r.across),
+                    )
+                })
                 .collect()
         };
         Rings { quads: single(&self.quads), edges: single(&self.edges), polygons: single(&self.polygons) }
@@ -247,7 +251,7 @@ impl Stencil {
         mut out: &mut [P],
     ) {
         use Kind::{Edges, Polygons, Quads};
-        let rings = P::rings(self);
+        let rings = P::Weight::rings(self);
         for run in window.runs() {
             let Range { start: from, end: to } = run.rows();
             let out = out.split_off_mut(..to - from).expect("one place a row");
@@ -300,7 +304,7 @@ impl Stencil {
         start: usize,
         faces: impl Fn(usize) -> P,
     ) -> P {
-        let rings = P::rings(self);
+        let rings = P::Weight::rings(self);
         let row = i - start;
         match self.kinds[i] {
             Kind::Quads => {

@@ -20,7 +20,7 @@ use super::gauss_seidel::sweep;
 use super::system::STRIP;
 use crate::assemble::Operator;
 use crate::assemble::face_sums::BLOCK;
-use crate::assemble::kernel::Point;
+use crate::assemble::kernel::{Point, Weight};
 use crate::pages::filled;
 use crate::parallel;
 use crate::prefetch::{POINTS_AHEAD, prefetch};
@@ -267,7 +267,7 @@ impl<'a> Wavefront<'a> {
     /// `out ← v + γ (v − out) + τ (r − A v)` on the rows of the task.
     fn update<P: Point>(&self, task: Update<P>, r: &[P]) {
         let (gamma, tau) = task.coefficients;
-        let (gamma, tau) = (P::weight(gamma), P::weight(tau));
+        let (gamma, tau) = (P::Weight::of(gamma), P::Weight::of(tau));
         let (points, start) = task.window;
         let mut image = [P::ZERO; STRIP];
         for (first, out) in task.rows.step_by(STRIP).zip(task.out.chunks_mut(STRIP)) {
