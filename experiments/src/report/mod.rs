@@ -4,6 +4,7 @@
 //! about. What it writes is the same, byte for byte, for the same input on the same machine.
 //!
 //! - [`table`]: a [`Table`] of typed columns and its three forms;
+//! - [`columns`]: the columns of a table with what each holds of a record;
 //! - [`mod@compare`]: a fresh table held against a committed CSV file, within each column's tolerance;
 //! - [`figure`]: a grid of panels rendered to an [`Image`], drawn three times finer than it is written so that
 //!   every line is anti-aliased;
@@ -16,6 +17,7 @@
 
 mod axis;
 mod canvas;
+pub mod columns;
 pub mod compare;
 pub mod figure;
 pub mod index;
@@ -29,6 +31,7 @@ pub mod table;
 
 pub use axis::Scale;
 pub use canvas::{Colour, Dash, Marker};
+pub use columns::Columns;
 pub use compare::compare;
 pub use figure::{Figure, Panel};
 pub use number::readable;

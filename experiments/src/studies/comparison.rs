@@ -4,8 +4,7 @@ use std::str::FromStr;
 
 use serde_json::{Value, json};
 
-use crate::cli::number;
-use crate::report::{Column, Figure, LinePlot, Scale, Series, Table};
+use crate::report::{Column, Columns, Figure, LinePlot, Scale, Series, Table};
 use limitlab::analysis::comparison::Row;
 use limitlab::analysis::own::Named;
 use limitlab::solvers::{Method, Solution};
@@ -46,47 +45,31 @@ pub fn auto_row(solution: Solution) -> Row<'static> {
 
 /// One row a method; `about` says which system, start and tolerance. What an outcome has for a reason is a note.
 pub fn table(id: String, title: String, about: String, rows: &[Row]) -> Table {
-    let mut table = Table::new(
-        id,
-        title,
-        vec![
-            Column::key("method"),
-            Column::key("parameter"),
-            Column::text("status"),
-            Column::count("iterations"),
-            Column::number("max_error", 1e-6, 3),
-            Column::number("mean_error", 1e-6, 3),
-            Column::number("observed_rate", 1e-3, 4),
-            Column::number("predicted_rate", 1e-6, 4),
-            Column::count("fill"),
-            Column::time("seconds_setup"),
-            Column::time("seconds_solve"),
-        ],
-    );
+    let mut table = columns().table(id, title, rows);
     table.note(format!(
         "{about} Rates are factors per iteration; `fill` counts the stored entries of the factors, where the library tells."
     ));
     for row in rows {
-        let report = &row.solution.report;
-        let last = report.last();
-        table.push(vec![
-            row.method.name().into(),
-            row.parameter.as_str().into(),
-            report.outcome.name().into(),
-            report.iterations.into(),
-            last.max.into(),
-            last.mean.into(),
-            row.observed_rate.into(),
-            row.predicted_rate.into(),
-            row.solution.fill.into(),
-            row.solution.setup_seconds.into(),
-            row.solution.solve_seconds.into(),
-        ]);
-        if let Some(detail) = &report.detail {
+        if let Some(detail) = &row.solution.report.detail {
             table.note(format!("{} ({}): {detail}", row.method, row.parameter));
         }
     }
     table
+}
+
+fn columns<'r>() -> Columns<'static, Row<'r>> {
+    Columns::new()
+        .col(Column::key("method"), |r: &Row| r.method.name().to_owned())
+        .col(Column::key("parameter"), |r| r.parameter.clone())
+        .col(Column::text("status"), |r| r.solution.report.outcome.name())
+        .col(Column::count("iterations"), |r| r.solution.report.iterations)
+        .col(Column::number("max_error", 1e-6, 3), |r| r.solution.report.last().max)
+        .col(Column::number("mean_error", 1e-6, 3), |r| r.solution.report.last().mean)
+        .col(Column::number("observed_rate", 1e-3, 4), |r| r.observed_rate)
+        .col(Column::number("predicted_rate", 1e-6, 4), |r| r.predicted_rate)
+        .col(Column::count("fill"), |r| r.solution.fill)
+        .col(Column::time("seconds_setup"), |r| r.solution.setup_seconds)
+        .col(Column::time("seconds_solve"), |r| r.solution.solve_seconds)
 }
 
 /// The maximum errors over the iterations, a line for each method that iterates; `unit` is what errors are measured in.
@@ -115,27 +98,20 @@ pub fn figure(title: String, unit: &str, rows: &[Row]) -> Figure {
     })
 }
 
-/// The rows as `compare-solvers --json` has them: a number that is not finite is `null`.
+/// The rows as `compare-solvers --json` has them: the columns of the table, the durations in an object of their own,
+/// and what an outcome has for a reason.
 pub fn json(rows: &[Row]) -> Value {
-    let row = |row: &Row| {
-        let report = &row.solution.report;
-        let last = report.last();
-        json!({
-            "method": row.method.name(),
-            "parameter": row.parameter,
-            "iterations": report.iterations,
-            "status": report.outcome.name(),
-            "detail": report.detail,
-            "max_error": number(last.max),
-            "mean_error": number(last.mean),
-            "observed_rate": row.observed_rate.map(number),
-            "predicted_rate": row.predicted_rate.map(number),
-            "fill": row.solution.fill,
-            "seconds": {
-                "setup": number(row.solution.setup_seconds),
-                "solve": number(row.solution.solve_seconds),
-            },
-        })
-    };
-    rows.iter().map(row).collect()
+    let mut objects = columns().table("", "", rows).to_json();
+    for (row, object) in rows.iter().zip(objects.as_array_mut().into_iter().flatten()) {
+        object["seconds"] = json!({
+            "setup": object["seconds_setup"].take(),
+            "solve": object["seconds_solve"].take(),
+        });
+        object["detail"] = json!(row.solution.report.detail);
+        if let Value::Object(fields) = object {
+            fields.remove("seconds_setup");
+            fields.remove("seconds_solve");
+        }
+    }
+    objects
 }
