@@ -28,7 +28,7 @@ use limitlab::Result;
 use limitlab::error::Error;
 use limitlab::output::write_file;
 use limitlab_experiments::cli::number;
-use limitlab_experiments::report::{Cell, Column, Table, readable};
+use limitlab_experiments::report::{Column, Columns, Table, readable};
 
 use crate::context::{Context, Item};
 use finding::{Evidence, Finding, Value, Verdict};
@@ -82,7 +82,7 @@ pub fn find(id: &str) -> Option<&'static Claim> {
 /// Those of the computations.
 pub fn run_alone(context: &mut Context, claims: &[&'static Claim]) -> Result<()> {
     let records = compute(context, claims.iter().copied())?;
-    let sections: Vec<String> = records.iter().map(section).collect();
+    let sections: Vec<String> = records.iter().map(|r| section(r, shown)).collect();
     context.printer.page(&sections.join("\n"))?;
     context.compare(&table(&records))?;
     context.ledger = records;
@@ -101,6 +101,7 @@ fn run_ledger(context: &mut Context) -> Result<()> {
     write("claims.json", &format!("{:#}\n", json(&records)))?;
     context.printer.page(&page)?;
     context.compare(&table)?;
+    context.table(times(&records))?;
     context.ledger = records;
     Ok(())
 }
@@ -128,63 +129,67 @@ fn compute(context: &Context, claims: impl Iterator<Item = &'static Claim>) -> R
         .collect()
 }
 
-/// One row for every number of every claim.
+/// A number with the claim that it decides.
+type Line<'a> = (&'a Record, &'a Evidence);
+
+/// One row for every number of every claim; the durations among them have their values in [`times`] alone, so that
+/// this table is the same from run to run.
 fn table(records: &[Record]) -> Table {
-    let mut table = Table::new(
-        "claims",
-        LEDGER.title,
-        vec![
-            Column::key("claim"),
-            Column::key("quantity"),
-            Column::remark("title"),
-            // What is measured with a random start or by sums of many terms differs in the last digits.
-            Column::number("value", 1e-4, 6).floor(1e-9),
-            Column::count("count"),
-            Column::time("time"),
-            Column::text("relation"),
-            Column::number("threshold", 1e-9, 6),
-            Column::text("holds"),
-            Column::text("verdict"),
-            Column::remark("remark"),
-        ],
-    );
+    // Of a claim without numbers.
     let none = Evidence::shown("", f64::NAN);
-    for Record { claim, finding } in records {
-        let rows = match finding.evidence.as_slice() {
-            [] => std::slice::from_ref(&none),
-            evidence => evidence,
-        };
-        for e in rows {
-            let [mut value, mut count, mut time] = [Cell::Empty, Cell::Empty, Cell::Empty];
-            match e.value {
-                _ if e.quantity.is_empty() => {}
-                Value::Number(x) => value = x.into(),
-                Value::Count(n) => count = n.into(),
-                Value::Time(x) => time = x.into(),
-            }
-            table.push(vec![
-                claim.id.into(),
-                e.quantity.as_str().into(),
-                claim.title.into(),
-                value,
-                count,
-                time,
-                e.test.map(|t| t.0.sign()).into(),
-                e.test.map(|t| t.1).into(),
-                e.holds().map(|h| if h { "yes" } else { "no" }).into(),
-                finding.verdict().name().into(),
-                finding.remark.as_str().into(),
-            ]);
-        }
-    }
-    table
+    let number = |e: &Evidence| match e.value {
+        Value::Number(x) if !e.quantity.is_empty() => Some(x),
+        _ => None,
+    };
+    let count = |e: &Evidence| match e.value {
+        Value::Count(n) => Some(n),
+        _ => None,
+    };
+    let columns = Columns::<Line>::new()
+        .col(Column::key("claim"), |(r, _)| r.claim.id)
+        .col(Column::key("quantity"), |(_, e)| e.quantity.clone())
+        .col(Column::remark("title"), |(r, _)| r.claim.title)
+        // What is measured with a random start or by sums of many terms differs in the last digits.
+        .col(Column::number("value", 1e-4, 6).floor(1e-9), move |(_, e)| number(e))
+        .col(Column::count("count"), move |(_, e)| count(e))
+        .col(Column::text("relation"), |(_, e)| e.test.map(|t| t.0.sign()))
+        .col(Column::number("threshold", 1e-9, 6), |(_, e)| e.test.map(|t| t.1))
+        .col(Column::text("holds"), |(_, e)| e.holds().map(|h| if h { "yes" } else { "no" }))
+        .col(Column::text("verdict"), |(r, _)| r.finding.verdict().name())
+        .col(Column::remark("remark"), |(r, _)| r.finding.remark.clone());
+    let lines: Vec<Line> = records
+        .iter()
+        .flat_map(|r| {
+            let evidence = match r.finding.evidence.as_slice() {
+                [] => std::slice::from_ref(&none),
+                evidence => evidence,
+            };
+            evidence.iter().map(move |e| (r, e))
+        })
+        .collect();
+    columns.table(LEDGER.id, LEDGER.title, &lines)
+}
+
+/// The durations, and ratios of durations, among the numbers of the claims.
+fn times(records: &[Record]) -> Table {
+    let columns = Columns::<(&Record, &Evidence, f64)>::new()
+        .col(Column::key("claim"), |(r, ..)| r.claim.id)
+        .col(Column::key("quantity"), |(_, e, _)| e.quantity.clone())
+        .col(Column::time("time"), |&(_, _, time)| time);
+    let lines: Vec<_> = records
+        .iter()
+        .flat_map(|r| r.finding.evidence.iter().map(move |e| (r, e)))
+        .filter_map(|(r, e)| if let Value::Time(time) = e.value { Some((r, e, time)) } else { None })
+        .collect();
+    columns.table(format!("{}--times", LEDGER.id), "Seconds, and their ratios, that claims speak of", &lines)
 }
 
 pub fn json(records: &[Record]) -> Json {
     let evidence = |e: &Evidence| {
         let value = match e.value {
             Value::Count(n) => n.into(),
-            _ => number(e.value.number()),
+            Value::Number(x) => number(x),
+            Value::Time(_) => Json::Null,
         };
         json!({
             "quantity": e.quantity,
@@ -237,7 +242,7 @@ fn page(context: &Context, records: &[Record]) -> String {
          paper, decided here. *Not reproducible*: with the reason. *Not confirmed*: a number is on the wrong side of \
          its threshold. Random meshes are {} closed ones of at most {} vertices with valences from 3, from fixed \
          seeds; L is the diagonal of a mesh's bounding box. `claims.csv` has a row for every number, `claims.json` \
-         both.\n\n{} claims: {}.\n",
+         both, `claims--times.csv` the durations.\n\n{} claims: {}.\n",
         LEDGER.title,
         context.note_on_meshes(),
         lab::RANDOM_MESHES,
@@ -257,14 +262,14 @@ fn page(context: &Context, records: &[Record]) -> String {
             let _ = writeln!(page, "| {} | {} | {verdict} |", claim.id, claim.title);
         }
         for record in own() {
-            let _ = write!(page, "\n{}", section(record));
+            let _ = write!(page, "\n{}", section(record, shown_by_reference));
         }
     }
     page
 }
 
-/// A claim for people.
-fn section(Record { claim, finding }: &Record) -> String {
+/// A claim for people, its numbers written by `show`.
+fn section(Record { claim, finding }: &Record, show: fn(Value) -> String) -> String {
     let mut text = format!(
         "### {} {} — {}\n\n{}. {}\n\n",
         claim.id,
@@ -274,7 +279,7 @@ fn section(Record { claim, finding }: &Record) -> String {
         claim.printed
     );
     for e in &finding.evidence {
-        let _ = write!(text, "- {}: {}", e.quantity, shown(e.value));
+        let _ = write!(text, "- {}: {}", e.quantity, show(e.value));
         if let Some((relation, threshold)) = e.test {
             let missed = if e.holds() == Some(false) { "; it is not" } else { "" };
             let _ = write!(text, " (to be {} {}{missed})", relation.sign(), shown(threshold.into()));
@@ -303,6 +308,14 @@ fn shown(value: Value) -> String {
                 false => text,
             }
         }
+    }
+}
+
+/// As [`shown`]; durations are named by their place, so that the page is the same from run to run.
+fn shown_by_reference(value: Value) -> String {
+    match value {
+        Value::Time(_) => format!("see {}--times.csv", LEDGER.id),
+        Value::Number(_) | Value::Count(_) => shown(value),
     }
 }
 
