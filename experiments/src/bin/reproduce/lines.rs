@@ -3,14 +3,14 @@
 use glam::DVec3;
 
 use limitlab::Result;
-use limitlab::analysis::lines::{Preconditioner, Regularity, count};
+use limitlab::analysis::lines::{Count, Preconditioner, Regularity, count};
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::interpolate;
 use limitlab::mesh::noise::move_vertices;
 use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::Stop;
 use limitlab_experiments::cli::STAND_IN_NOISE;
-use limitlab_experiments::report::{Cell, Column, Table};
+use limitlab_experiments::report::{Column, Columns};
 
 use crate::context::{Context, Item, Subject};
 use crate::corpus;
@@ -42,31 +42,70 @@ mod cost {
     pub const RELAX: f64 = 1_800.0;
 }
 
-/// The time of `auto` over that of the preconditioned iteration.
-fn time_ratio(irregular: f64, auto: usize, lines: usize) -> f64 {
-    let stars = |each: f64| irregular * each;
-    let one = cost::RESIDUAL + cost::LINES + stars(cost::RELAX);
-    let setup = cost::SETUP + cost::CHAINS + stars(cost::STAR);
-    (cost::SETUP + auto as f64 * cost::ITERATION) / (setup + lines as f64 * one + cost::RESIDUAL)
+/// A refined mesh and the runs on it.
+struct Row<'a> {
+    subject: &'a Subject,
+    levels: usize,
+    regularity: Regularity,
+    /// Conjugate gradients preconditioned by H, and by line solves.
+    plain: Count,
+    lines: Count,
+    /// Iterations of `auto`.
+    auto: usize,
+}
+
+impl<'a> Row<'a> {
+    fn new(subject: &'a Subject, levels: usize) -> Result<Self> {
+        let mut surface = Refinement::CatmullClark.refined_n(&subject.surface, levels)?;
+        move_vertices(&mut surface, STAND_IN_NOISE.amplitude, STAND_IN_NOISE.seed);
+        let system = LimitSystem::new(&surface, Scheme::CatmullClark)?;
+        let stop = Stop { tolerance: TOLERANCE * surface.diagonal(), max_iterations: LIMIT };
+        let points = surface.positions();
+        let regularity = Regularity::new(&surface);
+        let preconditioner = Preconditioner::new(&system, &regularity)?;
+        let scaled = |r: &[DVec3]| r.iter().zip(&system.h).map(|(r, h)| *r * *h).collect();
+        let plain = count(&system, points, &stop, scaled)?;
+        let lines = count(&system, points, &stop, |r| preconditioner.apply(r))?;
+        let auto = interpolate(&surface, Scheme::CatmullClark, &stop.into())?.report.iterations;
+        Ok(Row { subject, levels, regularity, plain, lines, auto })
+    }
+
+    /// The time of `auto` over that of the preconditioned iteration.
+    fn time_ratio(&self) -> f64 {
+        let stars = |each: f64| (1.0 - self.regularity.share()) * each;
+        let one = cost::RESIDUAL + cost::LINES + stars(cost::RELAX);
+        let setup = cost::SETUP + cost::CHAINS + stars(cost::STAR);
+        let auto = cost::SETUP + self.auto as f64 * cost::ITERATION;
+        auto / (setup + self.lines.iterations as f64 * one + cost::RESIDUAL)
+    }
 }
 
 fn run(context: &mut Context) -> Result<()> {
-    let mut table = Table::new(
-        LINES.id,
-        LINES.title,
-        vec![
-            Column::key("mesh"),
-            Column::key("refined"),
-            Column::text("vertices"),
-            Column::number("regular", 1e-9, 4),
-            Column::number("mean_chain", 1e-9, 3),
-            Column::number("kappa", 0.01, 4),
-            Column::number("kappa_lines", 0.01, 4),
-            Column::count("auto_iterations"),
-            Column::count("lines_iterations"),
-            Column::number("time_ratio", 0.1, 3),
-        ],
-    );
+    let subjects = if context.real() {
+        context.list(&corpus::LINES)?
+    } else {
+        // As they are: the noise comes after the refinements.
+        let built_in = corpus::LINES.built_in.iter();
+        built_in.map(|&(name, levels)| Ok((Subject::built_in(name)?, levels))).collect::<Result<_>>()?
+    };
+    let rows: Vec<Row> = subjects
+        .iter()
+        // Every refinement makes four vertices of one, but for a few.
+        .filter(|(subject, levels)| !context.quick || subject.surface.len() << (2 * levels) <= QUICK)
+        .map(|(subject, levels)| Row::new(subject, *levels))
+        .collect::<Result<_>>()?;
+    let mut table = Columns::<Row>::new()
+        .col(Column::key("mesh"), |r| r.subject.name.clone())
+        .col(Column::key("refined"), |r| r.levels.to_string())
+        .col(Column::text("vertices"), |r| r.regularity.regular.len().to_string())
+        .col(Column::number("regular", 1e-9, 4), |r| r.regularity.share())
+        .col(Column::number("mean_chain", 1e-9, 3), |r| r.regularity.mean_chain())
+        .col(Column::number("kappa", 0.01, 4), |r| r.plain.kappa)
+        .col(Column::number("kappa_lines", 0.01, 4), |r| r.lines.kappa)
+        .col(Column::count("auto_iterations"), |r| r.auto)
+        .col(Column::count("lines_iterations"), |r| r.lines.iterations)
+        .col(Column::number("time_ratio", 0.1, 3), Row::time_ratio)
+        .table(LINES.id, LINES.title, &rows);
     table.note(format!(
         "`regular`: share of vertices of valence 4 among quads. Chains of edges go straight through them; `mean_chain` \
          counts the regular vertices on one. `lines` solves with tridiag(1, 4, 1) along every chain, then across, \
@@ -99,46 +138,5 @@ fn run(context: &mut Context) -> Result<()> {
             / (cost::SETUP + 2.0 * (cost::RESIDUAL + cost::LINES_AT_BEST) + cost::RESIDUAL),
         best = cost::LINES_AT_BEST,
     ));
-    let subjects = if context.real() {
-        context.list(&corpus::LINES)?
-    } else {
-        // As they are: the noise comes after the refinements.
-        let built_in = corpus::LINES.built_in.iter();
-        built_in.map(|&(name, levels)| Ok((Subject::built_in(name)?, levels))).collect::<Result<_>>()?
-    };
-    for (subject, levels) in &subjects {
-        // Every refinement makes four vertices of one, but for a few.
-        if !context.quick || subject.surface.len() << (2 * levels) <= QUICK {
-            table.push(row(subject, *levels)?);
-        }
-    }
     context.table(table)
-}
-
-fn row(subject: &Subject, levels: usize) -> Result<Vec<Cell>> {
-    let mut surface = Refinement::CatmullClark.refined_n(&subject.surface, levels)?;
-    move_vertices(&mut surface, STAND_IN_NOISE.amplitude, STAND_IN_NOISE.seed);
-    let system = LimitSystem::new(&surface, Scheme::CatmullClark)?;
-    let stop = Stop { tolerance: TOLERANCE * surface.diagonal(), max_iterations: LIMIT };
-    let points = surface.positions();
-    let regularity = Regularity::new(&surface);
-    let preconditioner = Preconditioner::new(&system, &regularity)?;
-    let scaled = |r: &[DVec3]| r.iter().zip(&system.h).map(|(r, h)| *r * *h).collect();
-    let plain = count(&system, points, &stop, scaled)?;
-    let lines = count(&system, points, &stop, |r| preconditioner.apply(r))?;
-    let auto = interpolate(&surface, Scheme::CatmullClark, &stop.into())?;
-    let iterations = auto.report.iterations;
-    let irregular = 1.0 - regularity.share();
-    Ok(vec![
-        subject.name.as_str().into(),
-        levels.to_string().into(),
-        surface.len().to_string().into(),
-        regularity.share().into(),
-        regularity.mean_chain().into(),
-        plain.kappa.into(),
-        lines.kappa.into(),
-        iterations.into(),
-        lines.iterations.into(),
-        time_ratio(irregular, iterations, lines.iterations).into(),
-    ])
 }

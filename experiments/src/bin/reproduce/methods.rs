@@ -1,5 +1,7 @@
 //! All methods × all schemes × all meshes: iterations to 10⁻³, 10⁻⁶ and 10⁻¹⁰, and convergence plots.
 
+use std::collections::BTreeMap;
+
 use limitlab::Result;
 use limitlab::analysis::comparison::entries;
 use limitlab::analysis::spectrum::spectrum;
@@ -8,7 +10,7 @@ use limitlab::schemes::Scheme;
 use limitlab::solvers::anderson::WINDOW;
 use limitlab::solvers::method::{SOR_OMEGA, SSOR_OMEGA};
 use limitlab::solvers::{Method, Outcome, Stop, run as solve};
-use limitlab_experiments::report::{Cell, Column, Figure, LinePlot, Scale, Series, Table};
+use limitlab_experiments::report::{Cell, Column, Columns, Figure, LinePlot, Scale, Series, Table};
 
 use crate::context::{Context, Item, Subject};
 use crate::corpus;
@@ -43,6 +45,8 @@ const COLUMNS: [(&str, &str); 22] = [
     ("anderson", "of jacobi"),
     ("heavy-ball", ""),
 ];
+/// The column of the chain that chooses by itself.
+const AUTO: &str = "auto";
 /// Relative to the diagonal of the bounding box.
 const TOLERANCES: [f64; 3] = [1e-3, 1e-6, 1e-10];
 const LIMIT: usize = 10_000;
@@ -51,46 +55,60 @@ const LARGEST: usize = 20_000;
 /// Largest mesh of a quick run.
 const QUICK: usize = 300;
 
+/// How every method comes to one tolerance, relative to the diagonal of the bounding box.
+struct Row<'a> {
+    subject: &'a Subject,
+    scheme: Scheme,
+    tolerance: f64,
+    /// By column: the number of iterations, or how else the run ended.
+    ended: BTreeMap<String, std::result::Result<usize, Outcome>>,
+}
+
 fn run(context: &mut Context) -> Result<()> {
-    let mut tables = empty_tables();
     let most = if context.quick { QUICK } else { LARGEST };
-    for subject in context.subjects(&corpus::ALL_METHODS, most)? {
+    let subjects = context.subjects(&corpus::ALL_METHODS, most)?;
+    let mut rows = Vec::new();
+    for subject in &subjects {
         for scheme in Scheme::ALL {
             if subject.suits(scheme) {
-                one(context, &subject, scheme, &mut tables)?;
+                rows.extend(one(context, subject, scheme)?);
             }
         }
     }
-    for table in tables {
-        context.table(table)?;
+    for tolerance in TOLERANCES {
+        context.table(table(tolerance, &rows))?;
     }
     Ok(())
 }
 
-/// One table a tolerance, with a column for every line of the comparison.
-fn empty_tables() -> Vec<Table> {
-    TOLERANCES
-        .iter()
-        .map(|tolerance| {
-            let mut columns = vec![Column::key("mesh"), Column::key("scheme"), Column::text("vertices")];
-            columns.extend(COLUMNS.map(|(method, variant)| Column::count(column_name(method, variant))));
-            columns.push(Column::count("auto"));
-            let mut table = Table::new(
-                format!("{}--{tolerance:e}", ALL.id),
-                format!("Iterations of every method to {tolerance:e}"),
-                columns,
-            );
-            table.note(format!(
-                "Updates of all vertices until max_i ‖p_i − (A v)_i‖ ≤ {tolerance:e} of the bounding box's diagonal; \
-                 start V = P, file order for in-place sweeps, at most {LIMIT} iterations. A direct method makes one: \
-                 the solve. jacobi and w-pia run at their best ω, sor at ω = {SOR_OMEGA}, ssor and pcg-ssor at \
-                 {SSOR_OMEGA}; anderson keeps {WINDOW} differences, heavy-ball has an estimated interval; auto counts the \
-                 iterations of all corrections in mixed precision together. Where the tolerance was not reached, the cell says how the run ended. Meshes of at \
-                 most {LARGEST} vertices."
-            ));
-            table
-        })
-        .collect()
+/// The rows of one tolerance, with a column for every line of the comparison.
+fn table(tolerance: f64, rows: &[Row]) -> Table {
+    let mut columns = Columns::<Row>::new()
+        .col(Column::key("mesh"), |r| r.subject.name.clone())
+        .col(Column::key("scheme"), |r| r.scheme.name())
+        .col(Column::text("vertices"), |r| r.subject.surface.len().to_string());
+    for name in COLUMNS.map(|(method, variant)| column_name(method, variant)).into_iter().chain([AUTO.into()]) {
+        columns = columns.col(Column::count(name.clone()), move |r| {
+            r.ended.get(&name).map(|ended| match ended {
+                Ok(iterations) => Cell::from(*iterations),
+                Err(outcome) => outcome.name().into(),
+            })
+        });
+    }
+    let mut table = columns.table(
+        format!("{}--{tolerance:e}", ALL.id),
+        format!("Iterations of every method to {tolerance:e}"),
+        rows.iter().filter(|r| r.tolerance == tolerance),
+    );
+    table.note(format!(
+        "Updates of all vertices until max_i ‖p_i − (A v)_i‖ ≤ {tolerance:e} of the bounding box's diagonal; start \
+         V = P, file order for in-place sweeps, at most {LIMIT} iterations. A direct method makes one: the solve. \
+         jacobi and w-pia run at their best ω, sor at ω = {SOR_OMEGA}, ssor and pcg-ssor at {SSOR_OMEGA}; anderson \
+         keeps {WINDOW} differences, heavy-ball has an estimated interval; auto counts the iterations of all \
+         corrections in mixed precision together. Where the tolerance was not reached, the cell says how the run \
+         ended. Meshes of at most {LARGEST} vertices."
+    ));
+    table
 }
 
 /// The method, with the variant where the method has several.
@@ -99,15 +117,13 @@ fn column_name(method: &str, variant: &str) -> String {
     if several { format!("{method} {variant}") } else { method.into() }
 }
 
-fn one(context: &Context, subject: &Subject, scheme: Scheme, tables: &mut [Table]) -> Result<()> {
+/// A row for each of [`TOLERANCES`].
+fn one<'a>(context: &Context, subject: &'a Subject, scheme: Scheme) -> Result<[Row<'a>; TOLERANCES.len()]> {
     let system = subject.system(scheme)?;
     let spectrum = spectrum(&system)?;
     let size = subject.surface.diagonal();
-    let stop = Stop { tolerance: TOLERANCES[2] * size, max_iterations: LIMIT };
-    let mut rows: Vec<Vec<Cell>> = TOLERANCES
-        .iter()
-        .map(|_| vec![subject.name.as_str().into(), scheme.name().into(), subject.surface.len().to_string().into()])
-        .collect();
+    let stop = |tolerance| Stop { tolerance: tolerance * size, max_iterations: LIMIT };
+    let mut rows = TOLERANCES.map(|tolerance| Row { subject, scheme, tolerance, ended: BTreeMap::new() });
     let mut series = Vec::new();
     let lines = entries(&system, &spectrum, &Method::ALL, None, "file")?;
     for (method, variant) in COLUMNS {
@@ -115,35 +131,29 @@ fn one(context: &Context, subject: &Subject, scheme: Scheme, tables: &mut [Table
         let line = lines.iter().find(|l| column_name(l.method.name(), l.variant) == name);
         let Some(line) = line else {
             // No bound of λ_min is proven for this mesh.
-            rows.iter_mut().for_each(|row| row.push(Cell::Empty));
             continue;
         };
-        let report = solve(&system, subject.surface.positions(), line.method, &stop).report;
+        let report = solve(&system, subject.surface.positions(), line.method, &stop(TOLERANCES[2])).report;
         let errors: Vec<f64> = report.history.iter().map(|e| e.max / size).collect();
-        for (row, tolerance) in rows.iter_mut().zip(TOLERANCES) {
-            row.push(match errors.iter().position(|&e| e <= tolerance) {
-                Some(iterations) => iterations.into(),
-                None => report.outcome.name().into(),
-            });
+        for row in &mut rows {
+            let reached = errors.iter().position(|&e| e <= row.tolerance);
+            row.ended.insert(name.clone(), reached.ok_or(report.outcome));
         }
         if !line.method.is_direct() {
             let name = format!("{} ({})", line.method, line.parameter);
             series.push(Series::history(name, errors));
         }
     }
-    for (row, tolerance) in rows.iter_mut().zip(TOLERANCES) {
-        let stop = Stop { tolerance: tolerance * size, max_iterations: LIMIT };
-        let report = interpolate(&subject.surface, scheme, &stop.into())?.report;
-        row.push(match report.outcome {
-            Outcome::Converged => report.iterations.into(),
-            other => other.name().into(),
-        });
-    }
-    for (table, row) in tables.iter_mut().zip(rows) {
-        table.push(row);
+    for row in &mut rows {
+        let report = interpolate(&subject.surface, scheme, &stop(row.tolerance).into())?.report;
+        let ended = match report.outcome {
+            Outcome::Converged => Ok(report.iterations),
+            other => Err(other),
+        };
+        row.ended.insert(AUTO.into(), ended);
     }
     if context.quick || !PLOTTED.contains(&subject.name.as_str()) {
-        return Ok(());
+        return Ok(rows);
     }
     let stem = format!("{}--{}-{scheme}", ALL.id, subject.name.replace(':', "-"));
     context.figure(
@@ -156,7 +166,8 @@ fn one(context: &Context, subject: &Subject, scheme: Scheme, tables: &mut [Table
             series,
             ..LinePlot::default()
         }),
-    )
+    )?;
+    Ok(rows)
 }
 
 #[cfg(test)]

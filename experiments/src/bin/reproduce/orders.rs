@@ -4,9 +4,9 @@ use limitlab::Result;
 use limitlab::analysis::order_study::{Row, order_study, random_spread};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::Stop;
-use limitlab_experiments::report::{Column, Table};
+use limitlab_experiments::report::{Column, Columns};
 
-use crate::context::{Context, Item};
+use crate::context::{Context, Item, Subject};
 use crate::corpus;
 
 pub const ORDERS: Item =
@@ -17,19 +17,36 @@ const RANDOM: u64 = 20;
 /// Relative to the diagonal of the bounding box.
 const TOLERANCE: f64 = 1e-10;
 
+/// One order, or one figure of the random ones together.
+struct Line {
+    order: String,
+    omega: f64,
+    rho: Option<f64>,
+    sweeps: f64,
+}
+
 fn run(context: &mut Context) -> Result<()> {
-    let mut table = Table::new(
-        ORDERS.id,
-        ORDERS.title,
-        vec![
-            Column::key("mesh"),
-            Column::key("scheme"),
-            Column::key("omega"),
-            Column::key("order"),
-            Column::number("rho", 0.02, 4),
-            Column::number("sweeps", 0.05, 4).floor(1.01),
-        ],
-    );
+    if context.quick {
+        return Ok(());
+    }
+    let subjects = context.list(&corpus::ORDERS)?;
+    let mut records = Vec::new();
+    for (subject, schemes) in &subjects {
+        for &scheme in *schemes {
+            let system = subject.system(scheme)?;
+            let stop = Stop { tolerance: TOLERANCE * subject.surface.diagonal(), max_iterations: 10_000 };
+            let rows = order_study(&subject.surface, &system, &OMEGAS, RANDOM, &stop)?;
+            records.extend(lines(&rows).into_iter().map(|line| (subject, scheme, line)));
+        }
+    }
+    let mut table = Columns::<(&Subject, Scheme, Line)>::new()
+        .col(Column::key("mesh"), |(subject, ..)| subject.name.clone())
+        .col(Column::key("scheme"), |(_, scheme, _)| scheme.name())
+        .col(Column::key("omega"), |(.., line)| line.omega.to_string())
+        .col(Column::key("order"), |(.., line)| line.order.clone())
+        .col(Column::number("rho", 0.02, 4), |(.., line)| line.rho)
+        .col(Column::number("sweeps", 0.05, 4).floor(1.01), |(.., line)| line.sweeps)
+        .table(ORDERS.id, ORDERS.title, &records);
     table.note(format!(
         "Sweeps to {TOLERANCE:e} of the bounding box's diagonal from V = P, and the spectral radius of the sweep. \
          `random` orders: least, mean and greatest of {RANDOM} seeds. `greedy` relaxes the largest residual first \
@@ -40,40 +57,19 @@ fn run(context: &mut Context) -> Result<()> {
          spectral radius may be the least: the error is carried along the front. Colour by colour is the best or \
          within a few sweeps of it and may run in parallel. The order is worth up to a half, never more.",
     );
-    if context.quick {
-        return Ok(());
-    }
-    for (subject, schemes) in context.list(&corpus::ORDERS)? {
-        for &scheme in schemes {
-            let system = subject.system(scheme)?;
-            let stop = Stop { tolerance: TOLERANCE * subject.surface.diagonal(), max_iterations: 10_000 };
-            let rows = order_study(&subject.surface, &system, &OMEGAS, RANDOM, &stop)?;
-            push(&mut table, &subject.name, scheme, &rows);
-        }
-    }
     context.table(table)
 }
 
-fn push(table: &mut Table, mesh: &str, scheme: Scheme, rows: &[Row]) {
-    let mut line = |omega: f64, order: String, rho: Option<f64>, sweeps: f64| {
-        table.push(vec![
-            mesh.into(),
-            scheme.name().into(),
-            omega.to_string().into(),
-            order.into(),
-            rho.into(),
-            sweeps.into(),
-        ]);
-    };
-    for row in rows.iter().filter(|r| !r.order.starts_with("random:")) {
-        line(row.omega, row.order.clone(), row.rho, row.iterations);
-    }
-    for omega in OMEGAS {
-        let Some(spread) = random_spread(rows, omega) else {
-            continue;
-        };
+/// Each order that does not depend on chance, then the random ones at each ω.
+fn lines(rows: &[Row]) -> Vec<Line> {
+    let alone = rows.iter().filter(|r| !r.order.starts_with("random:"));
+    let mut lines: Vec<Line> =
+        alone.map(|r| Line { order: r.order.clone(), omega: r.omega, rho: r.rho, sweeps: r.iterations }).collect();
+    for spread in OMEGAS.into_iter().filter_map(|omega| random_spread(rows, omega)) {
         for (k, name) in ["least", "mean", "greatest"].into_iter().enumerate() {
-            line(omega, format!("random, {name}"), Some(spread.rho[k]), spread.iterations[k]);
+            let order = format!("random, {name}");
+            lines.push(Line { order, omega: spread.omega, rho: Some(spread.rho[k]), sweeps: spread.iterations[k] });
         }
     }
+    lines
 }

@@ -6,9 +6,9 @@
 
 use limitlab::Result;
 use limitlab::assemble::LimitSystem;
-use limitlab::interpolate::pia::{TwoStepsBack, passes};
+use limitlab::interpolate::pia::{Passes, TwoStepsBack, passes};
 use limitlab::schemes::Scheme;
-use limitlab_experiments::report::{Column, Table};
+use limitlab_experiments::report::{Column, Columns};
 
 use crate::context::{Context, Item, Subject};
 use crate::corpus::{self, Model};
@@ -45,15 +45,18 @@ impl Reading {
     }
 }
 
-/// A row: the paper's name of the model, its file, the reading, and the printed iterations, maximum and mean error.
+/// What the paper prints: iterations, maximum and mean error.
+type Printed = (usize, f64, f64);
+
+/// A row of the paper: its name of the model, the file, the reading.
 struct Line {
     model: &'static str,
     mesh: Model,
     reading: Reading,
-    printed: (usize, f64, f64),
+    printed: Printed,
 }
 
-const MUSHROOM: (usize, f64, f64) = (8, 0.000813821, 0.000235506);
+const MUSHROOM: Printed = (8, 0.000813821, 0.000235506);
 
 const LINES: [Line; 6] = [
     Line { model: "Horse", mesh: corpus::HORSE, reading: Reading::Loop, printed: (12, 0.000912016, 0.00022811) },
@@ -73,25 +76,66 @@ const STAND_INS: [(&str, Reading); 5] = [
     ("irregular-quad:226", Reading::CatmullClark),
 ];
 
+/// A row of the table.
+struct Row {
+    model: &'static str,
+    subject: Subject,
+    reading: Reading,
+    printed: Option<Printed>,
+    run: Passes,
+}
+
+impl Row {
+    fn new(model: &'static str, subject: Subject, reading: Reading, printed: Option<Printed>) -> Result<Self> {
+        let system = match reading {
+            Reading::Loop | Reading::LoopOpen => subject.system(Scheme::Loop)?,
+            Reading::CatmullClark => subject.system(Scheme::CatmullClark)?,
+            Reading::TwoStepsBack => LimitSystem::with_masks(&subject.surface, &TwoStepsBack)?,
+        };
+        let run = passes(&system, subject.surface.positions(), TOLERANCE, LIMIT);
+        Ok(Row { model, subject, reading, printed, run })
+    }
+
+    fn verdict(&self) -> &'static str {
+        let near = |measured: f64, printed: f64| (measured - printed).abs() <= AGREEMENT * printed;
+        let Passes { passes, errors, .. } = &self.run;
+        match self.printed {
+            None => "not the paper's model",
+            Some((iterations, max, mean))
+                if *passes == iterations && near(errors.max, max) && near(errors.mean, mean) =>
+            {
+                "reproduced"
+            }
+            Some(_) if matches!(self.reading, Reading::CatmullClark) => "corrected: the true limit mask",
+            Some(_) => "not reproduced",
+        }
+    }
+}
+
 fn run(context: &mut Context) -> Result<()> {
-    let mut table = Table::new(
-        TABLE1.id,
-        "PIA Table 1: progressive iterative interpolation until max error ≤ 10⁻³",
-        vec![
-            Column::key("model"),
-            Column::key("mesh"),
-            Column::key("reading"),
-            Column::text("vertices"),
-            Column::count("printed_iterations"),
-            Column::count("measured_iterations"),
-            Column::count("updates"),
-            Column::number("printed_max_error", 0.0, 6),
-            Column::number("measured_max_error", 1e-9, 6),
-            Column::number("printed_mean_error", 0.0, 6),
-            Column::number("measured_mean_error", 1e-9, 6),
-            Column::text("verdict"),
-        ],
-    );
+    let rows: Vec<Row> = if context.real() {
+        let lines = LINES.iter();
+        lines.map(|l| Row::new(l.model, context.model(&l.mesh)?, l.reading, Some(l.printed))).collect::<Result<_>>()?
+    } else {
+        let stand_ins = STAND_INS.into_iter();
+        stand_ins
+            .map(|(name, reading)| Row::new("stand-in", context.stand_in(name)?, reading, None))
+            .collect::<Result<_>>()?
+    };
+    let mut table = Columns::<Row>::new()
+        .col(Column::key("model"), |r| r.model)
+        .col(Column::key("mesh"), |r| r.subject.name.clone())
+        .col(Column::key("reading"), |r| r.reading.name())
+        .col(Column::text("vertices"), |r| r.subject.surface.len().to_string())
+        .col(Column::count("printed_iterations"), |r| r.printed.map(|p| p.0))
+        .col(Column::count("measured_iterations"), |r| r.run.passes)
+        .col(Column::count("updates"), |r| r.run.updates)
+        .col(Column::number("printed_max_error", 0.0, 6), |r| r.printed.map(|p| p.1))
+        .col(Column::number("measured_max_error", 1e-9, 6), |r| r.run.errors.max)
+        .col(Column::number("printed_mean_error", 0.0, 6), |r| r.printed.map(|p| p.2))
+        .col(Column::number("measured_mean_error", 1e-9, 6), |r| r.run.errors.mean)
+        .col(Column::text("verdict"), Row::verdict)
+        .table(TABLE1.id, "PIA Table 1: progressive iterative interpolation until max error ≤ 10⁻³", &rows);
     table.note(
         "Errors in mesh units, over all vertices. The paper counts the passes of its loop, the last of which needs no \
          update: `measured_iterations` = `updates` + 1, and the errors are those of the last pass. Reproduced: equal \
@@ -104,58 +148,6 @@ fn run(context: &mut Context) -> Result<()> {
              below it, so the paper's control mesh does not interpolate the Catmull-Clark surface there. The Boy has \
              26 boundary edges; its boundary vertices are treated as interior.",
         );
-        for line in &LINES {
-            let subject = context.model(&line.mesh)?;
-            row(&mut table, line.model, &subject, line.reading, Some(line.printed))?;
-        }
-    } else {
-        for (name, reading) in STAND_INS {
-            let subject = context.stand_in(name)?;
-            row(&mut table, "stand-in", &subject, reading, None)?;
-        }
     }
     context.table(table)
-}
-
-fn row(
-    table: &mut Table,
-    model: &str,
-    subject: &Subject,
-    reading: Reading,
-    printed: Option<(usize, f64, f64)>,
-) -> Result<()> {
-    let system = match reading {
-        Reading::Loop | Reading::LoopOpen => subject.system(Scheme::Loop)?,
-        Reading::CatmullClark => subject.system(Scheme::CatmullClark)?,
-        Reading::TwoStepsBack => LimitSystem::with_masks(&subject.surface, &TwoStepsBack)?,
-    };
-    let run = passes(&system, subject.surface.positions(), TOLERANCE, LIMIT);
-    let near = |measured: f64, printed: f64| (measured - printed).abs() <= AGREEMENT * printed;
-    let verdict = match printed {
-        None => "not the paper's model",
-        Some((iterations, max, mean)) => {
-            if run.passes == iterations && near(run.errors.max, max) && near(run.errors.mean, mean) {
-                "reproduced"
-            } else if matches!(reading, Reading::CatmullClark) {
-                "corrected: the true limit mask"
-            } else {
-                "not reproduced"
-            }
-        }
-    };
-    table.push(vec![
-        model.into(),
-        subject.name.as_str().into(),
-        reading.name().into(),
-        subject.surface.len().to_string().into(),
-        printed.map(|p| p.0).into(),
-        run.passes.into(),
-        run.updates.into(),
-        printed.map(|p| p.1).into(),
-        run.errors.max.into(),
-        printed.map(|p| p.2).into(),
-        run.errors.mean.into(),
-        verdict.into(),
-    ]);
-    Ok(())
 }

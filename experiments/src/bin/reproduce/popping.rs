@@ -1,10 +1,10 @@
 //! Lin-Luo §5: how far the unified √3 surface shrinks or bulges over α, the "popping effect".
 
 use limitlab::Result;
-use limitlab::interpolate::lin_luo::surface::popping;
-use limitlab_experiments::report::{Column, Figure, LinePlot, Rule, Series, Table};
+use limitlab::interpolate::lin_luo::surface::{Popping, popping};
+use limitlab_experiments::report::{Column, Columns, Figure, LinePlot, Rule, Series};
 
-use crate::context::{Context, Item};
+use crate::context::{Context, Item, Subject};
 use crate::corpus;
 
 pub const POPPING: Item =
@@ -16,54 +16,40 @@ const EIGHTHS: std::ops::RangeInclusive<usize> = 0..=16;
 const LEVELS: usize = 5;
 
 fn run(context: &mut Context) -> Result<()> {
-    let mut table = Table::new(
-        POPPING.id,
-        POPPING.title,
-        vec![
-            Column::key("mesh"),
-            Column::key("alpha"),
-            Column::number("volume_ratio", 1e-6, 5),
-            Column::number("vertex_mean", 1e-6, 3).floor(1e-9),
-            Column::number("vertex_max", 1e-6, 3).floor(1e-9),
-            Column::number("center_mean", 1e-6, 3).floor(1e-9),
-            Column::number("center_max", 1e-6, 3).floor(1e-9),
-            Column::number("center_outward", 1e-6, 3).floor(1e-9),
-        ],
-    );
+    let mut subjects = context.list(&corpus::POPPING)?;
+    if context.quick {
+        subjects.truncate(1);
+    }
+    let mut runs = Vec::new();
+    for (subject, ()) in &subjects {
+        for alpha in EIGHTHS.map(|eighths| eighths as f64 / 8.0) {
+            runs.push((subject, alpha, popping(&subject.surface, &vec![alpha; subject.surface.len()], LEVELS)?));
+        }
+    }
+    let mut table = Columns::<(&Subject, f64, Popping)>::new()
+        .col(Column::key("mesh"), |(subject, ..)| subject.name.clone())
+        .col(Column::key("alpha"), |(_, alpha, _)| alpha.to_string())
+        .col(Column::number("volume_ratio", 1e-6, 5), |(.., found)| found.volume_ratio)
+        .col(Column::number("vertex_mean", 1e-6, 3).floor(1e-9), |(.., found)| found.vertex_mean)
+        .col(Column::number("vertex_max", 1e-6, 3).floor(1e-9), |(.., found)| found.vertex_max)
+        .col(Column::number("center_mean", 1e-6, 3).floor(1e-9), |(.., found)| found.center_mean)
+        .col(Column::number("center_max", 1e-6, 3).floor(1e-9), |(.., found)| found.center_max)
+        .col(Column::number("center_outward", 1e-6, 3).floor(1e-9), |(.., found)| found.center_outward)
+        .table(POPPING.id, POPPING.title, &runs);
     table.note(format!(
         "The same α at all vertices: 0 is Kobbelt's approximating scheme, 1 the interpolating one. `volume_ratio` is \
          the volume after {LEVELS} steps over that of the mesh. Distances are those of the vertices, and of the \
          triangles' centres, from where they were, over the diagonal of the bounding box; `center_outward` is signed \
          along the normals. The jump that a viewer sees between mesh and surface is least where the ratio passes 1."
     ));
-    let mut subjects = context.list(&corpus::POPPING)?;
-    if context.quick {
-        subjects.truncate(1);
-    }
-    let mut series = Vec::new();
-    for (subject, ()) in &subjects {
-        let mut curve = Vec::new();
-        for eighths in EIGHTHS {
-            let alpha = eighths as f64 / 8.0;
-            let found = popping(&subject.surface, &vec![alpha; subject.surface.len()], LEVELS)?;
-            curve.push((alpha, found.volume_ratio));
-            table.push(vec![
-                subject.name.as_str().into(),
-                alpha.to_string().into(),
-                found.volume_ratio.into(),
-                found.vertex_mean.into(),
-                found.vertex_max.into(),
-                found.center_mean.into(),
-                found.center_max.into(),
-                found.center_outward.into(),
-            ]);
-        }
-        series.push(Series::line(subject.name.as_str(), curve));
-    }
     context.table(table)?;
     if context.quick {
         return Ok(());
     }
+    let curves = runs.chunk_by(|(a, ..), (b, ..)| a.name == b.name);
+    let series = curves
+        .map(|runs| Series::line(&*runs[0].0.name, runs.iter().map(|(_, alpha, found)| (*alpha, found.volume_ratio))))
+        .collect();
     context.figure(
         POPPING.id,
         &Figure::new(LinePlot {

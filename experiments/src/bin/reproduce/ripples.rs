@@ -1,12 +1,12 @@
 //! How much interpolating surfaces ripple, iteration by iteration, against the fairest one (Halstead, Kass & DeRose).
 
 use limitlab::Result;
-use limitlab::interpolate::halstead::{Fairness, Weights, fit, follow};
+use limitlab::interpolate::halstead::{Fairness, Row, Weights, fit, follow};
 use limitlab::interpolate::zheng_cai::Constraints;
 use limitlab::schemes::Scheme;
 use limitlab::schemes::catmull_clark::limit_normals;
 use limitlab::solvers::{Method, Stop};
-use limitlab_experiments::report::{Column, Figure, LinePlot, Scale, Series, Table};
+use limitlab_experiments::report::{Column, Columns, Figure, LinePlot, Scale, Series};
 
 use crate::context::{Context, Item};
 use crate::corpus;
@@ -29,27 +29,6 @@ const SHOWN: [usize; 8] = [0, 1, 2, 3, 5, 10, 20, 50];
 const TOLERANCE: f64 = 1e-8;
 
 fn run(context: &mut Context) -> Result<()> {
-    let mut table = Table::new(
-        RIPPLES.id,
-        RIPPLES.title,
-        vec![
-            Column::key("mesh"),
-            Column::key("method"),
-            Column::key("iteration"),
-            Column::number("max_error", 1e-4, 3).floor(1e-9),
-            Column::number("thin_plate_ratio", 1e-4, 4),
-            Column::number("membrane_ratio", 1e-4, 4),
-            Column::number("normal_deviation_mean_degrees", 1e-3, 4),
-            Column::number("normal_deviation_max_degrees", 1e-3, 4),
-        ],
-    );
-    table.note(
-        "Catmull-Clark. The reference is the fairest surface that meets the points (least thin-plate plus membrane \
-         energy, control mesh two refinements down): energies are ratios to its own, normals are compared with its \
-         normals at the points. `max_error` is relative to the diagonal of the bounding box. The last row of a method is \
-         the converged surface: where the deviation passes through a minimum before, stopping early gives a smoother \
-         surface at the price of the error shown.",
-    );
     let subject = context.subject(&corpus::BOB)?;
     if context.quick {
         return Ok(());
@@ -62,42 +41,49 @@ fn run(context: &mut Context) -> Result<()> {
     normals.truncate(subject.surface.len());
     let size = subject.surface.diagonal();
     let stop = Stop { tolerance: TOLERANCE * size, max_iterations: 1000 };
-    let (mut energies, mut deviations) = (Vec::new(), Vec::new());
+    let mut runs = Vec::new();
     for (name, method) in METHODS {
-        let (rows, _) = follow(&subject.surface, &system, &fairness, &normals, method, &stop)?;
-        let last = rows.len().saturating_sub(1);
-        for row in &rows {
-            if !SHOWN.contains(&row.iteration) && row.iteration != last {
-                continue;
-            }
-            table.push(vec![
-                subject.name.as_str().into(),
-                name.into(),
-                row.iteration.to_string().into(),
-                (row.errors.max / size).into(),
-                (row.energies.thin_plate / fairest.energies.thin_plate).into(),
-                (row.energies.membrane / fairest.energies.membrane).into(),
-                row.deviation_mean.to_degrees().into(),
-                row.deviation_max.to_degrees().into(),
-            ]);
-        }
-        let curve = |value: &dyn Fn(&limitlab::interpolate::halstead::Row) -> f64| {
-            Series::line(name, rows.iter().map(|row| (row.errors.max / size, value(row))).collect::<Vec<_>>())
-        };
-        energies.push(curve(&|row| row.energies.thin_plate / fairest.energies.thin_plate));
-        deviations.push(curve(&|row| row.deviation_mean.to_degrees()));
+        runs.push((name, follow(&subject.surface, &system, &fairness, &normals, method, &stop)?.0));
     }
+    let shown = runs.iter().flat_map(|(name, rows)| {
+        let last = rows.len().saturating_sub(1);
+        let rows = rows.iter().filter(move |row| SHOWN.contains(&row.iteration) || row.iteration == last);
+        rows.map(move |row| (*name, row))
+    });
+    let error = |row: &Row| row.errors.max / size;
+    let thin_plate = |row: &Row| row.energies.thin_plate / fairest.energies.thin_plate;
+    let deviation = |row: &Row| row.deviation_mean.to_degrees();
+    let mut table = Columns::<(&str, &Row)>::new()
+        .col(Column::key("mesh"), |_| subject.name.clone())
+        .col(Column::key("method"), |(name, _)| *name)
+        .col(Column::key("iteration"), |(_, row)| row.iteration.to_string())
+        .col(Column::number("max_error", 1e-4, 3).floor(1e-9), |(_, row)| error(row))
+        .col(Column::number("thin_plate_ratio", 1e-4, 4), |(_, row)| thin_plate(row))
+        .col(Column::number("membrane_ratio", 1e-4, 4), |(_, row)| row.energies.membrane / fairest.energies.membrane)
+        .col(Column::number("normal_deviation_mean_degrees", 1e-3, 4), |(_, row)| deviation(row))
+        .col(Column::number("normal_deviation_max_degrees", 1e-3, 4), |(_, row)| row.deviation_max.to_degrees())
+        .table(RIPPLES.id, RIPPLES.title, &shown.collect::<Vec<_>>());
+    table.note(
+        "Catmull-Clark. The reference is the fairest surface that meets the points (least thin-plate plus membrane \
+         energy, control mesh two refinements down): energies are ratios to its own, normals are compared with its \
+         normals at the points. `max_error` is relative to the diagonal of the bounding box. The last row of a method is \
+         the converged surface: where the deviation passes through a minimum before, stopping early gives a smoother \
+         surface at the price of the error shown.",
+    );
     context.table(table)?;
-    let panel = |y_label: &str, series| LinePlot {
+    let panel = |y_label: &str, value: &dyn Fn(&Row) -> f64| LinePlot {
         x_label: "max error / L (iterations go to the left)".into(),
         y_label: y_label.into(),
         x_scale: Scale::Log,
-        series,
+        series: runs
+            .iter()
+            .map(|(name, rows)| Series::line(*name, rows.iter().map(|row| (error(row), value(row)))))
+            .collect(),
         ..LinePlot::default()
     };
     context.figure(
         RIPPLES.id,
-        &Figure::stack([panel("thin plate / fairest", energies), panel("mean deviation (°)", deviations)])
+        &Figure::stack([panel("thin plate / fairest", &thin_plate), panel("mean deviation (°)", &deviation)])
             .title(format!("{}: ripples against accuracy", subject.name)),
     )
 }

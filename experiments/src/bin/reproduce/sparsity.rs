@@ -3,7 +3,7 @@
 use limitlab::Result;
 use limitlab::mesh::order::{Order, inverse};
 use limitlab::schemes::Scheme;
-use limitlab_experiments::report::{Column, Figure, SparsityPlot, Table};
+use limitlab_experiments::report::{Column, Columns, Figure, SparsityPlot};
 
 use crate::context::{Context, Item};
 use crate::corpus;
@@ -15,22 +15,11 @@ const ORDERS: [Order; 4] = [Order::File, Order::Rcm, Order::Morton, Order::Rando
 fn run(context: &mut Context) -> Result<()> {
     let subject = context.subject(&corpus::SPOT_QUADS)?;
     let system = subject.system(Scheme::CatmullClark)?;
-    let mut table = Table::new(
-        PATTERNS.id,
-        PATTERNS.title,
-        vec![
-            Column::key("mesh"),
-            Column::key("order"),
-            Column::text("vertices"),
-            Column::text("entries"),
-            Column::text("bandwidth"),
-        ],
-    );
-    table.note("Bandwidth: the largest |i − j| of an entry, vertices numbered in the order.");
+    let mut bandwidths = Vec::new();
     let mut panels = Vec::new();
+    let pattern = system.a.pattern();
     for order in ORDERS {
         let place = inverse(&order.order(subject.surface.mesh(), subject.surface.incidence()));
-        let pattern = system.a.pattern();
         let entries = || {
             (0..system.len()).flat_map(|i| {
                 let place = &place;
@@ -38,16 +27,18 @@ fn run(context: &mut Context) -> Result<()> {
             })
         };
         let bandwidth = entries().map(|(i, j)| i.abs_diff(j)).max().unwrap_or(0);
-        table.push(vec![
-            subject.name.as_str().into(),
-            order.to_string().into(),
-            system.len().to_string().into(),
-            pattern.columns().len().to_string().into(),
-            bandwidth.to_string().into(),
-        ]);
+        bandwidths.push((order, bandwidth));
         let caption = format!("{order} order, bandwidth {bandwidth}");
         panels.push(SparsityPlot::new(caption, system.len(), entries()));
     }
+    let mut table = Columns::<(Order, u32)>::new()
+        .col(Column::key("mesh"), |_| subject.name.clone())
+        .col(Column::key("order"), |(order, _)| order.to_string())
+        .col(Column::text("vertices"), |_| system.len().to_string())
+        .col(Column::text("entries"), |_| pattern.columns().len().to_string())
+        .col(Column::text("bandwidth"), |(_, bandwidth)| bandwidth.to_string())
+        .table(PATTERNS.id, PATTERNS.title, &bandwidths);
+    table.note("Bandwidth: the largest |i − j| of an entry, vertices numbered in the order.");
     context.table(table)?;
     let mut figure = Figure::row(panels);
     figure.columns = 2;

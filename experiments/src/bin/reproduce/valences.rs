@@ -4,7 +4,7 @@ use limitlab::Result;
 use limitlab::analysis::valence_study::{Row, regular_band, valence_study};
 use limitlab::schemes::Scheme;
 use limitlab_experiments::report::series::Bars;
-use limitlab_experiments::report::{Column, Figure, LinePlot, Rule, Table};
+use limitlab_experiments::report::{Column, Columns, Figure, LinePlot, Rule};
 
 use crate::context::{Context, Item};
 
@@ -22,50 +22,32 @@ fn run(context: &mut Context) -> Result<()> {
     if context.real() || context.quick {
         return Ok(());
     }
-    let mut table = Table::new(
-        VALENCES.id,
-        VALENCES.title,
-        vec![
-            Column::key("scheme"),
-            Column::key("valence"),
-            Column::text("vertices"),
-            Column::number("lambda_min", 1e-8, 6),
-            Column::number("jacobi_lambda_min", 1e-8, 6),
-            Column::number("jacobi_lambda_max", 1e-8, 6),
-            Column::count("outside_band_a"),
-            Column::count("outside_band_jacobi"),
-            Column::number("slow_mode_near_star", 1e-3, 3).floor(1e-6),
-            Column::text("slow_mode_peak_valence"),
-            Column::number("limiting_mode_near_star", 1e-3, 3).floor(1e-6),
-            Column::text("limiting_mode_peak_valence"),
-        ],
-    );
+    let mut records = Vec::new();
+    for scheme in SCHEMES {
+        let rows = valence_study(scheme, STUDIED.into_iter())?;
+        context.figure(&format!("{}--{scheme}", VALENCES.id), &histograms(scheme, &rows))?;
+        records.extend(rows.into_iter().map(|row| (scheme, row)));
+    }
+    let mut table = Columns::<(Scheme, Row)>::new()
+        .col(Column::key("scheme"), |(scheme, _)| scheme.name())
+        .col(Column::key("valence"), |(_, row)| row.valence.to_string())
+        .col(Column::text("vertices"), |(_, row)| row.vertices.to_string())
+        .col(Column::number("lambda_min", 1e-8, 6), |(_, row)| row.a.first().copied())
+        .col(Column::number("jacobi_lambda_min", 1e-8, 6), |(_, row)| row.jacobi.first().copied())
+        .col(Column::number("jacobi_lambda_max", 1e-8, 6), |(_, row)| row.jacobi.last().copied())
+        .col(Column::count("outside_band_a"), |(_, row)| row.separated_a)
+        .col(Column::count("outside_band_jacobi"), |(_, row)| row.separated_jacobi)
+        .col(Column::number("slow_mode_near_star", 1e-3, 3).floor(1e-6), |(_, row)| row.slow_pia.near_star)
+        .col(Column::text("slow_mode_peak_valence"), |(_, row)| row.slow_pia.peak_valence.to_string())
+        .col(Column::number("limiting_mode_near_star", 1e-3, 3).floor(1e-6), |(_, row)| row.limiting_jacobi.near_star)
+        .col(Column::text("limiting_mode_peak_valence"), |(_, row)| row.limiting_jacobi.peak_valence.to_string())
+        .table(VALENCES.id, VALENCES.title, &records);
     table.note(
         "Two vertices of the valence in a regular surrounding (on quads with the vertices of valence 3 that Euler's \
          formula asks for). `outside_band` counts eigenvalues beyond those of the infinite regular mesh; the slow mode \
          is that of λ_min(A), which slows PIA, the limiting mode that of λ_max(D⁻¹A), which limits ω; `near_star` is \
          the part of Σx² at the two vertices and on their faces.",
     );
-    for scheme in SCHEMES {
-        let rows = valence_study(scheme, STUDIED.into_iter())?;
-        for row in &rows {
-            table.push(vec![
-                scheme.name().into(),
-                row.valence.to_string().into(),
-                row.vertices.to_string().into(),
-                row.a.first().copied().into(),
-                row.jacobi.first().copied().into(),
-                row.jacobi.last().copied().into(),
-                row.separated_a.into(),
-                row.separated_jacobi.into(),
-                row.slow_pia.near_star.into(),
-                row.slow_pia.peak_valence.to_string().into(),
-                row.limiting_jacobi.near_star.into(),
-                row.limiting_jacobi.peak_valence.to_string().into(),
-            ]);
-        }
-        context.figure(&format!("{}--{scheme}", VALENCES.id), &histograms(scheme, &rows))?;
-    }
     context.table(table)
 }
 

@@ -15,7 +15,7 @@ use limitlab::assemble::LimitSystem;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::gauss_seidel::sweep;
 use limitlab::solvers::{Method, Stop, run as solve, run_watched};
-use limitlab_experiments::report::{Column, Table};
+use limitlab_experiments::report::{Column, Columns};
 
 use crate::context::{Context, Item, Subject};
 use crate::corpus;
@@ -35,43 +35,83 @@ const DENSE: usize = 12_000;
 /// The same in a quick run.
 const DENSE_QUICK: usize = 1000;
 
+/// What is measured on one model.
+struct Row<'a> {
+    subject: &'a Subject,
+    /// The paper's number of sweeps.
+    printed: Option<usize>,
+    /// The largest update of each sweep, and the error after the last, relative to the diagonal of the bounding box.
+    updates: Vec<f64>,
+    error: f64,
+    seconds: Seconds,
+}
+
+/// Gauss-Seidel on Zheng-Cai's system, and direct methods on Nasri's.
+struct Seconds {
+    gauss_seidel: f64,
+    dense: Option<f64>,
+    lu: f64,
+    cholesky: f64,
+}
+
+impl Row<'_> {
+    fn verdict(&self) -> &'static str {
+        match self.printed {
+            Some(p) if p == self.updates.len() => "reproduced",
+            Some(_) => "not reproduced",
+            None => "not the paper's model",
+        }
+    }
+
+    /// The paper's seconds: of Gauss-Seidel, of Gaussian elimination on Nasri's system.
+    fn printed_seconds(&self) -> Option<(f64, f64)> {
+        (self.subject.surface.len() == 562).then_some((0.0049, 1.4))
+    }
+}
+
 fn run(context: &mut Context) -> Result<()> {
     // The paper's counts belong to its own model.
     let printed = context.real().then_some(3);
     let subjects = [(context.subject(&corpus::HAT)?, printed), (context.subject(&corpus::SPOT)?, None)];
-    let mut columns = vec![
-        Column::key("mesh"),
-        Column::text("vertices"),
-        Column::count("printed_sweeps"),
-        Column::count("measured_sweeps"),
-    ];
-    columns.extend((1..=SHOWN).map(|k| Column::number(format!("update_{k}_percent"), 1e-6, 4)));
-    columns.push(Column::number("max_error_percent", 1e-6, 4));
-    columns.push(Column::text("verdict"));
-    let mut table = Table::new(SECTION_3_5.id, SECTION_3_5.title, columns);
+    let mut rows = Vec::new();
+    for (subject, printed) in &subjects {
+        let system = subject.system(Scheme::ZhengCai)?;
+        let (updates, error) = updates(&system, subject.surface.positions(), subject.surface.diagonal());
+        let seconds = timing(context, subject, &system)?;
+        rows.push(Row { subject, printed: *printed, updates, error, seconds });
+    }
+    let mut columns = Columns::<Row>::new()
+        .col(Column::key("mesh"), |r| r.subject.name.clone())
+        .col(Column::text("vertices"), |r| r.subject.surface.len().to_string())
+        .col(Column::count("printed_sweeps"), |r| r.printed)
+        .col(Column::count("measured_sweeps"), |r| r.updates.len());
+    for k in 1..=SHOWN {
+        let column = Column::number(format!("update_{k}_percent"), 1e-6, 4);
+        columns = columns.col(column, move |r| r.updates.get(k - 1).map(|u| 100.0 * u));
+    }
+    let mut table = columns
+        .col(Column::number("max_error_percent", 1e-6, 4), |r| 100.0 * r.error)
+        .col(Column::text("verdict"), Row::verdict)
+        .table(SECTION_3_5.id, SECTION_3_5.title, &rows);
     table.note(
         "Gauss-Seidel in file order on Zheng-Cai's system (Eq. 7) from V = P, until the largest update of a sweep is \
          at most 0.3 % of the bounding box's diagonal. `update_k_percent` is that of sweep k, `max_error_percent` the \
          largest distance of the interpolated points after the last sweep, before the paper's second phase removes it.",
     );
-    let mut times = Table::new(
-        format!("{}--times", SECTION_3_5.id),
-        "Zheng-Cai §3.5: seconds, then and now",
-        vec![
-            Column::key("mesh"),
-            Column::text("vertices"),
-            Column::time("printed_gauss_seidel"),
-            Column::time("gauss_seidel"),
-            Column::time("printed_nasri_dense"),
-            Column::time("nasri_dense"),
-            Column::time("nasri_sparse_lu"),
-            Column::time("nasri_cholesky"),
-            Column::time("printed_ratio"),
-            Column::time("ratio_dense"),
-            Column::time("ratio_sparse_lu"),
-            Column::time("ratio_cholesky"),
-        ],
-    );
+    let mut times = Columns::<Row>::new()
+        .col(Column::key("mesh"), |r| r.subject.name.clone())
+        .col(Column::text("vertices"), |r| r.subject.surface.len().to_string())
+        .col(Column::time("printed_gauss_seidel"), |r| r.printed_seconds().map(|p| p.0))
+        .col(Column::time("gauss_seidel"), |r| r.seconds.gauss_seidel)
+        .col(Column::time("printed_nasri_dense"), |r| r.printed_seconds().map(|p| p.1))
+        .col(Column::time("nasri_dense"), |r| r.seconds.dense)
+        .col(Column::time("nasri_sparse_lu"), |r| r.seconds.lu)
+        .col(Column::time("nasri_cholesky"), |r| r.seconds.cholesky)
+        .col(Column::time("printed_ratio"), |r| r.printed_seconds().map(|p| p.1 / p.0))
+        .col(Column::time("ratio_dense"), |r| r.seconds.dense.map(|d| d / r.seconds.gauss_seidel))
+        .col(Column::time("ratio_sparse_lu"), |r| r.seconds.lu / r.seconds.gauss_seidel)
+        .col(Column::time("ratio_cholesky"), |r| r.seconds.cholesky / r.seconds.gauss_seidel)
+        .table(format!("{}--times", SECTION_3_5.id), "Zheng-Cai §3.5: seconds, then and now", &rows);
     times.note(
         "Gauss-Seidel to the 0.3 % threshold on Zheng-Cai's system, against solving Nasri's system: dense Gaussian \
          elimination with partial pivoting (as in the paper), sparse LU and sparse Cholesky, each with its set-up. \
@@ -79,27 +119,6 @@ fn run(context: &mut Context) -> Result<()> {
          failed for lack of memory (the dense matrix takes 1.07 GB). On triangle meshes both matrices are the same, \
          so the comparison there is of solvers only.",
     );
-    for (subject, printed) in subjects {
-        let system = subject.system(Scheme::ZhengCai)?;
-        let points = subject.surface.positions();
-        let size = subject.surface.diagonal();
-        let (updates, error) = updates(&system, points, size);
-        let sweeps = updates.len();
-        let mut row =
-            vec![subject.name.as_str().into(), system.len().to_string().into(), printed.into(), sweeps.into()];
-        row.extend((0..SHOWN).map(|k| updates.get(k).map(|u| 100.0 * u).into()));
-        row.push((100.0 * error).into());
-        row.push(
-            match printed {
-                Some(p) if p == sweeps => "reproduced",
-                Some(_) => "not reproduced",
-                None => "not the paper's model",
-            }
-            .into(),
-        );
-        table.push(row);
-        times.push(timing(context, &subject, &system)?);
-    }
     context.table(table)?;
     context.table(times)
 }
@@ -127,11 +146,7 @@ fn largest_update(before: &[DVec3], after: &[DVec3]) -> f64 {
     before.iter().zip(after).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
 }
 
-fn timing(
-    context: &Context,
-    subject: &Subject,
-    system: &LimitSystem,
-) -> Result<Vec<limitlab_experiments::report::Cell>> {
+fn timing(context: &Context, subject: &Subject, system: &LimitSystem) -> Result<Seconds> {
     let points = subject.surface.positions();
     let threshold = THRESHOLD * subject.surface.diagonal();
     // The loop of the paper: sweep, largest update, threshold.
@@ -155,22 +170,7 @@ fn timing(
         let solution = solve(&nasri, points, method, &stop);
         solution.setup_seconds + solution.solve_seconds
     };
-    let (lu, cholesky) = (direct(Method::Lu), direct(Method::Cholesky));
-    let printed = (system.len() == 562).then_some((0.0049, 1.4));
-    Ok(vec![
-        subject.name.as_str().into(),
-        system.len().to_string().into(),
-        printed.map(|p| p.0).into(),
-        gauss_seidel.into(),
-        printed.map(|p| p.1).into(),
-        dense.into(),
-        lu.into(),
-        cholesky.into(),
-        printed.map(|p| p.1 / p.0).into(),
-        dense.map(|d| d / gauss_seidel).into(),
-        (lu / gauss_seidel).into(),
-        (cholesky / gauss_seidel).into(),
-    ])
+    Ok(Seconds { gauss_seidel, dense, lu: direct(Method::Lu), cholesky: direct(Method::Cholesky) })
 }
 
 /// Seconds of Gaussian elimination with partial pivoting on the full matrix, three right-hand sides.

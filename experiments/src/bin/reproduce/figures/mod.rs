@@ -16,7 +16,7 @@ use limitlab::assemble::LimitSystem;
 use limitlab::mesh::{Mesh, Surface, diagonal};
 use limitlab::schemes::Refinement;
 use limitlab::solvers::{Method, Stop, run as solve};
-use limitlab_experiments::report::{Colour, Column, Figure, Picture, ShadedMesh, Table, View};
+use limitlab_experiments::report::{Colour, Column, Columns, Figure, Picture, ShadedMesh, Table, View};
 
 use crate::context::{Context, Item, Subject};
 use crate::corpus::Model;
@@ -84,18 +84,7 @@ struct Line<'a> {
 
 impl<'a> Album<'a> {
     fn new(context: &'a mut Context) -> Self {
-        let mut table = Table::new(
-            ALL.id,
-            ALL.title,
-            vec![
-                Column::key("picture"),
-                Column::text("shows"),
-                Column::text("mesh"),
-                Column::text("vertices"),
-                Column::count("iterations"),
-                Column::number("error_percent", 1e-6, 3).floor(1e-9),
-            ],
-        );
+        let mut table = columns().table(ALL.id, ALL.title, []);
         table.note(
             "Each picture is the file `figures--PICTURE.png` beside this one. Surfaces are refined and their vertices \
              then put on the limit surface, with its normals (Loop, Catmull-Clark), or refined until facets are no \
@@ -131,17 +120,20 @@ impl<'a> Album<'a> {
     }
 
     fn list(&mut self, line: &Line) {
-        let (name, points) = line.subject;
-        let size = diagonal(points);
-        self.table.push(vec![
-            line.name.into(),
-            line.shows.into(),
-            name.into(),
-            points.len().to_string().into(),
-            line.iterations.into(),
-            line.error.map(|e| 100.0 * e / size).into(),
-        ]);
+        self.table.push(columns().row(line));
     }
+}
+
+fn columns<'r>() -> Columns<'static, Line<'r>> {
+    Columns::new()
+        .col(Column::key("picture"), |line: &Line| line.name.to_owned())
+        .col(Column::text("shows"), |line| line.shows)
+        .col(Column::text("mesh"), |line| line.subject.0)
+        .col(Column::text("vertices"), |line| line.subject.1.len().to_string())
+        .col(Column::count("iterations"), |line| line.iterations)
+        .col(Column::number("error_percent", 1e-6, 3).floor(1e-9), |line| {
+            line.error.map(|e| 100.0 * e / diagonal(line.subject.1))
+        })
 }
 
 /// A mesh of our own.
