@@ -25,7 +25,7 @@ use limitlab_experiments::cli::{
     self, CommonFlags, Given, Input, MeshFlags, OutputFlags, Progress, StopFlags, Subject, number,
 };
 use limitlab_experiments::report::series::Bars;
-use limitlab_experiments::report::{Column, Figure, LinePlot, Rule, Table};
+use limitlab_experiments::report::{Column, Columns, Figure, LinePlot, Rule, Table};
 
 /// The ends of the spectra of A and D⁻¹A and the spectral radius of each method's error matrix, with proven bounds
 /// beside them, and whether the system is singular. A folder is taken for a system of anybody, as `compare-solvers` does:
@@ -91,7 +91,35 @@ struct Findings {
     certificates: [Option<Certificate>; 4],
 }
 
+/// An end of a spectrum.
+struct Quantity {
+    name: &'static str,
+    estimate: Estimate,
+    bound: f64,
+    certified: Option<f64>,
+    /// The end of what the points excite.
+    excited: Option<f64>,
+}
+
 impl Findings {
+    /// The ends of the spectra of A and D⁻¹A.
+    fn quantities(&self) -> [Quantity; 4] {
+        let quantity = |name, estimate, bound, certificate: Option<Certificate>, excited| {
+            let certified = certificate.map(|c| c.bound);
+            Quantity { name, estimate, bound, certified, excited }
+        };
+        let (e, b) = (&self.ends, &self.bounds);
+        let [a, jacobi] = self.data;
+        let [lowest, highest, jacobi_lowest, jacobi_highest] = self.certificates;
+        let (low, high) = (|d: Extremes| d.min, |d: Extremes| d.max);
+        [
+            quantity("lambda_min", e.lambda_min, b.lambda_min, lowest, a.map(low)),
+            quantity("lambda_max", e.lambda_max, b.lambda_max, highest, a.map(high)),
+            quantity("jacobi_lambda_min", e.jacobi_lambda_min, b.jacobi_lambda_min, jacobi_lowest, jacobi.map(low)),
+            quantity("jacobi_lambda_max", e.jacobi_lambda_max, b.jacobi_lambda_max, jacobi_highest, jacobi.map(high)),
+        ]
+    }
+
     fn spectrum(&self) -> Spectrum {
         self.ends.spectrum()
     }
@@ -279,22 +307,19 @@ fn radii_of_sweeps(system: &LimitSystem) -> Result<Vec<(Method<'static>, f64, Sp
 }
 
 fn eigenvalue_table(subject: &Subject, found: &Findings, n: usize) -> Table {
-    let mut table = Table::new(
-        subject.stem("spectrum"),
-        format!("Spectrum of {}", subject.title),
-        vec![
-            Column::key("quantity"),
-            Column::number("value", 1e-7, 10),
-            Column::number("residual", 1e3, 2).floor(1e-6),
-            Column::number("error", 1e3, 2).floor(1e-6),
-            Column::text("source"),
-            Column::count("multiplicity"),
-            Column::number("equal_within", 1e-3, 1),
-            Column::number("proven_bound", 1e-9, 10),
-            Column::number("certified", 1e-6, 10),
-            Column::number("excited_by_data", 1e-3, 6),
-        ],
-    );
+    let columns = Columns::<Quantity>::new()
+        .col(Column::key("quantity"), |q| q.name)
+        .col(Column::number("value", 1e-7, 10), |q| q.estimate.value)
+        .col(Column::number("residual", 1e3, 2).floor(1e-6), |q| q.estimate.residual)
+        .col(Column::number("error", 1e3, 2).floor(1e-6), |q| q.estimate.error)
+        .col(Column::text("source"), |q| q.estimate.source.name())
+        .col(Column::count("multiplicity"), |q| q.estimate.multiplicity.map(|m| m.count))
+        .col(Column::number("equal_within", 1e-3, 1), |q| q.estimate.multiplicity.map(|m| m.within))
+        .col(Column::number("proven_bound", 1e-9, 10), |q| q.bound)
+        .col(Column::number("certified", 1e-6, 10), |q| q.certified)
+        .col(Column::number("excited_by_data", 1e-3, 6), |q| q.excited);
+    let title = format!("Spectrum of {}", subject.title);
+    let mut table = columns.table(subject.stem("spectrum"), title, &found.quantities());
     table.note(match &found.verdict {
         Some(verdict) => format!("{}, {}", subject.size, of_a_mesh(verdict)),
         None => format!("{}; {}", subject.size, of_a_system(found, n)),
@@ -321,31 +346,6 @@ fn eigenvalue_table(subject: &Subject, found: &Findings, n: usize) -> Table {
         ),
         None => "All points coincide: no tolerance is relative to their extent, and no iterations are promised.".into(),
     });
-    let b = &found.bounds;
-    let e = &found.ends;
-    let data = |k: usize, low: bool| found.data[k].map(|d| if low { d.min } else { d.max });
-    for (k, (name, estimate, bound, excited)) in [
-        ("lambda_min", e.lambda_min, b.lambda_min, data(0, true)),
-        ("lambda_max", e.lambda_max, b.lambda_max, data(0, false)),
-        ("jacobi_lambda_min", e.jacobi_lambda_min, b.jacobi_lambda_min, data(1, true)),
-        ("jacobi_lambda_max", e.jacobi_lambda_max, b.jacobi_lambda_max, data(1, false)),
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        table.push(vec![
-            name.into(),
-            estimate.value.into(),
-            estimate.residual.into(),
-            estimate.error.into(),
-            estimate.source.name().into(),
-            estimate.multiplicity.map(|m| m.count).into(),
-            estimate.multiplicity.map(|m| m.within).into(),
-            bound.into(),
-            found.certificates[k].map(|c| c.bound).into(),
-            excited.into(),
-        ]);
-    }
     table
 }
 
@@ -400,47 +400,39 @@ fn promised(count: f64) -> String {
 }
 
 fn radius_table(subject: &Subject, found: &Findings) -> Table {
-    let mut table = Table::new(
-        subject.stem("spectrum-rates"),
-        format!("Predicted rates on {}", subject.title),
-        vec![Column::key("method"), Column::key("parameter"), Column::number("rho", 1e-5, 6)],
-    );
+    let columns = Columns::<(&str, String, f64)>::new()
+        .col(Column::key("method"), |&(method, ..)| method)
+        .col(Column::key("parameter"), |(_, parameter, _)| parameter.clone())
+        .col(Column::number("rho", 1e-5, 6), |&(.., rho)| rho);
+    let title = format!("Predicted rates on {}", subject.title);
+    let mut table = columns.table(subject.stem("spectrum-rates"), title, &found.radii());
     table.note(
         "Factors per iteration: the spectral radius of the error matrix; for Chebyshev and conjugate gradients the bound \
          from the condition number."
             .to_string(),
     );
-    for (method, parameter, rho) in found.radii() {
-        table.push(vec![method.into(), parameter.into(), rho.into()]);
-    }
     table
 }
 
 fn full_table(subject: &Subject, full: &dense::Eigenvalues) -> Table {
-    let mut table = Table::new(
-        subject.stem("spectrum-full"),
-        format!("All eigenvalues of {}", subject.title),
-        vec![Column::key("index"), Column::number("a", 1e-9, 10), Column::number("jacobi", 1e-9, 10)],
-    );
-    for (i, (a, jacobi)) in full.a.iter().zip(&full.jacobi).enumerate() {
-        table.push(vec![i.to_string().into(), (*a).into(), (*jacobi).into()]);
-    }
-    table
+    let columns = Columns::<usize>::new()
+        .col(Column::key("index"), |i| i.to_string())
+        .col(Column::number("a", 1e-9, 10), |&i| full.a[i])
+        .col(Column::number("jacobi", 1e-9, 10), |&i| full.jacobi[i]);
+    let title = format!("All eigenvalues of {}", subject.title);
+    columns.table(subject.stem("spectrum-full"), title, &Vec::from_iter(0..full.a.len()))
 }
 
 fn mode_table(subject: &Subject, modes: &[Mode]) -> Table {
-    let mut columns = vec![Column::key("vertex")];
-    for k in 0..modes.len() {
-        columns.push(Column::number(format!("mode_{k}"), 1e-3, 6).floor(1e-3));
+    let mut columns = Columns::<usize>::new().col(Column::key("vertex"), |v| v.to_string());
+    for (k, mode) in modes.iter().enumerate() {
+        columns = columns.col(Column::number(format!("mode_{k}"), 1e-3, 6).floor(1e-3), |&v| mode.values[v]);
     }
-    let mut table = Table::new(subject.stem("spectrum-modes"), format!("Slowest modes of {}", subject.title), columns);
+    let title = format!("Slowest modes of {}", subject.title);
+    let vertices = Vec::from_iter(0..modes[0].values.len());
+    let mut table = columns.table(subject.stem("spectrum-modes"), title, &vertices);
     let values: Vec<String> = modes.iter().map(|m| format!("{:.10}", m.eigenvalue.value)).collect();
     table.note(format!("Eigenvectors of A, largest entry 1, of the eigenvalues {}.", values.join(", ")));
-    for v in 0..modes[0].values.len() {
-        let mut row = vec![v.to_string().into()];
-        row.extend(modes.iter().map(|m| m.values[v].into()));
-        table.push(row);
-    }
     table
 }
 
@@ -462,7 +454,8 @@ fn histogram(subject: &Subject, full: &dense::Eigenvalues, promise: &Promise) ->
 fn json(subject: &Subject, found: &Findings, n: usize) -> Value {
     let e = &found.ends;
     let Spectrum { a, jacobi } = found.spectrum();
-    let multiplicity = |e: Estimate| e.multiplicity.map(|m| json!({ "count": m.count, "within": m.within }));
+    let quantities = found.quantities();
+    let each = |value: fn(&Quantity) -> Value| quantities.iter().map(|q| (q.name, value(q))).collect::<Value>();
     let promised = |count: fn(&Counts) -> f64| found.counts.as_ref().map(|c| number(count(c)));
     let mut rho = Map::new();
     for (method, _, value) in found.radii() {
@@ -476,24 +469,12 @@ fn json(subject: &Subject, found: &Findings, n: usize) -> Value {
         "jacobi_lambda_max": number(e.jacobi_lambda_max.value),
         "jacobi_lambda_min_bound": number(found.bounds.jacobi_lambda_min),
         "jacobi_lambda_max_bound": number(found.bounds.jacobi_lambda_max),
-        "residuals": {
-            "lambda_min": number(e.lambda_min.residual),
-            "lambda_max": number(e.lambda_max.residual),
-            "jacobi_lambda_min": number(e.jacobi_lambda_min.residual),
-            "jacobi_lambda_max": number(e.jacobi_lambda_max.residual),
-        },
-        "multiplicities": {
-            "lambda_min": multiplicity(e.lambda_min),
-            "lambda_max": multiplicity(e.lambda_max),
-            "jacobi_lambda_min": multiplicity(e.jacobi_lambda_min),
-            "jacobi_lambda_max": multiplicity(e.jacobi_lambda_max),
-        },
-        "sources": {
-            "lambda_min": e.lambda_min.source.name(),
-            "lambda_max": e.lambda_max.source.name(),
-            "jacobi_lambda_min": e.jacobi_lambda_min.source.name(),
-            "jacobi_lambda_max": e.jacobi_lambda_max.source.name(),
-        },
+        "residuals": each(|q| number(q.estimate.residual)),
+        "multiplicities": each(|q| {
+            let multiplicity = q.estimate.multiplicity;
+            multiplicity.map(|m| json!({ "count": m.count, "within": m.within })).into()
+        }),
+        "sources": each(|q| q.estimate.source.name().into()),
         "converged": e.converged(),
         "applications": e.applications,
         "rho": rho,
@@ -514,12 +495,8 @@ fn json(subject: &Subject, found: &Findings, n: usize) -> Value {
         "kernel_excited": found.verdict.as_ref().map(|v| v.excited),
     });
     if let Value::Object(map) = &mut object {
-        let names = ["lambda_min", "lambda_max", "jacobi_lambda_min", "jacobi_lambda_max"];
-        let proofs: Map<String, Value> = names
-            .into_iter()
-            .zip(&found.certificates)
-            .filter_map(|(name, c)| c.map(|c| (name.to_owned(), number(c.bound))))
-            .collect();
+        let proofs: Map<String, Value> =
+            quantities.iter().filter_map(|q| Some((q.name.to_owned(), number(q.certified?)))).collect();
         if !proofs.is_empty() {
             map.insert("certified".into(), Value::Object(proofs));
         }

@@ -15,6 +15,7 @@ use limitlab::solvers::Method;
 use limitlab_experiments::cli::{
     self, CommonFlags, Grid, List, MeshFlags, OutputFlags, Problem, Progress, StopFlags, number,
 };
+use limitlab_experiments::report::Table;
 use limitlab_experiments::studies::sweep as study;
 
 /// Sweeps the damping ω of Jacobi, PIA and SOR: iterations to the tolerance and the measured rate, with the
@@ -98,7 +99,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         if !arguments.output.json {
             cli::print(&table.to_markdown())?;
         }
-        results.push(json(&problem, arguments, &sweep));
+        results.push(json(&problem, arguments, &sweep, &table));
     }
     cli::finish(&results, &arguments.output, &arguments.common)
 }
@@ -150,23 +151,12 @@ fn sweep_one(
     Ok(in_units_of_files(found))
 }
 
-fn json(problem: &Problem, arguments: &Arguments, sweep: &Sweep) -> Value {
-    let rows: Vec<Value> = sweep
-        .rows
-        .iter()
-        .map(|row| {
-            json!({
-                "method": row.method.name(),
-                "omega": number(row.omega),
-                "iterations": row.iterations,
-                "status": row.outcome.name(),
-                "predicted_rho": number(row.predicted_rho),
-                "predicted_rho_data": row.predicted_rho_data.map(number),
-                "observed_rate": row.observed_rate.map(number),
-                "max_error": number(row.errors.max),
-            })
-        })
-        .collect();
+/// The rows are those of the table, with ω as a number.
+fn json(problem: &Problem, arguments: &Arguments, sweep: &Sweep, table: &Table) -> Value {
+    let mut rows = table.to_json();
+    for (row, object) in sweep.rows.iter().zip(rows.as_array_mut().into_iter().flatten()) {
+        object["omega"] = number(row.omega);
+    }
     let (mut best, mut critical, mut critical_data, mut optimal) = (Map::new(), Map::new(), Map::new(), Map::new());
     for &method in &arguments.method.0 {
         let omega = sweep.best(method).map_or(Value::Null, |r| number(r.omega));

@@ -1,8 +1,9 @@
 //! Tables and pictures of splitting matrices.
 
-use crate::report::{Column, Figure, LinePlot, Marker, Rule, Series, Table, palette};
+use crate::report::{Column, Columns, Figure, LinePlot, Marker, Rule, Series, Table, palette};
 use limitlab::Result;
 use limitlab::analysis::splitting::row::MAP_ROUNDS;
+use limitlab::analysis::splitting::thall::{Entry, Membership, Orientation};
 use limitlab::analysis::splitting::{
     Condition, Crossing, LocalScheme, Row, SplittingMatrix, ThallTables, characteristic_map, condition_over_alpha,
     crossings, thall_tables,
@@ -83,30 +84,30 @@ fn stem(scheme: LocalScheme) -> String {
     }
 }
 
+fn yes(answer: bool) -> &'static str {
+    if answer { "yes" } else { "no" }
+}
+
 fn summary(scheme: LocalScheme, rows: &[Row]) -> Table {
-    let mut table = Table::new(
-        stem(scheme),
-        format!("Splitting matrices of {scheme}"),
-        vec![
-            Column::key("valence"),
-            Column::text("rings"),
-            Column::text("size"),
-            Column::number("lambda_1", 1e-9, 10),
-            Column::number("lambda_1_imaginary", 1e-9, 4),
-            Column::number("lambda_1_formula", 1e-9, 10),
-            Column::number("lambda_3_modulus", 1e-9, 6),
-            Column::number("eigenvalue_error", 1e-2, 2),
-            Column::number("limit_mask_vertex", 1e-9, 6),
-            Column::number("limit_mask_error", 1e-2, 2),
-            Column::number("tangent_mask_distance", 1e-2, 2),
-            Column::number("residual_right", 1e-2, 2),
-            Column::number("residual_left", 1e-2, 2),
-            Column::text("pair_leads"),
-            Column::text("map_regular"),
-            Column::text("map_injective"),
-            Column::number("map_least_sine", 1e-6, 4),
-        ],
-    );
+    let columns = Columns::<Row>::new()
+        .col(Column::key("valence"), |r| r.valence)
+        .col(Column::text("rings"), |r| r.rings)
+        .col(Column::text("size"), |r| r.eigenvalues.len())
+        .col(Column::number("lambda_1", 1e-9, 10), |r| r.lambda_subdominant.re)
+        .col(Column::number("lambda_1_imaginary", 1e-9, 4), |r| r.lambda_subdominant.im.abs())
+        .col(Column::number("lambda_1_formula", 1e-9, 10), |r| r.lambda_subdominant_formula)
+        .col(Column::number("lambda_3_modulus", 1e-9, 6), |r| r.eigenvalues.get(3).map(|z| z.norm()))
+        .col(Column::number("eigenvalue_error", 1e-2, 2), |r| r.eigenvalue_error)
+        .col(Column::number("limit_mask_vertex", 1e-9, 6), |r| r.limit_mask[0])
+        .col(Column::number("limit_mask_error", 1e-2, 2), |r| r.limit_mask_error)
+        .col(Column::number("tangent_mask_distance", 1e-2, 2), |r| r.tangent_mask_distance)
+        .col(Column::number("residual_right", 1e-2, 2), |r| r.residual_right)
+        .col(Column::number("residual_left", 1e-2, 2), |r| r.residual_left)
+        .col(Column::text("pair_leads"), |r| yes(r.pair_leads))
+        .col(Column::text("map_regular"), |r| r.map.as_ref().map(|m| yes(m.regular)))
+        .col(Column::text("map_injective"), |r| r.map.as_ref().map(|m| yes(m.injective)))
+        .col(Column::number("map_least_sine", 1e-6, 4), |r| r.map.as_ref().map(|m| m.least_sine));
+    let mut table = columns.table(stem(scheme), format!("Splitting matrices of {scheme}"), rows);
     table.note(
         "Each matrix is read off from the refinement of unit vectors on a star; `rings` is the least number on which it \
          closes. `lambda_1` has the largest modulus after λ_0 = 1. Errors are the largest deviations from the closed \
@@ -121,77 +122,44 @@ fn summary(scheme: LocalScheme, rows: &[Row]) -> Table {
          and as injective if moreover its outermost ring goes counter-clockwise about the middle exactly once. Without \
          entry: the leading pair of frequency 1 is complex and there is no map."
     ));
-    for row in rows {
-        let yes = |b: bool| if b { "yes" } else { "no" };
-        table.push(vec![
-            row.valence.into(),
-            row.rings.into(),
-            row.eigenvalues.len().into(),
-            row.lambda_subdominant.re.into(),
-            row.lambda_subdominant.im.abs().into(),
-            row.lambda_subdominant_formula.into(),
-            row.eigenvalues.get(3).map(|z| z.norm()).into(),
-            row.eigenvalue_error.into(),
-            row.limit_mask[0].into(),
-            row.limit_mask_error.into(),
-            row.tangent_mask_distance.into(),
-            row.residual_right.into(),
-            row.residual_left.into(),
-            yes(row.pair_leads).into(),
-            row.map.as_ref().map(|m| yes(m.regular)).into(),
-            row.map.as_ref().map(|m| yes(m.injective)).into(),
-            row.map.as_ref().map(|m| m.least_sine).into(),
-        ]);
-    }
     table
 }
 
 fn eigenvalue_table(scheme: LocalScheme, rows: &[Row]) -> Table {
-    let mut table = Table::new(
+    let columns = Columns::<(&Row, usize)>::new()
+        .col(Column::key("valence"), |&(row, _)| row.valence)
+        .col(Column::key("index"), |&(_, i)| i)
+        .col(Column::number("real", 1e-7, 10), |&(row, i)| row.eigenvalues[i].re)
+        .col(Column::number("imaginary", 1e-7, 10), |&(row, i)| row.eigenvalues[i].im);
+    let mut table = columns.table(
         format!("{}-eigenvalues", stem(scheme)),
         format!("Eigenvalues of the splitting matrices of {scheme}"),
-        vec![
-            Column::key("valence"),
-            Column::key("index"),
-            Column::number("real", 1e-7, 10),
-            Column::number("imaginary", 1e-7, 10),
-        ],
+        &with_indices(rows, |row| row.eigenvalues.len()),
     );
     table.note("All of them with their multiplicities, by falling modulus.");
-    for row in rows {
-        for (index, z) in row.eigenvalues.iter().enumerate() {
-            table.push(vec![row.valence.into(), index.into(), z.re.into(), z.im.into()]);
-        }
-    }
     table
 }
 
 fn mask_table(scheme: LocalScheme, rows: &[Row]) -> Table {
-    let mut table = Table::new(
+    let tangent = |k: usize| move |&(row, i): &(&Row, usize)| row.tangent_masks.as_ref().map(|masks| masks[k][i]);
+    let columns = Columns::<(&Row, usize)>::new()
+        .col(Column::key("valence"), |&(row, _)| row.valence)
+        .col(Column::key("position"), |&(row, i)| scheme.layout().label(row.valence, i))
+        .col(Column::number("limit", 1e-9, 8), |&(row, i)| row.limit_mask[i])
+        .col(Column::number("tangent_cosine", 1e-9, 8), tangent(0))
+        .col(Column::number("tangent_sine", 1e-9, 8), tangent(1));
+    let mut table = columns.table(
         format!("{}-masks", stem(scheme)),
         format!("Limit and tangent masks of {scheme}"),
-        vec![
-            Column::key("valence"),
-            Column::key("position"),
-            Column::number("limit", 1e-9, 8),
-            Column::number("tangent_cosine", 1e-9, 8),
-            Column::number("tangent_sine", 1e-9, 8),
-        ],
+        &with_indices(rows, |row| row.limit_mask.len()),
     );
     table.note(format!("Positions: {}.", order(scheme)));
-    for row in rows {
-        for (i, &limit) in row.limit_mask.iter().enumerate() {
-            let tangent = |k: usize| row.tangent_masks.as_ref().map(|masks| masks[k][i]);
-            table.push(vec![
-                row.valence.into(),
-                scheme.layout().label(row.valence, i).into(),
-                limit.into(),
-                tangent(0).into(),
-                tangent(1).into(),
-            ]);
-        }
-    }
     table
+}
+
+/// Each row as often as `count` says, with the index of an eigenvalue or a position.
+fn with_indices(rows: &[Row], count: fn(&Row) -> usize) -> Vec<(&Row, usize)> {
+    rows.iter().flat_map(|row| (0..count(row)).map(move |i| (row, i))).collect()
 }
 
 /// How the positions of a star are named.
@@ -257,117 +225,80 @@ fn maps(scheme: LocalScheme, valences: &[usize]) -> Result<Option<Figure>> {
 }
 
 fn thall_report(tables: &ThallTables) -> [Table; 3] {
-    let mut entries = Table::new(
-        "splitting-thall",
-        "Thall's splitting matrices and masks, entry by entry",
-        vec![
-            Column::key("place"),
-            Column::key("valence"),
-            Column::key("item"),
-            Column::number("printed", 1e-12, 10),
-            Column::number("computed", 1e-9, 10),
-            Column::text("agrees"),
-        ],
-    );
+    let columns = Columns::<Entry>::new()
+        .col(Column::key("place"), |e| e.place)
+        .col(Column::key("valence"), |e| e.valence)
+        .col(Column::key("item"), |e| e.item.clone())
+        .col(Column::number("printed", 1e-12, 10), |e| e.printed)
+        .col(Column::number("computed", 1e-9, 10), |e| e.computed)
+        .col(Column::text("agrees"), |e| yes((e.printed - e.computed).abs() < 1e-12));
+    let title = "Thall's splitting matrices and masks, entry by entry";
+    let mut entries = columns.table("splitting-thall", title, &tables.entries);
     entries.note(
         "S and masks in Thall's order v, f_1…f_n, e_1…e_n. Tables II and III are compared with his formulas for c_2 and \
          c_3 under the index map of §4.1 (Table II is scaled by 4). Agreement: to 1e-12.",
     );
-    for e in &tables.entries {
-        let agrees = (e.printed - e.computed).abs() < 1e-12;
-        entries.push(vec![
-            e.place.into(),
-            e.valence.into(),
-            e.item.clone().into(),
-            e.printed.into(),
-            e.computed.into(),
-            if agrees { "yes" } else { "no" }.into(),
-        ]);
-    }
-    let mut members = Table::new(
-        "splitting-thall-membership",
-        "Printed tangent masks and the left eigenspace of λ_2 = λ_3",
-        vec![
-            Column::key("place"),
-            Column::key("valence"),
-            Column::key("mask"),
-            Column::number("distance", 1e-6, 4),
-            Column::number("distance_edges_scaled", 1e-6, 4),
-        ],
-    );
+    let columns = Columns::<Membership>::new()
+        .col(Column::key("place"), |m| m.place)
+        .col(Column::key("valence"), |m| m.valence)
+        .col(Column::key("mask"), |m| m.mask.clone())
+        .col(Column::number("distance", 1e-6, 4), |m| m.distance)
+        .col(Column::number("distance_edges_scaled", 1e-6, 4), |m| m.distance_scaled);
+    let title = "Printed tangent masks and the left eigenspace of λ_2 = λ_3";
+    let mut members = columns.table("splitting-thall-membership", title, &tables.memberships);
     members.note(
         "Relative distance ‖v − QQᵀv‖/‖v‖ of the mask from the eigenspace; then the same with the edge weights \
          multiplied by A_n.",
     );
-    for m in &tables.memberships {
-        members.push(vec![
-            m.place.into(),
-            m.valence.into(),
-            m.mask.clone().into(),
-            m.distance.into(),
-            m.distance_scaled.into(),
-        ]);
-    }
-    let mut normals = Table::new(
-        "splitting-thall-normals",
-        "Which way m_2 × m_3 points",
-        vec![Column::key("place"), Column::key("valence"), Column::key("masks"), Column::number("sine", 1e-9, 4)],
-    );
+    let columns = Columns::<Orientation>::new()
+        .col(Column::key("place"), |o| o.place)
+        .col(Column::key("valence"), |o| o.valence)
+        .col(Column::key("masks"), |o| o.masks)
+        .col(Column::number("sine", 1e-9, 4), |o| o.sine);
+    let mut normals = columns.table("splitting-thall-normals", "Which way m_2 × m_3 points", &tables.orientations);
     normals.note("The sine of the angle from m_2 to m_3 on a counter-clockwise planar star: positive is outward.");
-    for o in &tables.orientations {
-        normals.push(vec![o.place.into(), o.valence.into(), o.masks.into(), o.sine.into()]);
-    }
     [entries, members, normals]
 }
 
 fn condition_table(sampled: &[Condition]) -> Table {
-    let mut columns = vec![Column::key("valence"), Column::key("alpha")];
+    let mut columns = Columns::<Condition>::new()
+        .col(Column::key("valence"), |c| c.valence)
+        .col(Column::key("alpha"), |c| c.alpha.to_string());
     for k in 1..=4 {
-        columns.push(Column::number(format!("lambda_{k}_modulus"), 1e-6, 6));
+        columns = columns.col(Column::number(format!("lambda_{k}_modulus"), 1e-6, 6), move |c| c.lambda[k - 1].norm());
     }
-    columns.push(Column::number("margin", 1e-6, 4));
-    columns.push(Column::text("holds"));
-    columns.push(Column::text("third_equals_fourth"));
-    let mut table = Table::new("splitting-sqrt3-condition", "Lin and Luo's eigenvalue condition over α", columns);
+    let columns = columns
+        .col(Column::number("margin", 1e-6, 4), |c| c.margin)
+        .col(Column::text("holds"), |c| yes(c.holds))
+        .col(Column::text("third_equals_fourth"), |c| yes(c.third_equals_fourth));
+    let title = "Lin and Luo's eigenvalue condition over α";
+    let mut table = columns.table("splitting-sqrt3-condition", title, sampled);
     table.note(
         "S̃ = R·S·S on three rings. The condition: λ_0 = 1 > λ_1 = λ_2 > λ_3, a real pair of frequency 1 leading; `margin` is \
          the modulus of that pair less the largest other. The paper (§6) states it for all α in [0, 2], and λ_3 = λ_4 \
          beside it for n > 3.",
     );
-    for c in sampled {
-        let yes = |b: bool| if b { "yes" } else { "no" };
-        let mut row = vec![c.valence.into(), c.alpha.to_string().into()];
-        row.extend(c.lambda.iter().map(|z| z.norm().into()));
-        row.extend([c.margin.into(), yes(c.holds).into(), yes(c.third_equals_fourth).into()]);
-        table.push(row);
-    }
     table
 }
 
 fn crossing_table(valences: &[usize], crossings: &[Vec<Crossing>]) -> Table {
-    let mut table = Table::new(
-        "splitting-sqrt3-crossings",
-        "Where Lin and Luo's eigenvalue condition ceases to hold",
-        vec![
-            Column::key("valence"),
-            Column::number("alpha", 1e-6, 8),
-            Column::text("above"),
-            Column::text("frequency"),
-        ],
-    );
+    // A valence without crossings has a row all the same.
+    let mut rows = Vec::new();
+    for (&n, found) in valences.iter().zip(crossings) {
+        rows.extend(found.is_empty().then_some((n, None)));
+        rows.extend(found.iter().map(|c| (n, Some(c))));
+    }
+    let columns = Columns::<(usize, Option<&Crossing>)>::new()
+        .col(Column::key("valence"), |&(n, _)| n)
+        .col(Column::number("alpha", 1e-6, 8), |(_, c)| c.map(|c| c.alpha))
+        .col(Column::text("above"), |(_, c)| if c.is_none_or(|c| c.holds_above) { "holds" } else { "fails" })
+        .col(Column::text("frequency"), |(_, c)| c.map(|c| c.frequency));
+    let title = "Where Lin and Luo's eigenvalue condition ceases to hold";
+    let mut table = columns.table("splitting-sqrt3-crossings", title, &rows);
     table.note(
         "`frequency` is that of the eigenvalue that meets λ_1 there: 0 for rotation-invariant ones. Found between \
          neighbours of 401 values of α, then by bisection. Without α: it holds on all of [0, 2].",
     );
-    for (&n, found) in valences.iter().zip(crossings) {
-        if found.is_empty() {
-            table.push(vec![n.into(), None::<f64>.into(), "holds".into(), "".into()]);
-        }
-        for c in found {
-            let above = if c.holds_above { "holds" } else { "fails" };
-            table.push(vec![n.into(), c.alpha.into(), above.into(), c.frequency.into()]);
-        }
-    }
     table
 }
 

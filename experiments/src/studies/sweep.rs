@@ -1,8 +1,8 @@
 //! The table and the picture of an ω sweep.
 
 use crate::cli::Grid;
-use crate::report::{Column, Figure, LinePlot, Marker, Rule, Scale, Series, Table, palette};
-use limitlab::analysis::sweep::Sweep;
+use crate::report::{Column, Columns, Figure, LinePlot, Marker, Rule, Scale, Series, Table, palette};
+use limitlab::analysis::sweep::{Row, Sweep};
 use limitlab::error::short;
 use limitlab::solvers::{Method, Outcome};
 
@@ -14,20 +14,7 @@ pub fn default_grid(method: Method) -> Vec<f64> {
 
 /// One row a method and ω. `about` says which mesh, start and tolerance.
 pub fn table(id: String, title: String, about: String, sweep: &Sweep) -> Table {
-    let mut table = Table::new(
-        id,
-        title,
-        vec![
-            Column::key("method"),
-            Column::key("omega"),
-            Column::text("status"),
-            Column::count("iterations"),
-            Column::number("predicted_rho", 1e-4, 4),
-            Column::number("predicted_rho_data", 1e-3, 4),
-            Column::number("observed_rate", 1e-2, 4),
-            Column::number("max_error", 1e-2, 3),
-        ],
-    );
+    let mut table = columns().table(id, title, &sweep.rows);
     table.note(format!(
         "{about} `predicted_rho` is the spectral radius of the error matrix, `predicted_rho_data` the same over the \
          eigenvectors that the data excite, `observed_rate` the factor per iteration fitted to the tail of the \
@@ -56,19 +43,19 @@ pub fn table(id: String, title: String, about: String, sweep: &Sweep) -> Table {
         }
         table.note(text + ".");
     }
-    for row in &sweep.rows {
-        table.push(vec![
-            row.method.name().into(),
-            short(row.omega).into(),
-            row.outcome.name().into(),
-            row.iterations.into(),
-            row.predicted_rho.into(),
-            row.predicted_rho_data.into(),
-            row.observed_rate.into(),
-            row.errors.max.into(),
-        ]);
-    }
     table
+}
+
+fn columns() -> Columns<'static, Row> {
+    Columns::<Row>::new()
+        .col(Column::key("method"), |r| r.method.name())
+        .col(Column::key("omega"), |r| short(r.omega))
+        .col(Column::text("status"), |r| r.outcome.name())
+        .col(Column::count("iterations"), |r| r.iterations)
+        .col(Column::number("predicted_rho", 1e-4, 4), |r| r.predicted_rho)
+        .col(Column::number("predicted_rho_data", 1e-3, 4), |r| r.predicted_rho_data)
+        .col(Column::number("observed_rate", 1e-2, 4), |r| r.observed_rate)
+        .col(Column::number("max_error", 1e-2, 3), |r| r.errors.max)
 }
 
 /// Iterations above, rates below, over ω.

@@ -30,7 +30,9 @@ use limitlab::schemes::Scheme;
 use limitlab::solvers::gauss_seidel::{by_colours, in_waves};
 use limitlab::solvers::{Method, Report, Stop, run};
 use limitlab_experiments::cli::{self, CommonFlags, List, Printer, Progress, number};
-use limitlab_experiments::report::{Colour, Column, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette};
+use limitlab_experiments::report::{
+    Colour, Column, Columns, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette,
+};
 
 /// Measures time, memory and iterations of the methods over growing meshes, from faces in memory to control points,
 /// everything counted.
@@ -98,23 +100,7 @@ fn measure(arguments: &Arguments) -> Result<()> {
     let threads = rayon::current_num_threads();
     let bandwidth = machine::triad();
     let mut printer = Printer::new(arguments.json);
-    let mut table = Table::new(
-        "scaling",
-        "Time and memory from faces in memory to control points",
-        vec![
-            Column::key("scheme"),
-            Column::key("mesh"),
-            Column::key("order"),
-            Column::key("method"),
-            Column::count("vertices"),
-            Column::count("iterations"),
-            Column::text("status"),
-            Column::time("seconds"),
-            Column::time("solve_seconds"),
-            Column::time("nanoseconds_per_vertex"),
-            Column::time("peak_megabytes"),
-        ],
-    );
+    let mut table = columns().table("scaling", "Time and memory from faces in memory to control points", &[]);
     table.note(format!(
         "{threads} threads, STREAM triad {:.1} GB/s in this run. Noise 0.1 on every mesh; start V = P; stop at max_i ‖p_i − \
          (A v)_i‖ ≤ {:e}·L. Seconds count topology, order, set-up and solve; the memory is the most heap that is held \
@@ -165,18 +151,19 @@ fn local_edits(arguments: &Arguments, printer: &mut Printer) -> Result<()> {
     let Some(&last) = sizes.last() else {
         return Ok(());
     };
-    let mut table = edits::edits_table(arguments.tol);
+    let mut rows = Vec::new();
     let mut largest = Vec::new();
     for &scheme in &arguments.scheme.0 {
         for &n in &sizes {
             let name = family(scheme, n);
             let mesh = noisy(&name)?;
-            let operator = edits::edits(&name, mesh, scheme, arguments.tol, &mut table)?;
+            let operator = edits::edits(&name, mesh, scheme, arguments.tol, &mut rows)?;
             if n == last {
                 largest.push((format!("{name}, {scheme}"), operator));
             }
         }
     }
+    let table = edits::edits_table(arguments.tol, &rows);
     table.write(&arguments.out)?;
     edits::decay_table(&largest)?.write(&arguments.out)?;
     printer.table(&table)
@@ -272,6 +259,40 @@ struct Outcome {
     solve_seconds: f64,
 }
 
+/// One way on one mesh.
+struct Row {
+    scheme: Scheme,
+    name: String,
+    random: bool,
+    way: Way,
+    vertices: usize,
+    seconds: f64,
+    outcome: Outcome,
+    /// Bytes.
+    memory: usize,
+}
+
+impl Row {
+    fn nanoseconds_per_vertex(&self) -> f64 {
+        1e9 * self.seconds / self.vertices as f64
+    }
+}
+
+fn columns() -> Columns<'static, Row> {
+    Columns::<Row>::new()
+        .col(Column::key("scheme"), |r| r.scheme.name())
+        .col(Column::key("mesh"), |r| r.name.clone())
+        .col(Column::key("order"), |r| if r.random { "random" } else { "good" })
+        .col(Column::key("method"), |r| r.way.name())
+        .col(Column::count("vertices"), |r| r.vertices)
+        .col(Column::count("iterations"), |r| r.outcome.iterations)
+        .col(Column::text("status"), |r| r.outcome.status)
+        .col(Column::time("seconds"), |r| r.seconds)
+        .col(Column::time("solve_seconds"), |r| r.outcome.solve_seconds)
+        .col(Column::time("nanoseconds_per_vertex"), Row::nanoseconds_per_vertex)
+        .col(Column::time("peak_megabytes"), |r| r.memory as f64 / 1e6)
+}
+
 /// Where the interval of Chebyshev iterations starts, by a small mesh.
 fn estimate(scheme: Scheme) -> Result<f64> {
     let small = noisy(&family(scheme, ESTIMATE))?;
@@ -280,6 +301,7 @@ fn estimate(scheme: Scheme) -> Result<f64> {
 }
 
 fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut Table) -> Result<[LinePlot; 2]> {
+    let columns = columns();
     let estimate = estimate(scheme)?;
     let mut curves: Vec<Curve> = Vec::new();
     let mut bound = Vec::new();
@@ -305,22 +327,12 @@ fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut 
                     continue;
                 };
                 progress.step();
-                table.push(vec![
-                    scheme.name().into(),
-                    name.clone().into(),
-                    if random { "random" } else { "good" }.into(),
-                    way.name().into(),
-                    mesh.len().into(),
-                    outcome.iterations.into(),
-                    outcome.status.into(),
-                    seconds.into(),
-                    outcome.solve_seconds.into(),
-                    (1e9 * seconds / mesh.len() as f64).into(),
-                    (memory as f64 / 1e6).into(),
-                ]);
+                let (name, vertices) = (name.clone(), mesh.len());
+                let row = Row { scheme, name, random, way, vertices, seconds, outcome, memory };
+                table.push(columns.row(&row));
                 // A run of hours may be stopped: what was measured is kept.
                 table.write(&arguments.out)?;
-                let at = (mesh.len() as f64, 1e9 * seconds / mesh.len() as f64);
+                let at = (row.vertices as f64, row.nanoseconds_per_vertex());
                 let known = curves.iter_mut().find(|c| c.way == way && c.random == random);
                 match known {
                     Some(curve) => curve.points.push(at),
@@ -329,7 +341,7 @@ fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut 
                 if way == Way::Free(CHEBYSHEV) && !random {
                     // What a fused iteration in double precision must move, as often.
                     let bytes = 4.0 * 24.0 + 37.0;
-                    bound.push((at.0, 1e9 * bytes * outcome.iterations as f64 / bandwidth));
+                    bound.push((at.0, 1e9 * bytes * row.outcome.iterations as f64 / bandwidth));
                 }
             }
         }

@@ -14,7 +14,7 @@ use limitlab::solvers::coloured::Coloured;
 use limitlab::solvers::iteration::Iterate;
 use limitlab::solvers::system::{Rows, System};
 use limitlab::solvers::wavefront::Wavefront;
-use limitlab_experiments::report::{Column, Table};
+use limitlab_experiments::report::{Column, Columns, Table};
 
 use crate::baseline::Plain;
 use crate::machine::triad;
@@ -24,29 +24,37 @@ use crate::threads::on_threads;
 const ITERATIONS: usize = 17;
 const RUNS: usize = 5;
 
+/// One iteration of a kernel; bytes and flops are those of a vertex.
+struct Row {
+    kernel: &'static str,
+    threads: usize,
+    bytes: f64,
+    flops: f64,
+    seconds: f64,
+    /// Of STREAM's triad, in bytes a second.
+    bandwidth: f64,
+}
+
 /// The table of one mesh on one thread and on all: Chebyshev iterations, error norm included where the method takes it,
 /// and sweeps of Gauss-Seidel.
 pub fn profile(name: &str, mesh: &Mesh, scheme: Scheme, all: usize) -> Result<Table> {
-    let mut table = Table::new(
-        "scaling-profile",
-        format!("One iteration on {name} under {scheme}"),
-        vec![
-            Column::key("kernel"),
-            Column::key("threads"),
-            Column::number("bytes_per_vertex", 0.0, 4),
-            Column::number("flops_per_vertex", 0.0, 4),
-            Column::time("nanoseconds_per_vertex"),
-            Column::time("gigabytes_per_second"),
-            Column::time("share_of_triad"),
-        ],
-    );
+    let n = mesh.len() as f64;
+    let columns = Columns::<Row>::new()
+        .col(Column::key("kernel"), |r| r.kernel)
+        .col(Column::key("threads"), |r| r.threads.to_string())
+        .col(Column::number("bytes_per_vertex", 0.0, 4), |r| r.bytes)
+        .col(Column::number("flops_per_vertex", 0.0, 4), |r| r.flops)
+        .col(Column::time("nanoseconds_per_vertex"), |r| 1e9 * r.seconds / n)
+        .col(Column::time("gigabytes_per_second"), |r| 1e-9 * (r.bytes * n / r.seconds))
+        .col(Column::time("share_of_triad"), |r| r.bytes * n / r.seconds / r.bandwidth);
     let mut threads = vec![1, all];
     threads.dedup();
-    let mut triads = Vec::new();
+    let (mut rows, mut triads) = (Vec::new(), Vec::new());
     for count in threads {
-        let bandwidth = on_threads(count, || kernels(mesh, scheme, &mut table))??;
+        let bandwidth = on_threads(count, || kernels(mesh, scheme, &mut rows))??;
         triads.push(format!("{:.1} GB/s on {count}", bandwidth / 1e9));
     }
+    let mut table = columns.table("scaling-profile", format!("One iteration on {name} under {scheme}"), &rows);
     table.note(format!(
         "{} vertices. Bytes are those that must pass between memory and processor if every array is read once; STREAM's \
          triad moves {} threads in this run. A share above 1 says that iterations share a pass over memory.",
@@ -57,8 +65,8 @@ pub fn profile(name: &str, mesh: &Mesh, scheme: Scheme, all: usize) -> Result<Ta
 }
 
 /// The rows of the threads that this runs on, and the bandwidth of STREAM's triad.
-fn kernels(mesh: &Mesh, scheme: Scheme, table: &mut Table) -> Result<f64> {
-    let threads = rayon::current_num_threads().to_string();
+fn kernels(mesh: &Mesh, scheme: Scheme, rows: &mut Vec<Row>) -> Result<f64> {
+    let threads = rayon::current_num_threads();
     let n = mesh.len() as f64;
     let points = &mesh.positions;
     let surface = Surface::new(mesh.clone())?;
@@ -77,17 +85,8 @@ fn kernels(mesh: &Mesh, scheme: Scheme, table: &mut Table) -> Result<f64> {
     let double = 4.0 * 24.0;
     let single = 4.0 * 16.0;
     let index = |operator: &Operator| operator.sweep_bytes() as f64 / n;
-    let mut push = |kernel: &str, bytes: f64, flops: f64, seconds: f64| {
-        let rate = bytes * n / seconds;
-        table.push(vec![
-            kernel.into(),
-            threads.as_str().into(),
-            bytes.into(),
-            flops.into(),
-            (1e9 * seconds / n).into(),
-            (1e-9 * rate).into(),
-            (rate / bandwidth).into(),
-        ]);
+    let mut push = |kernel, bytes, flops, seconds| {
+        rows.push(Row { kernel, threads, bytes, flops, seconds, bandwidth });
     };
     if let Some(plain) = Plain::new(mesh, scheme) {
         let seconds = best(|| plain.chebyshev(points, (0.1, 1.0), 0.0, ITERATIONS).1);
@@ -103,7 +102,7 @@ fn kernels(mesh: &Mesh, scheme: Scheme, table: &mut Table) -> Result<f64> {
     push("stored matrix, fused, double", double + 12.0 * entries + 4.0, stored_flops, iterations(&explicit, points));
     push("matrix-free, fused, double, file order", double + index(&free), free_flops, iterations(&free, points));
     push("matrix-free, fused, double, front order", double + index(&front), free_flops, iterations(&front, &moved));
-    let mut rows = Rows::new(mesh.len());
+    let mut products = Rows::new(mesh.len());
     let mut image = moved.clone();
     let mut nothing = vec![(); mesh.len()];
     push(
@@ -113,7 +112,7 @@ fn kernels(mesh: &Mesh, scheme: Scheme, table: &mut Table) -> Result<f64> {
         best(|| {
             for _ in 0..ITERATIONS {
                 let image = &mut image;
-                rows.product(&front, &moved, image, &mut nothing, |_, ax, y, (), _| {
+                products.product(&front, &moved, image, &mut nothing, |_, ax, y, (), _| {
                     *y = ax;
                 });
             }
@@ -130,7 +129,7 @@ fn kernels(mesh: &Mesh, scheme: Scheme, table: &mut Table) -> Result<f64> {
     // The iterate is read and written, the points and the diagonal are read; no norm, no momentum.
     let sweep = 3.0 * 24.0 + 8.0;
     let sweep_flops = free_flops - 12.0;
-    let mut sweeps = |kernel: &str, operator: &Operator, p: &[DVec3], relax: Relax| {
+    let mut sweeps = |kernel: &'static str, operator: &Operator, p: &[DVec3], relax: Relax| {
         let mut x = p.to_vec();
         let seconds = best(|| {
             relax(ITERATIONS, p, &mut x);

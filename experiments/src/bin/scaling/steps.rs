@@ -12,7 +12,7 @@ use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Mesh, Surface, Topology, io};
 use limitlab::schemes::{Refinement, Scheme, unified_sqrt3};
 use limitlab_experiments::cli::Printer;
-use limitlab_experiments::report::{Cell, Column, Table};
+use limitlab_experiments::report::{Column, Columns};
 
 use super::noisy;
 use super::threads::on_threads;
@@ -23,27 +23,7 @@ const RUNS: usize = 3;
 /// Measures all steps at about `n` vertices and writes the table to `folder`, which also takes the mesh files for a
 /// while.
 pub fn steps(n: usize, folder: &Path, printer: &mut Printer) -> Result<()> {
-    let mut table = Table::new(
-        "scaling-steps",
-        "The steps around the solve",
-        vec![
-            Column::key("step"),
-            Column::key("scheme"),
-            Column::key("mesh"),
-            Column::key("order"),
-            Column::key("threads"),
-            Column::count("vertices"),
-            Column::count("new_vertices"),
-            Column::time("seconds"),
-            Column::time("nanoseconds_per_vertex"),
-            Column::time("megabytes_per_second"),
-        ],
-    );
-    table.note(
-        "Memory to memory but for the files; the fastest of three runs. Refinement: from a validated mesh with its \
-         topology to the refined mesh with its topology, nanoseconds per new vertex; \"from faces\" finds the topology \
-         of the coarse mesh too, not validated. Assembly: from faces to A and M. Files: positions with all 17 digits; PLY is binary.",
-    );
+    let mut rows = Vec::new();
     let quads = noisy(&format!("irregular-quad:{}", n & !1))?;
     let triangles = noisy(&format!("irregular-tri:{n}"))?;
     let polygons = noisy(&format!("irregular-poly:{n}"))?;
@@ -55,25 +35,58 @@ pub fn steps(n: usize, folder: &Path, printer: &mut Printer) -> Result<()> {
         let random = shuffle_faces(&permute_vertices(&good, &order), 7);
         for (order, mesh) in [("good", &good), ("random", &random)] {
             for &threads in &threads {
-                let mut rows = Rows {
-                    table: &mut table,
-                    mesh,
-                    keys: [format!("irregular-{name}:{n}"), order.into(), threads.to_string()],
-                };
-                on_threads(threads, || rows.measure(folder))??;
+                let on = On { name: format!("irregular-{name}:{n}"), order, threads, vertices: mesh.len() };
+                on_threads(threads, || Rows { rows: &mut rows, mesh, on }.measure(folder))??;
             }
         }
     }
+    let columns = Columns::<Row>::new()
+        .col(Column::key("step"), |r| r.step.clone())
+        .col(Column::key("scheme"), |r| r.scheme)
+        .col(Column::key("mesh"), |r| r.on.name.clone())
+        .col(Column::key("order"), |r| r.on.order)
+        .col(Column::key("threads"), |r| r.on.threads.to_string())
+        .col(Column::count("vertices"), |r| r.on.vertices)
+        .col(Column::count("new_vertices"), |r| (r.vertices != r.on.vertices).then_some(r.vertices))
+        .col(Column::time("seconds"), |r| r.seconds)
+        .col(Column::time("nanoseconds_per_vertex"), |r| 1e9 * r.seconds / r.vertices as f64)
+        .col(Column::time("megabytes_per_second"), |r| r.speed.map(|s| s / 1e6));
+    let mut table = columns.table("scaling-steps", "The steps around the solve", &rows);
+    table.note(
+        "Memory to memory but for the files; the fastest of three runs. Refinement: from a validated mesh with its \
+         topology to the refined mesh with its topology, nanoseconds per new vertex; \"from faces\" finds the topology \
+         of the coarse mesh too, not validated. Assembly: from faces to A and M. Files: positions with all 17 digits; PLY is binary.",
+    );
     table.write(folder)?;
     printer.table(&table)
 }
 
+/// What steps are measured on.
+#[derive(Clone)]
+struct On {
+    name: String,
+    order: &'static str,
+    threads: usize,
+    vertices: usize,
+}
+
+/// One step.
+struct Row {
+    step: String,
+    scheme: &'static str,
+    on: On,
+    /// After the step.
+    vertices: usize,
+    seconds: f64,
+    /// Bytes a second.
+    speed: Option<f64>,
+}
+
 /// The rows of one mesh and number of threads.
 struct Rows<'a> {
-    table: &'a mut Table,
+    rows: &'a mut Vec<Row>,
     mesh: &'a Mesh,
-    /// Mesh, order, threads.
-    keys: [String; 3],
+    on: On,
 }
 
 impl Rows<'_> {
@@ -97,7 +110,7 @@ impl Rows<'_> {
             let alpha = vec![0.5; mesh.len()];
             self.refinement("unified-sqrt3", |surface| Ok(unified_sqrt3::refined(surface, &alpha)?.0))?;
         }
-        if self.keys[1] == "good" && mesh.faces.uniform_size().is_some() {
+        if self.on.order == "good" && mesh.faces.uniform_size().is_some() {
             for ending in ["off", "obj", "ply"] {
                 self.files(&folder.join(format!("scaling-steps.{ending}")), ending)?;
             }
@@ -105,20 +118,20 @@ impl Rows<'_> {
         Ok(())
     }
 
-    fn plain<T>(&mut self, step: &str, scheme: &str, work: impl Fn() -> Result<T>) -> Result<()> {
+    fn plain<T>(&mut self, step: &str, scheme: &'static str, work: impl Fn() -> Result<T>) -> Result<()> {
         let (seconds, _) = fastest(|| (), |()| work())?;
         self.push(step, scheme, self.mesh.len(), seconds, None);
         Ok(())
     }
 
     /// With validation, and topology where it is needed.
-    fn validated<T>(&mut self, step: &str, scheme: &str, work: impl Fn(Surface) -> Result<T>) -> Result<()> {
+    fn validated<T>(&mut self, step: &str, scheme: &'static str, work: impl Fn(Surface) -> Result<T>) -> Result<()> {
         let (seconds, _) = fastest(|| self.mesh.clone(), |mesh| work(Surface::new(mesh)?))?;
         self.push(step, scheme, self.mesh.len(), seconds, None);
         Ok(())
     }
 
-    fn refinement(&mut self, scheme: &str, step: impl Fn(&Surface) -> Result<Surface>) -> Result<()> {
+    fn refinement(&mut self, scheme: &'static str, step: impl Fn(&Surface) -> Result<Surface>) -> Result<()> {
         let mesh = self.mesh;
         let surface = Surface::new(mesh.clone())?;
         surface.topology();
@@ -142,21 +155,9 @@ impl Rows<'_> {
         std::fs::remove_file(path).map_err(|e| Error::io(path, "remove", e))
     }
 
-    fn push(&mut self, step: &str, scheme: &str, vertices: usize, seconds: f64, speed: Option<f64>) {
-        let [mesh, order, threads] = self.keys.clone();
-        let new = if vertices == self.mesh.len() { Cell::Empty } else { vertices.into() };
-        self.table.push(vec![
-            step.into(),
-            scheme.into(),
-            mesh.into(),
-            order.into(),
-            threads.into(),
-            self.mesh.len().into(),
-            new,
-            seconds.into(),
-            (1e9 * seconds / vertices as f64).into(),
-            speed.map(|s| s / 1e6).into(),
-        ]);
+    fn push(&mut self, step: &str, scheme: &'static str, vertices: usize, seconds: f64, speed: Option<f64>) {
+        let (step, on) = (step.to_owned(), self.on.clone());
+        self.rows.push(Row { step, scheme, on, vertices, seconds, speed });
     }
 }
 

@@ -14,7 +14,7 @@ use limitlab::solvers::coloured::Coloured;
 use limitlab::solvers::system::Rows;
 use limitlab::solvers::wavefront::Wavefront;
 use limitlab_experiments::cli::Printer;
-use limitlab_experiments::report::{Column, Table};
+use limitlab_experiments::report::{Column, Columns};
 
 use super::machine::triad;
 use super::{Arguments, CHEBYSHEV, Way, estimate, family, go, noisy};
@@ -42,23 +42,30 @@ pub fn on_threads<T: Send>(count: usize, work: impl FnOnce() -> T + Send) -> Res
     Ok(pool.install(work))
 }
 
+/// A part of a method's run, on one thread and on all.
+struct Row {
+    scheme: Scheme,
+    name: String,
+    method: String,
+    part: &'static str,
+    seconds: [f64; 2],
+    /// Of STREAM's triad.
+    bandwidth: [f64; 2],
+}
+
 /// Writes the table of quads under Catmull-Clark and triangles under Loop.
 pub fn gains(arguments: &Arguments, all: usize, printer: &mut Printer) -> Result<()> {
     let runs = usize::from(arguments.runs).max(2);
-    let mut table = Table::new(
-        "scaling-threads",
-        format!("One thread beside {all}"),
-        vec![
-            Column::key("scheme"),
-            Column::key("mesh"),
-            Column::key("method"),
-            Column::key("part"),
-            Column::time("seconds_on_one"),
-            Column::time("seconds_on_all"),
-            Column::time("gain"),
-            Column::time("gain_of_triad"),
-        ],
-    );
+    let columns = Columns::<Row>::new()
+        .col(Column::key("scheme"), |r| r.scheme.name())
+        .col(Column::key("mesh"), |r| r.name.clone())
+        .col(Column::key("method"), |r| r.method.clone())
+        .col(Column::key("part"), |r| r.part)
+        .col(Column::time("seconds_on_one"), |r| r.seconds[0])
+        .col(Column::time("seconds_on_all"), |r| r.seconds[1])
+        .col(Column::time("gain"), |r| r.seconds[0] / r.seconds[1])
+        .col(Column::time("gain_of_triad"), |r| r.bandwidth[1] / r.bandwidth[0]);
+    let mut table = columns.table("scaling-threads", format!("One thread beside {all}"), &[]);
     table.note(format!(
         "Good order; the fastest of {runs} runs. Gain: seconds on one thread over seconds on {all}. STREAM's triad \
          is measured with as many threads around each scheme's measurements: what it gains is what memory allows where \
@@ -102,23 +109,14 @@ pub fn gains(arguments: &Arguments, all: usize, printer: &mut Printer) -> Result
         }
         let after = [on_threads(1, triad)?, on_threads(all, triad)?];
         let bandwidth = [0, 1].map(|k| before[k].max(after[k]));
-        let of_triad = bandwidth[1] / bandwidth[0];
         table.note(format!(
             "STREAM triad around {scheme}: {:.1} GB/s on one thread, {:.1} GB/s on {all}.",
             bandwidth[0] / 1e9,
             bandwidth[1] / 1e9
         ));
-        for (method, part, [one, many]) in seconds {
-            table.push(vec![
-                scheme.name().into(),
-                name.as_str().into(),
-                method.into(),
-                part.into(),
-                one.into(),
-                many.into(),
-                (one / many).into(),
-                of_triad.into(),
-            ]);
+        for (method, part, seconds) in seconds {
+            let name = name.clone();
+            table.push(columns.row(&Row { scheme, name, method, part, seconds, bandwidth }));
         }
     }
     table.write(&arguments.out)?;
