@@ -53,6 +53,25 @@ pub enum Error {
         /// The scheme by name, or what else needs a closed mesh.
         scheme: &'static str,
     },
+    /// A sharp edge or vertex that the mesh does not have, or whose sharpness is none.
+    #[error("{0}")]
+    Tag(String),
+    /// A vertex at which one sharp edge ends.
+    #[error("vertex {vertex} is a dart, the end of one sharp edge, and {scheme} has no row for it; {advice}")]
+    Dart {
+        /// The number of the vertex, from 0.
+        vertex: usize,
+        /// The scheme or the work by name.
+        scheme: &'static str,
+        /// A way out, as an imperative.
+        advice: &'static str,
+    },
+    /// Sharp edges or vertices, where all vertices must be smooth.
+    #[error("{what} needs a mesh without creases, corners and boundaries")]
+    Creased {
+        /// What needs it.
+        what: &'static str,
+    },
     /// A result that 32-bit indices do not reach.
     #[error("{what}, which 32-bit indices do not reach; {advice}")]
     TooLarge {

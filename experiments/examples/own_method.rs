@@ -49,12 +49,12 @@ pub fn run(out: &Path) -> limitlab::Result<Vec<Row<'static>>> {
     let (name, parameter) = ("steepest-descent".into(), "mine".into());
     let mine = Own { name, parameter, start: &|s, points| Ok(Box::new(SteepestDescent(s, points, points.to_vec()))) };
     let lines = entries(&system, &spectrum, &[Method::WPia { omega: None }, Method::Cg, Method::Lu], None, "file")?;
-    let rows = compare(&system, &spectrum, points, &lines, &[mine], &stop, &mut || ())?;
+    let rows = compare(&system, &spectrum, (points, points), &lines, &[mine], &stop, &mut || ())?;
     println!("{}", table("own".into(), "My method".into(), "A torus.".into(), &rows).to_markdown());
     limitlab::output::create_dir(out)?;
     figure("My method".into(), "mesh units", &rows).render()?.save(&out.join("own_method.png"))?;
     let grid = vec![(Method::Pia, (1..=20).map(|k| f64::from(k) / 10.0).collect())];
-    let found = sweep(&system, points, &grid, None, &stop, rounding_floor(surface.diagonal()), &|_| ())?;
+    let found = sweep(&system, (points, points), &grid, None, &stop, rounding_floor(surface.diagonal()), &|_| ())?;
     println!("best ω of PIA: {:?}", found.best(Method::Pia).map(|row| (row.omega, row.iterations)));
     Ok(rows)
 }

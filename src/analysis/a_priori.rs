@@ -50,7 +50,7 @@ impl Promise {
         }
     }
 
-    /// A-priori iteration counts from V = P. With e₀ = (I − A)P:
+    /// A-priori iteration counts from V = `start` (P, unless there is reason for another). With e₀ = P − A V:
     /// PIA, W-PIA: `max ‖e_i‖ ≤ √h_max ρ^k ‖H^-½e₀‖₂`, ρ = 1 − λ_min and (κ−1)/(κ+1);
     /// Chebyshev: the same with 1/T_k((κ+1)/(κ−1)) for ρ^k;
     /// Thall: `max ‖e_i‖ ≤ max(h_i√m_ii) ρ^k ‖Dm^-½H⁻¹e₀‖₂`, Dm = diag M, as AD⁻¹ is symmetric in that norm.
@@ -58,13 +58,13 @@ impl Promise {
     ///
     /// # Panics
     /// If there is not one point a vertex.
-    pub fn counts(&self, system: &impl System, points: &[DVec3], tolerance: f64) -> Counts {
+    pub fn counts(&self, system: &impl System, (points, start): (&[DVec3], &[DVec3]), tolerance: f64) -> Counts {
         assert_eq!(points.len(), system.len(), "one point a vertex");
         let (mut in_h, mut in_d) = (0.0, 0.0);
         let (mut h_max, mut d_max) = (0.0f64, 0.0f64);
         // Rows one by one would sum a large face once for each of its corners.
         let mut errors = vec![DVec3::ZERO; points.len()];
-        Rows::new(points.len()).residual(system, points, points, &mut errors, |_, e, out, _| *out = e);
+        Rows::new(points.len()).residual(system, points, start, &mut errors, |_, e, out, _| *out = e);
         for (i, e) in errors.into_iter().enumerate() {
             let h = system.weights()[i];
             let m = system.diagonal()[i] / h;

@@ -1,6 +1,8 @@
 //! Comparison of methods: all on one system, from one start, in one norm, to one tolerance, with the predicted rate
 //! beside the observed one.
 
+use std::ops::ControlFlow;
+
 use glam::DVec3;
 
 use super::own::{Named, Own};
@@ -13,7 +15,7 @@ use crate::error::Result;
 use crate::mesh::diagonal;
 use crate::solvers::anderson::WINDOW;
 use crate::solvers::jacobi::THALL_OMEGA;
-use crate::solvers::{Accelerated, Method, Solution, Stop, run};
+use crate::solvers::{Accelerated, Method, Solution, Step, Stop, run_from};
 
 /// A method with its parameter in words: a line of a comparison.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,7 +37,7 @@ pub struct Row<'a> {
     pub variant: &'static str,
     /// As in the [`Entry`], or as the caller's own method tells it.
     pub parameter: String,
-    /// Control points, history of errors and times of the run from V = P.
+    /// Control points, history of errors and times of the run.
     pub solution: Solution,
     /// Factor per iteration fitted to the history's tail; `None` for direct methods and short histories.
     pub observed_rate: Option<f64>,
@@ -210,8 +212,8 @@ fn four_digits(x: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
-/// Runs the lines, then the methods of the caller's [own], one after the other, so that their times are comparable.
-/// `done` is called after each.
+/// Runs the lines from V = `start` (P, unless there is reason for another), then the methods of the caller's [own], which
+/// start from the points, one after the other, so that their times are comparable. `done` is called after each.
 ///
 /// [own]: super::own
 ///
@@ -219,11 +221,11 @@ fn four_digits(x: f64) -> String {
 /// If an eigenvalue computation for a prediction does not converge.
 ///
 /// # Panics
-/// If there is not one point a vertex.
+/// If there is not one point a vertex in both.
 pub fn compare<'a>(
     system: &LimitSystem,
     spectrum: &Spectrum,
-    points: &[DVec3],
+    (points, start): (&[DVec3], &[DVec3]),
     entries: &[Entry<'a>],
     own: &[Own],
     stop: &Stop,
@@ -237,7 +239,8 @@ pub fn compare<'a>(
     let ours = entries
         .iter()
         .map(|entry| {
-            let solution = run(system, points, entry.method, stop);
+            let watch = &mut |_: &Step| ControlFlow::Continue(());
+            let solution = run_from(system, points, start, entry.method, stop, watch);
             let observed_rate = (!entry.method.is_direct()).then(|| observed_rate(&solution)).flatten();
             let predicted_rate = predicted_rate(system, spectrum, entry.method)?;
             done();

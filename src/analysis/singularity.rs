@@ -3,7 +3,8 @@
 //!
 //! Theory, on closed meshes with all valences ≥ 3: each scheme has its [`SingularSet`]. Under Catmull-Clark A is singular
 //! exactly when some connected component has all valences 3 and a bipartite edge graph; its null vector is the ±1
-//! colouring. Schemes with positive lower bounds are never singular.
+//! colouring. Schemes with positive lower bounds are never singular. A component with a boundary, crease or corner vertex
+//! is none of these: its null vector would vanish there, and with the sums over its edges everywhere.
 
 use glam::DVec3;
 
@@ -89,6 +90,7 @@ impl Singularity {
         let mut regular = vec![false; components];
         for v in 0..mesh.len() {
             let bad = valence.is_some_and(|valence| topology.incidence.face_count(v) != valence)
+                || surface.features().is_some_and(|features| !features.is_smooth(v))
                 || neighbours(surface, v).any(|w| colour[w] == colour[v]);
             if bad {
                 regular[component[v] as usize] = true;

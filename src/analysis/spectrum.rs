@@ -482,18 +482,22 @@ fn components(m: &Csr) -> usize {
     count
 }
 
-/// The ends of the part of the spectrum that the run from V = P excites: Lanczos from the first differences
-/// e₀ = (I − A) P, which meets only eigenvectors that e₀ has a part in. `None` if e₀ vanishes.
+/// The ends of the part of the spectrum that the run of A V = `points` from V = `start` excites: Lanczos from the first
+/// residual, which meets only eigenvectors that it has a part in. `None` if it vanishes.
 ///
 /// # Errors
 /// If an eigenvalue computation does not converge.
 ///
 /// # Panics
 /// If there is not one point a vertex.
-pub fn excited(system: &impl System, points: &[DVec3], operator: Operator) -> Result<Option<Extremes>> {
+pub fn excited(
+    system: &impl System,
+    (points, start): (&[DVec3], &[DVec3]),
+    operator: Operator,
+) -> Result<Option<Extremes>> {
     let n = points.len();
     let mut e = vec![DVec3::ZERO; n];
-    let errors = Rows::new(n).residual(system, points, points, &mut e, |_, e, out, _| *out = e);
+    let errors = Rows::new(n).residual(system, points, start, &mut e, |_, e, out, _| *out = e);
     let largest = errors.errors.max;
     let matrix = Matrix { system, which: operator };
     let mut found: Option<Extremes> = None;

@@ -1,5 +1,6 @@
 //! ω sweeps: iterations and rates over a grid of ω, with the predicted spectral radius beside them.
 
+use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
 
 use glam::DVec3;
@@ -10,7 +11,7 @@ use super::rate::observed_rate;
 use super::spectrum::{Extremes, Operator, Spectrum, excited, spectrum};
 use crate::assemble::LimitSystem;
 use crate::error::Result;
-use crate::solvers::{Errors, Method, Outcome, Stop, run};
+use crate::solvers::{Errors, Method, Outcome, Step, Stop, run_from};
 
 /// A method at one ω.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +20,7 @@ pub struct Row {
     pub method: Method<'static>,
     /// The relaxation factor.
     pub omega: f64,
-    /// How the run from V = P ended.
+    /// How the run ended.
     pub outcome: Outcome,
     /// Updates of all vertices made.
     pub iterations: usize,
@@ -33,14 +34,14 @@ pub struct Row {
     pub errors: Errors,
 }
 
-/// The thresholds of one relaxation: of the matrix (for every start) and of the data (for V₀ = P).
+/// The thresholds of one relaxation: of the matrix (for every start) and of the data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
     /// Jacobi, Thall, PIA or W-PIA, as given with the grid.
     pub method: Method<'static>,
     /// The ends of the spectrum of D⁻¹A for Jacobi and Thall, of A for PIA and W-PIA.
     pub matrix: Extremes,
-    /// The same of the part of the spectrum that the data excite; `None` if V = P is the solution.
+    /// The same of the part of the spectrum that the data excite; `None` if the start is the solution.
     pub data: Option<Extremes>,
 }
 
@@ -69,7 +70,8 @@ pub fn rounding_floor(diagonal: f64) -> f64 {
     64.0 * f64::EPSILON * diagonal
 }
 
-/// Runs every method at every ω of its grid, in parallel over the grid.
+/// Runs every method at every ω of its grid, from V = `start` (P, unless there is reason for another), in parallel over the
+/// grid.
 ///
 /// `grids` pairs a method (Jacobi, PIA or SOR) with its values of ω; `order` is the vertex order of SOR;
 /// `floor` the rounding level of the errors; `done` is called after each run, with the rows that are there so far, in the
@@ -79,10 +81,10 @@ pub fn rounding_floor(diagonal: f64) -> f64 {
 /// If an eigenvalue computation does not converge.
 ///
 /// # Panics
-/// If a method has no ω, or there is not one point a vertex.
+/// If a method has no ω, or there is not one point a vertex in both.
 pub fn sweep(
     system: &LimitSystem,
-    points: &[DVec3],
+    (points, start): (&[DVec3], &[DVec3]),
     grids: &[(Method<'static>, Vec<f64>)],
     order: Option<&[u32]>,
     stop: &Stop,
@@ -111,7 +113,7 @@ pub fn sweep(
             | Method::Anderson { .. }
             | Method::HeavyBall { .. } => continue,
         };
-        thresholds.push(Thresholds { method: *method, matrix, data: excited(system, points, operator)? });
+        thresholds.push(Thresholds { method: *method, matrix, data: excited(system, (points, start), operator)? });
     }
     let jobs: Vec<(Method<'static>, f64)> =
         grids.iter().flat_map(|(method, omegas)| omegas.iter().map(|&omega| (*method, omega))).collect();
@@ -121,7 +123,8 @@ pub fn sweep(
         let Some(swept) = method.in_order(order).at_omega(omega) else {
             panic!("{method} is not swept over ω");
         };
-        let report = run(system, points, swept, stop).report;
+        let watch = &mut |_: &Step| ControlFlow::Continue(());
+        let report = run_from(system, points, start, swept, stop, watch).report;
         let predicted = predicted_rate(system, &spectrum, swept)?;
         let maxima: Vec<f64> = report.history.iter().map(|e| e.max).collect();
         let data = thresholds.iter().find(|t| t.method == method).and_then(|t| t.data);

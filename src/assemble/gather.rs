@@ -23,7 +23,7 @@ pub(super) struct Rows<'a> {
     /// The entry of H and the vertex weight.
     by_valence: &'a [[f64; 2]],
     valence: &'a [u32],
-    /// Every side has a twin.
+    /// Every side at a vertex that has a row of its own has a twin.
     closed: bool,
 }
 
@@ -56,6 +56,15 @@ impl Row {
         let key = u64::from(column) << 32 | self.contributions.len() as u64;
         self.keys.push(key);
         self.contributions.push(value);
+    }
+
+    /// One entry, on the diagonal.
+    fn unit(&mut self, row: usize, value: f64) {
+        self.columns.clear();
+        self.columns.push(row as u32);
+        self.values.clear();
+        self.values.push(value);
+        self.own = 0;
     }
 
     /// Sums the contributions to each entry.
@@ -171,7 +180,7 @@ impl<'a> Rows<'a> {
             blocks,
             by_valence,
             valence,
-            closed: surface.is_closed(),
+            closed: surface.is_closed() || surface.features().is_some(),
         }
     }
 
@@ -247,7 +256,7 @@ impl<'a> Rows<'a> {
         let incidence = &self.topology.incidence;
         let length = |v: usize| {
             let edges = self.valence[v];
-            if self.blocks.sides_only {
+            if self.blocks.sides_only || edges == 0 {
                 return edges + 1;
             }
             let at = incidence.corners_at(v);
@@ -297,6 +306,9 @@ impl<'a> Rows<'a> {
 
     /// Row `v` of M.
     fn row(&self, v: usize, row: &mut Row) {
+        if self.valence[v] == 0 {
+            return row.unit(v, self.by_valence[0][1]);
+        }
         if self.closed && self.usual_row(v, row) {
             return;
         }

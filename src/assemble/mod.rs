@@ -1,11 +1,12 @@
 //! From a mesh to its limit system `A V = P`: the schemes as four small functions, one generic assembler into
-//! own compressed sparse rows, proven bounds from valences and face sizes, Matrix Market files; systems of other origin.
+//! own compressed sparse rows, the same as a sequence of stages where there are boundaries and creases, proven bounds from valences and face sizes, Matrix Market files; systems of other origin.
 //! This room knows no solvers.
 
 pub mod bounds;
 mod build;
 pub mod convert;
 pub mod csr;
+pub mod curves;
 pub mod face_sums;
 mod gather;
 pub mod kernel;
@@ -13,8 +14,10 @@ pub mod matrix_market;
 mod neighbours;
 pub mod operator;
 mod parts;
+pub mod stages;
 pub mod system;
 
 pub use csr::Csr;
 pub use operator::Operator;
+pub use stages::Stages;
 pub use system::LimitSystem;

@@ -9,7 +9,7 @@ use super::bounds::SpectralBounds;
 use super::build::Source;
 use super::kernel::{Point, Stencil, runs};
 use super::neighbours::Neighbours;
-use super::system::check;
+use super::system::{check, require_one_block};
 use crate::error::Result;
 use crate::mesh::order::Numbering;
 use crate::mesh::{Faces, Incidence, Surface, Topology};
@@ -55,6 +55,7 @@ impl Operator {
     /// If the numbering is of another number of vertices.
     pub fn in_order(surface: &Surface, scheme: Scheme, numbering: Option<&Numbering>) -> Result<Self> {
         check(surface, scheme)?;
+        require_one_block(surface)?;
         let open = if surface.is_closed() { None } else { Some(surface.topology()) };
         Self::build(surface.faces(), (surface.incidence(), open), scheme, (numbering, None))
     }
@@ -63,7 +64,8 @@ impl Operator {
     /// those vertices.
     ///
     /// The rows of vertices that are not marked `free` are *fixed*: zero, (A x)_i = 0. For x that vanishes there, the other
-    /// rows are those of the principal submatrix A_SS, whose eigenvalues keep to the bounds by interlacing.
+    /// rows are those of the principal submatrix A_SS, whose eigenvalues keep to the bounds by interlacing. On an open or
+    /// creased mesh all vertices that are not smooth must be fixed: at the others every face and edge is there.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -78,7 +80,8 @@ impl Operator {
         match surface.renumbered() {
             Some(inside) => Self::build(&inside.faces, (&inside.incidence, None), scheme, rows),
             None => {
-                let open = if surface.is_closed() { None } else { Some(surface.topology()) };
+                let is_whole = surface.is_closed() || surface.features().is_some();
+                let open = if is_whole { None } else { Some(surface.topology()) };
                 Self::build(surface.faces(), (surface.incidence(), open), scheme, rows)
             }
         }

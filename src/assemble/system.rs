@@ -8,6 +8,7 @@ use super::bounds::SpectralBounds;
 use super::csr::{Csr, Pattern};
 use super::gather::Rows;
 use crate::error::{Error, Result};
+use crate::mesh::features::Rule;
 use crate::mesh::{Faces, Surface};
 use crate::parallel;
 use crate::schemes::{Masks, Scheme};
@@ -37,8 +38,8 @@ impl LimitSystem {
     /// for any number of threads.
     ///
     /// # Errors
-    /// A face that is no triangle under Loop or √3; a boundary under a scheme whose masks need whole faces;
-    /// more than 2³² − 1 entries.
+    /// A face that is no triangle under Loop or √3; a boundary that is treated as interior, under a scheme whose masks need
+    /// whole faces; other boundaries and creases, on which A has [`Stages`](super::Stages); more than 2³² − 1 entries.
     ///
     /// ```
     /// use limitlab::assemble::LimitSystem;
@@ -54,6 +55,7 @@ impl LimitSystem {
     /// ```
     pub fn new(surface: &Surface, scheme: Scheme) -> Result<Self> {
         check(surface, scheme)?;
+        require_one_block(surface)?;
         let mut system = Self::with_masks(surface, &scheme)?;
         if surface.is_closed() {
             let triangles = surface.faces().uniform_size() == Some(3);
@@ -68,22 +70,9 @@ impl LimitSystem {
     /// # Errors
     /// More than 2³² − 1 entries.
     pub fn with_masks(surface: &Surface, masks: &impl Masks) -> Result<Self> {
-        let valence = valences(surface);
-        let largest = valence.iter().copied().max().unwrap_or(0) as usize;
-        let by_valence: Vec<[f64; 2]> = (0..=largest).map(|n| [masks.h(n), masks.vertex_weight(n)]).collect();
-        let blocks = FaceBlocks::new(surface.faces(), masks);
-        let rows = Rows::new(surface, &blocks, &by_valence, &valence);
-        let arrays = rows.arrays()?;
-        let h = parallel::collect(valence.len(), |v| by_valence[valence[v] as usize][0]);
-        let bounds = SpectralBounds::gershgorin(&arrays.diagonal);
-        let pattern = Arc::new(Pattern::new(arrays.offsets, arrays.columns));
-        Ok(LimitSystem {
-            h,
-            m: Csr::new(Arc::clone(&pattern), arrays.m),
-            a: Csr::new(pattern, arrays.a),
-            diagonal: arrays.diagonal,
-            bounds,
-        })
+        let Assembled { h, m, a, diagonal } = rows_of(surface, masks, None)?;
+        let bounds = SpectralBounds::gershgorin(&diagonal);
+        Ok(LimitSystem { h, m, a, diagonal, bounds })
     }
 
     /// The number of vertices N.
@@ -106,11 +95,59 @@ impl LimitSystem {
     }
 }
 
-/// Refuses faces and boundaries that `scheme` is not defined on.
+/// H, M and A.
+pub(super) struct Assembled {
+    pub(super) h: Vec<f64>,
+    pub(super) m: Csr,
+    pub(super) a: Csr,
+    pub(super) diagonal: Vec<f64>,
+}
+
+/// All rows; those of vertices that are not marked `free` are rows of I, so that M is symmetric on the others only.
+pub(super) fn rows_of(surface: &Surface, masks: &impl Masks, free: Option<&[bool]>) -> Result<Assembled> {
+    let mut valence = valences(surface);
+    if let Some(free) = free {
+        parallel::change(&mut valence, |v, n| *n = if free[v] { *n } else { 0 });
+    }
+    let largest = valence.iter().copied().max().unwrap_or(0) as usize;
+    let weights = |n: usize| if n == 0 { [1.0, 1.0] } else { [masks.h(n), masks.vertex_weight(n)] };
+    let by_valence: Vec<[f64; 2]> = (0..=largest).map(weights).collect();
+    let blocks = FaceBlocks::new(surface.faces(), masks);
+    let rows = Rows::new(surface, &blocks, &by_valence, &valence);
+    let arrays = rows.arrays()?;
+    let h = parallel::collect(valence.len(), |v| by_valence[valence[v] as usize][0]);
+    let pattern = Arc::new(Pattern::new(arrays.offsets, arrays.columns));
+    Ok(Assembled {
+        h,
+        m: Csr::new(Arc::clone(&pattern), arrays.m),
+        a: Csr::new(pattern, arrays.a),
+        diagonal: arrays.diagonal,
+    })
+}
+
+/// Refuses a mesh on which A is not H·M.
+pub(super) fn require_one_block(surface: &Surface) -> Result<()> {
+    match surface.features() {
+        Some(_) => Err(Error::Creased { what: "A = H·M with a symmetric M" }),
+        None => Ok(()),
+    }
+}
+
+/// Refuses faces, boundaries and darts that `scheme` is not defined on.
 pub(super) fn check(surface: &Surface, scheme: Scheme) -> Result<()> {
     let faces = surface.faces();
     if let Some(face) = scheme.first_unsuitable_face(faces) {
         return Err(Error::NotTriangles { face, corners: faces.face(face).len(), scheme: scheme.name() });
+    }
+    if let Some(features) = surface.features() {
+        return match features.rules().iter().position(|&rule| rule == Rule::Dart) {
+            Some(vertex) => Err(Error::Dart {
+                vertex,
+                scheme: scheme.name(),
+                advice: "make it a corner, or lead the crease on to a boundary, a corner or another crease",
+            }),
+            None => Ok(()),
+        };
     }
     if !surface.is_closed() && !scheme.edges_only() {
         return Err(Error::Open { edges: surface.boundary_edges(), scheme: scheme.name() });
@@ -118,7 +155,7 @@ pub(super) fn check(surface: &Surface, scheme: Scheme) -> Result<()> {
     Ok(())
 }
 
-/// The number of edges at every vertex: the valence n of the masks, on a boundary too.
+/// The number of edges at every vertex: the valence n of the masks, on a boundary that is treated as interior too.
 pub fn valences(surface: &Surface) -> Vec<u32> {
     parallel::collect(surface.len(), |v| {
         if surface.is_closed() {

@@ -11,7 +11,7 @@
 //! | [`halstead`] | fair interpolation as a sparse constrained least-squares problem; iterations watched by it |
 //! | [`surface`] | from a control mesh to the surface: levels, limit points, normals |
 //! | [`solver`] | the front door: the control mesh by any method, by `auto` unless told; once, or again for points that move |
-//! | [`subset`] | some vertices only, for every scheme and solver |
+//! | [`staged`] | curves, then smooth vertices, or some of them, by any method |
 //!
 //! This room builds on meshes, subdivision, assembly, solvers and analysis, and knows no plotting.
 
@@ -21,9 +21,9 @@ pub mod nasri;
 pub mod normals;
 pub mod pia;
 pub mod solver;
-pub mod subset;
+pub mod staged;
 pub mod surface;
 pub mod thall;
 pub mod zheng_cai;
 
-pub use solver::{Interpolator, Options, Tolerance, interpolate, interpolate_watched, solve_stored};
+pub use solver::{Interpolator, Options, Tolerance, interpolate, interpolate_watched, limit_points, solve_stored};

@@ -3,14 +3,12 @@
 //! of the control mesh; [`FirstRefinement`](super::zheng_cai::FirstRefinement) with the ordinary rule adds exact
 //! centroids, normals and shape handles.
 
-use std::ops::ControlFlow;
-
-use super::subset::Restriction;
+use super::staged;
 use crate::Result;
-use crate::assemble::LimitSystem;
+use crate::assemble::Stages;
 use crate::mesh::Surface;
 use crate::schemes::Scheme;
-use crate::solvers::{Method, Solution, Stop, run};
+use crate::solvers::{Method, Solution, Stop};
 
 /// Solves Nasri's system for the control points: all vertices, or those marked in `interpolated` with V_j = I_j at
 /// the others (a principal submatrix, whose eigenvalues stay in [¼, 1], so it is soluble on every mesh).
@@ -26,13 +24,6 @@ pub fn control_points(
     method: Method,
     stop: &Stop,
 ) -> Result<Solution> {
-    let mesh = surface.mesh();
-    let system = LimitSystem::new(surface, Scheme::Nasri)?;
-    let points = &mesh.positions;
-    Ok(match interpolated {
-        None => run(&system, points, method, stop),
-        Some(marks) => {
-            Restriction::new(&system, marks)?.solve(&system, points, method, stop, &mut |_| ControlFlow::Continue(()))
-        }
-    })
+    let stages = Stages::new(surface, Scheme::Nasri, interpolated)?;
+    Ok(staged::run(&stages, surface.positions(), method, stop))
 }

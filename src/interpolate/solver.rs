@@ -18,8 +18,9 @@
 //! any order, and rows are [grouped by kind](in_kinds) only; so they are for mixed faces under Nasri and Zheng-Cai, where
 //! iterations are too few to pay for the search. Results come back in the order of the surface.
 //!
-//! *Some vertices only.* With V_j = P_j at the others the unknown is X = V − P, zero there: their rows of the operator are
-//! fixed, and A_SS X_S = (P − A P)_S is solved by the same chain.
+//! *Boundaries, creases, some vertices only.* What is known before is computed first, as in [`Stages`]: curves exactly, and
+//! V_j = P_j at corners and at vertices that are not interpolated. From these, and P at all others, the unknown is a
+//! difference X, zero where V is known: the rows there are fixed, and A_SS X_S = (P − A V)_S is solved by the same chain.
 //!
 //! Direct methods lose at every size tried, by `reports/scaling.md`.
 
@@ -28,11 +29,13 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::subset::{Restriction, nothing};
+use super::staged;
 use crate::analysis::comparison::with_spectrum;
 use crate::analysis::failed::Failed;
 use crate::analysis::spectrum::spectrum;
-use crate::assemble::{LimitSystem, Operator};
+use crate::assemble::curves::Curves;
+use crate::assemble::stages::{curves, free};
+use crate::assemble::{LimitSystem, Operator, Stages};
 use crate::error::{Error, Result};
 use crate::memory::require;
 use crate::mesh::breadth_first::{in_fronts, in_kinds};
@@ -43,7 +46,7 @@ use crate::schemes::Scheme;
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::mixed::{self, Workspace};
 use crate::solvers::system::Rows;
-use crate::solvers::{Iterate, Method, Outcome, Report, Solution, Step, Stop, run, run_watched, solve};
+use crate::solvers::{Iterate, Method, Outcome, Report, Solution, Step, Stop, run, solve};
 
 /// From this many vertices on, the rows of the operator are breadth first. Tuned.
 pub const ORDERED: usize = 200_000;
@@ -142,8 +145,8 @@ pub fn interpolate(surface: &Surface, scheme: Scheme, options: &Options) -> Resu
     interpolate_watched(surface, scheme, options, &mut |_| ControlFlow::Continue(()))
 }
 
-/// As [`interpolate`], with a watch that sees every iterate of a method that is named; on some vertices only it sees
-/// X = V − P.
+/// As [`interpolate`], with a watch that sees every iterate of a method that is named: all vertices, or those of the
+/// [block](Stages::block).
 ///
 /// # Errors
 /// As [`interpolate`].
@@ -179,6 +182,52 @@ pub fn interpolate_watched(
     Ok(Solution { setup_seconds: setup_seconds + solve_seconds + direct.setup_seconds, ..direct })
 }
 
+/// The limit points A V of control points, the vertices of a surface: by the rows of its curves, corners, and smooth
+/// vertices, without a stored matrix. O(corners).
+///
+/// # Errors
+/// As [`Interpolator::new`].
+///
+/// ```
+/// use limitlab::interpolate::limit_points;
+/// use limitlab::mesh::{Surface, builtin};
+/// use limitlab::schemes::Scheme;
+/// // β₃ = 2/5 at the vertex itself, 1/5 at each of its neighbours, and these four points add up to 0.
+/// let tetrahedron = Surface::new(builtin::builtin("tetrahedron")?)?;
+/// let limits = limit_points(&tetrahedron, Scheme::Loop)?;
+/// assert!(limits[0].distance(0.2 * tetrahedron.positions()[0]) < 1e-15);
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn limit_points(surface: &Surface, scheme: Scheme) -> Result<Vec<DVec3>> {
+    let control = surface.positions();
+    let free = free(surface, None)?;
+    let there = |points: &[DVec3]| surface.renumbered().map(|inside| inside.numbering.there(points));
+    let marks = match (surface.renumbered(), &free) {
+        (Some(inside), Some(marks)) => Some(inside.numbering.there(marks)),
+        (_, marks) => marks.clone(),
+    };
+    let operator = Operator::inside(surface, scheme, None, marks.as_deref())?;
+    let points = there(control);
+    let points = points.as_deref().unwrap_or(control);
+    let mut limits = vec![DVec3::ZERO; control.len()];
+    let mut nothing = vec![(); control.len()];
+    Rows::new(control.len()).product(&operator, points, &mut limits, &mut nothing, |_, ax, limit, (), _| *limit = ax);
+    if let Some(inside) = surface.renumbered() {
+        limits = inside.numbering.back(&limits);
+    }
+    if let Some(free) = free {
+        for (limit, (free, &v)) in limits.iter_mut().zip(free.iter().zip(control)) {
+            if !free {
+                *limit = v;
+            }
+        }
+        let curves = curves(surface, scheme, None);
+        let w = curves.weight();
+        curves.rows(|v, [a, b]| limits[v] = (1.0 - 2.0 * w) * control[v] + w * (control[a] + control[b]));
+    }
+    Ok(limits)
+}
+
 /// The last two steps of the chain on a stored system of any origin: conjugate gradients, LDLᵀ where they make no progress.
 ///
 /// # Panics
@@ -193,7 +242,7 @@ fn no_progress(outcome: Outcome) -> bool {
     matches!(outcome, Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown)
 }
 
-/// By one method on the stored matrix.
+/// By one method on the stored matrix; the order of a sweep is one of all vertices.
 fn by_method(
     surface: &Surface,
     scheme: Scheme,
@@ -203,16 +252,12 @@ fn by_method(
     watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
 ) -> Result<Solution> {
     let start = Instant::now();
-    let system = LimitSystem::new(surface, scheme)?;
-    let part = marks.map(|marks| Restriction::new(&system, marks)).transpose()?;
-    let solved = part.as_ref().map_or(&system, |part| &part.system);
-    let method = with_spectrum(solved, method, &|| spectrum(solved))?;
+    let stages = Stages::new(surface, scheme, marks)?;
+    let order = method.order().map(|order| stages.order(order));
+    let block = stages.block();
+    let method = with_spectrum(block, method.in_order(order.as_deref()), &|| spectrum(block))?;
     let seconds = start.elapsed().as_secs_f64();
-    let points = surface.positions();
-    let mut solution = match &part {
-        Some(part) => part.solve(&system, points, method, stop, watch),
-        None => run_watched(&system, points, method, stop, watch),
-    };
+    let mut solution = staged::run_watched(&stages, surface.positions(), method, stop, watch);
     solution.setup_seconds += seconds;
     Ok(solution)
 }
@@ -256,11 +301,15 @@ pub struct Interpolator {
     operator: Operator,
     /// The order of the rows, where that is not the surface's.
     numbering: Option<Numbering>,
-    /// By row: those interpolated, where some are not.
+    /// What is solved first.
+    curves: Curves,
+    /// By row: those of the block, where some are not.
     free: Option<Vec<bool>>,
     rows: Rows,
     workspace: Workspace,
-    /// In the order of the rows, as far as they are needed: P, what A X has to be on some vertices, and the iterate.
+    /// What is known before the block, in the order of the surface; only where there are curves.
+    known: Vec<DVec3>,
+    /// In the order of the rows, as far as they are needed: P, what A X has to be on the block, and the iterate.
     points: Vec<DVec3>,
     right: Vec<DVec3>,
     iterate: Vec<DVec3>,
@@ -275,12 +324,7 @@ impl Interpolator {
     /// # Panics
     /// If there is not one mark a vertex.
     pub fn new(surface: &Surface, scheme: Scheme, interpolated: Option<&[bool]>) -> Result<Self> {
-        if let Some(marks) = interpolated {
-            assert_eq!(marks.len(), surface.len(), "one mark a vertex");
-            if !marks.contains(&true) {
-                return Err(nothing());
-            }
-        }
+        let free = free(surface, interpolated)?;
         let (faces, incidence) = match surface.renumbered() {
             Some(inside) => (&inside.faces, &inside.incidence),
             None => (surface.faces(), surface.incidence()),
@@ -292,10 +336,10 @@ impl Interpolator {
         } else {
             in_kinds(faces, incidence)
         };
-        let marks = interpolated.map(|marks| match surface.renumbered() {
-            Some(inside) => inside.numbering.there(marks),
-            None => marks.to_vec(),
-        });
+        let marks = match (surface.renumbered(), free) {
+            (Some(inside), Some(marks)) => Some(inside.numbering.there(&marks)),
+            (_, marks) => marks,
+        };
         let operator = Operator::inside(surface, scheme, rows.as_ref(), marks.as_deref())?;
         let free = marks.map(|marks| rows.as_ref().map_or(marks.clone(), |rows| rows.there(&marks)));
         let numbering = match (surface.renumbered(), rows) {
@@ -304,13 +348,15 @@ impl Interpolator {
             (None, rows) => rows,
         };
         let workspace = Workspace::new(&operator);
-        let [points, right, iterate] = [const { Vec::new() }; 3];
+        let [known, points, right, iterate] = [const { Vec::new() }; 4];
         Ok(Interpolator {
+            curves: curves(surface, scheme, interpolated),
             rows: Rows::new(surface.len()),
             operator,
             numbering,
             free,
             workspace,
+            known,
             points,
             right,
             iterate,
@@ -339,6 +385,15 @@ impl Interpolator {
         if self.numbering.is_none() && self.free.is_none() {
             return chain(&self.operator, points, control, &mut self.workspace, stop);
         }
+        let points: &[DVec3] = match self.curves.is_empty() {
+            true => points,
+            false => {
+                self.known.clear();
+                self.known.extend_from_slice(points);
+                self.curves.solve(&mut self.known);
+                &self.known
+            }
+        };
         let points: &[DVec3] = match &self.numbering {
             Some(numbering) => {
                 self.points.resize(n, DVec3::ZERO);
@@ -348,6 +403,11 @@ impl Interpolator {
             None => points,
         };
         match &self.numbering {
+            // The unknown is a difference then.
+            _ if cold && self.free.is_some() => {
+                self.iterate.clear();
+                self.iterate.resize(n, DVec3::ZERO);
+            }
             _ if cold => self.iterate.clear(),
             Some(numbering) => {
                 self.iterate.resize(n, DVec3::ZERO);
@@ -372,7 +432,7 @@ impl Interpolator {
         };
         if let Some(free) = &self.free {
             // The mean is that of the vertices in question.
-            let share = n as f64 / free.iter().filter(|free| **free).count() as f64;
+            let share = n as f64 / free.iter().filter(|free| **free).count().max(1) as f64;
             report.history.iter_mut().for_each(|errors| errors.mean *= share);
         }
         match &self.numbering {

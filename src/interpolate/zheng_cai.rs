@@ -8,7 +8,7 @@
 use glam::DVec3;
 
 use super::normals::unit_normals;
-use super::subset::nothing;
+use crate::assemble::stages::nothing;
 use crate::error::short;
 use crate::mesh::{Mesh, Surface};
 use crate::parallel;

@@ -9,6 +9,7 @@ mod cuthill_mckee;
 mod defect;
 mod degenerate;
 pub(crate) mod edge_numbers;
+pub mod features;
 pub mod frame;
 pub mod generate;
 pub mod incidence;

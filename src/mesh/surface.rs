@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 
 use super::curve::{along_curve, is_scattered};
+use super::features::{Features, Tags};
 use super::order::Numbering;
 use super::validate::{Boundary, Validation, remarks, validate};
 use super::{Faces, Incidence, Mesh, Topology};
@@ -42,13 +43,17 @@ pub struct Surface {
 #[derive(Debug)]
 struct Connectivity {
     is_closed: bool,
+    /// What boundary edges are, where there may be some.
+    boundary: Boundary,
+    /// Where not all vertices are smooth.
+    features: Option<Features>,
     incidence: OnceLock<Arc<Incidence>>,
     topology: OnceLock<Topology>,
     renumbered: Option<Renumbered>,
 }
 
 /// The faces of a scattered mesh, with their vertices along a space-filling curve: every pass is several times faster.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Renumbered {
     pub(crate) faces: Faces,
     pub(crate) incidence: Incidence,
@@ -80,7 +85,12 @@ impl Surface {
         }
         let mut report = validate(&mesh, lines, boundary);
         match report.topology.take() {
-            Some(topology) if report.is_valid() => Ok(Self::of_topology(mesh, topology)),
+            Some(topology) if report.is_valid() => {
+                let tags = Tags { boundary, ..Tags::default() };
+                // Without tags there is nothing that could be wrong.
+                let features = Features::new(&mesh.faces, &topology, &tags).unwrap_or_default();
+                Ok(Self::of_parts(mesh, topology, boundary, features))
+            }
             topology => {
                 report.topology = topology;
                 Err(Box::new(report))
@@ -90,21 +100,59 @@ impl Surface {
 
     /// A mesh that is valid by the way it was made: the refinement of a valid one.
     pub(crate) fn of_topology(mesh: Mesh, topology: Topology) -> Self {
+        debug_assert!(topology.is_closed());
+        Self::of_parts(mesh, topology, Boundary::Refuse, None)
+    }
+
+    fn of_parts(mesh: Mesh, topology: Topology, boundary: Boundary, features: Option<Features>) -> Self {
         debug_assert!(topology.incidence.vertices() == mesh.len() && topology.irregular_edges().is_empty());
         let connectivity = Connectivity {
-            is_closed: topology.is_closed(),
+            boundary,
+            features,
             incidence: OnceLock::from(Arc::clone(&topology.incidence)),
-            topology: OnceLock::from(topology),
-            renumbered: None,
+            ..Connectivity::new(topology.is_closed())
         };
+        let connectivity = Connectivity { topology: OnceLock::from(topology), ..connectivity };
         Surface { mesh, connectivity: Arc::new(connectivity) }
     }
 
     /// A closed mesh that is valid by the way it was made. Its topology is made if it is asked for.
     pub(crate) fn of_valid(mesh: Mesh) -> Self {
-        let (incidence, topology) = (OnceLock::new(), OnceLock::new());
-        let connectivity = Connectivity { is_closed: true, incidence, topology, renumbered: None };
+        let connectivity = Connectivity::new(true);
         Surface { mesh, connectivity: Arc::new(connectivity) }
+    }
+
+    /// The same mesh with these sharp edges and vertices, and none of others; its boundary is as the tags say.
+    ///
+    /// # Errors
+    /// As [`Features::new`]; [`Error::Defects`] if the mesh is open and the tags refuse that.
+    ///
+    /// ```
+    /// use limitlab::mesh::features::{Rule, Tags};
+    /// use limitlab::mesh::{Surface, builtin};
+    /// let cube = Surface::new(builtin::builtin("cube")?)?;
+    /// let top = [[4, 5], [5, 6], [6, 7], [7, 4]];
+    /// let tags = Tags { creases: top.map(|edge| (edge, 10.0)).to_vec(), ..Tags::default() };
+    /// let creased = cube.tagged(&tags)?;
+    /// let features = creased.features().unwrap();
+    /// assert_eq!((features.count(Rule::Crease), features.curves().len()), (4, 1));
+    /// # Ok::<(), limitlab::Error>(())
+    /// ```
+    pub fn tagged(&self, tags: &Tags) -> Result<Self> {
+        if !self.is_closed() && tags.boundary == Boundary::Refuse {
+            return Self::examined(self.mesh.clone(), None, Boundary::Refuse).map_err(Error::Defects);
+        }
+        let topology = self.topology();
+        let features = Features::new(self.faces(), topology, tags)?;
+        let connectivity = Connectivity {
+            boundary: tags.boundary,
+            features,
+            incidence: self.connectivity.incidence.clone(),
+            topology: self.connectivity.topology.clone(),
+            renumbered: self.connectivity.renumbered.clone(),
+            ..Connectivity::new(self.is_closed())
+        };
+        Ok(Surface { mesh: self.mesh.clone(), connectivity: Arc::new(connectivity) })
     }
 
     /// The same faces with other points.
@@ -177,6 +225,17 @@ impl Surface {
         self.connectivity.topology.get_or_init(made)
     }
 
+    /// Rules and curves, where not all vertices are smooth: on an open mesh, unless its boundary is treated as interior,
+    /// and on one with [tags](Self::tagged).
+    pub fn features(&self) -> Option<&Features> {
+        self.connectivity.features.as_ref()
+    }
+
+    /// What boundary edges are, where there are some.
+    pub fn boundary(&self) -> Boundary {
+        self.connectivity.boundary
+    }
+
     /// The number of edges with one face.
     pub fn boundary_edges(&self) -> usize {
         if self.is_closed() { 0 } else { self.topology().boundary_edges() }
@@ -198,6 +257,12 @@ impl Surface {
 }
 
 impl Connectivity {
+    /// With all vertices smooth.
+    fn new(is_closed: bool) -> Self {
+        let (incidence, topology) = (OnceLock::new(), OnceLock::new());
+        Connectivity { is_closed, boundary: Boundary::Refuse, features: None, incidence, topology, renumbered: None }
+    }
+
     /// That of a closed mesh without defects; `None` if there is any.
     fn closed(mesh: &Mesh) -> Option<Self> {
         let renumbered = if mesh.len() >= SCATTERED && is_scattered(&mesh.faces) { along_curve(mesh) } else { None };
@@ -223,7 +288,7 @@ impl Connectivity {
             }
             None => (OnceLock::from(Arc::new(incidence)), None),
         };
-        Some(Connectivity { is_closed: true, incidence, topology: OnceLock::new(), renumbered })
+        Some(Connectivity { incidence, renumbered, ..Connectivity::new(true) })
     }
 }
 
@@ -331,5 +396,6 @@ mod tests {
         assert!(Surface::new(open.clone()).is_err());
         let surface = Surface::examined(open, None, Boundary::AsInterior).unwrap();
         assert_eq!((surface.is_closed(), surface.boundary_edges()), (false, 3));
+        assert!(surface.features().is_none());
     }
 }

@@ -7,9 +7,11 @@ use std::str::FromStr;
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
 pub use super::defect::{Defect, DefectKind};
+use super::features::Rule;
 use super::incidence::{Incidence, next_in, prev_in};
 use super::topology::{NONE, Topology, join};
 use super::{Faces, Mesh, Surface, degenerate};
+use crate::error::one_of;
 use crate::parallel;
 use crate::{Error, Result};
 
@@ -22,29 +24,51 @@ pub enum Boundary {
     /// An open mesh is invalid.
     #[default]
     Refuse,
+    /// Boundary edges are sharp, and so are boundary vertices with one face: OpenSubdiv's and USD's edge-and-corner.
+    EdgeAndCorner,
+    /// Boundary edges are sharp, and boundary vertices with one face lie on the curve: edge-only.
+    EdgeOnly,
     /// Boundary vertices get the masks of interior ones with as many edges, as in the paper that has the Boy
     /// model. Only schemes whose masks need edges alone (Loop, √3) can do this.
     AsInterior,
+}
+
+impl Boundary {
+    const ALL: [Boundary; 4] = [Boundary::EdgeAndCorner, Boundary::EdgeOnly, Boundary::AsInterior, Boundary::Refuse];
+
+    /// As `parse` reads it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Boundary::EdgeAndCorner => "edge-and-corner",
+            Boundary::EdgeOnly => "edge-only",
+            Boundary::AsInterior => "as-interior",
+            Boundary::Refuse => "refuse",
+        }
+    }
+
+    /// The least valence that a vertex may have on an open mesh.
+    fn least_valence(self) -> usize {
+        match self {
+            Boundary::EdgeAndCorner | Boundary::EdgeOnly => 2,
+            Boundary::AsInterior | Boundary::Refuse => 3,
+        }
+    }
 }
 
 impl FromStr for Boundary {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        match text {
-            "refuse" => Ok(Boundary::Refuse),
-            "as-interior" => Ok(Boundary::AsInterior),
-            _ => Err(Error::Unknown(format!("unknown treatment of the boundary `{text}`: use refuse or as-interior"))),
-        }
+        Boundary::ALL.into_iter().find(|boundary| boundary.name() == text).ok_or_else(|| {
+            let names = Boundary::ALL.map(Boundary::name);
+            Error::Unknown(format!("unknown treatment of the boundary `{text}`: use {}", one_of(&names)))
+        })
     }
 }
 
 impl fmt::Display for Boundary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Boundary::Refuse => "refuse",
-            Boundary::AsInterior => "as-interior",
-        })
+        f.write_str(self.name())
     }
 }
 
@@ -315,8 +339,10 @@ fn examine_topology(mesh: &Mesh, boundary: Boundary, report: &mut Validation) {
         report.orientation = Some(examine_orientation(faces, &topology));
     }
     // Components are found one after the other, vertices in parallel.
-    let ((min_valence, max_valence), components) =
-        rayon::join(|| examine_vertices(faces, &topology, &mut report.defects), || topology.components(faces).1);
+    let ((min_valence, max_valence), components) = rayon::join(
+        || examine_vertices(faces, &topology, boundary, &mut report.defects),
+        || topology.components(faces).1,
+    );
     let boundary_edges = topology.boundary_edges();
     let boundary_loops = topology
         .irregular_edges()
@@ -332,10 +358,10 @@ fn examine_topology(mesh: &Mesh, boundary: Boundary, report: &mut Validation) {
                 report.defects.push(defect);
             }
         }
-        Boundary::AsInterior if boundary_edges > 0 => {
-            report.remarks.push(boundary_remark(boundary_edges, boundary_loops));
+        Boundary::AsInterior | Boundary::EdgeAndCorner | Boundary::EdgeOnly if boundary_edges > 0 => {
+            report.remarks.push(boundary_remark(boundary_edges, boundary_loops, boundary));
         }
-        Boundary::AsInterior => {}
+        Boundary::AsInterior | Boundary::EdgeAndCorner | Boundary::EdgeOnly => {}
     }
     report.counts = Some(Counts {
         vertices: mesh.len(),
@@ -353,10 +379,16 @@ fn examine_topology(mesh: &Mesh, boundary: Boundary, report: &mut Validation) {
 }
 
 /// What to know of a boundary that is allowed.
-fn boundary_remark(edges: usize, loops: Option<usize>) -> String {
+fn boundary_remark(edges: usize, loops: Option<usize>, boundary: Boundary) -> String {
     let edges = counted(edges, "boundary edge");
     let loops = loops.map_or_else(String::new, |l| format!(" in {}", counted(l, "loop")));
-    format!("{edges}{loops}: boundary vertices are treated as interior")
+    let treatment = match boundary {
+        Boundary::AsInterior => "boundary vertices are treated as interior",
+        Boundary::EdgeAndCorner => "they are sharp, and vertices with one face are corners",
+        Boundary::EdgeOnly => "they are sharp, and the curve is smooth at vertices with one face",
+        Boundary::Refuse => "they are not allowed",
+    };
+    format!("{edges}{loops}: {treatment}")
 }
 
 /// The remarks of [`validate`] on a mesh that has no defects.
@@ -365,7 +397,16 @@ pub(super) fn remarks(surface: &Surface) -> Vec<String> {
     if !surface.is_closed() {
         let topology = surface.topology();
         let loops = topology.boundary_loops(surface.faces()).len();
-        remarks.push(boundary_remark(topology.boundary_edges(), Some(loops)));
+        remarks.push(boundary_remark(topology.boundary_edges(), Some(loops), surface.boundary()));
+    }
+    if let Some(features) = surface.features() {
+        let creased = features.creased_edges();
+        let parts =
+            [(creased, "creased edge"), (features.count(Rule::Corner), "corner"), (features.count(Rule::Dart), "dart")];
+        let parts: Vec<String> = parts.iter().filter(|p| p.0 > 0).map(|&(count, one)| counted(count, one)).collect();
+        if !parts.is_empty() {
+            remarks.push(parts.join(", "));
+        }
     }
     if let Some(renumbered) = surface.renumbered() {
         // Looking for what is not there is many times faster so. What is there needs the file's own numbers.
@@ -378,11 +419,53 @@ pub(super) fn remarks(surface: &Surface) -> Vec<String> {
     remarks
 }
 
+/// How many boundary edges lie on another one, end on end by the last bit, and the first of them by its ends: seams, where
+/// an exporter has split vertices. O(b log b) for b boundary edges.
+///
+/// ```
+/// use limitlab::mesh::{Faces, Mesh, Surface, validate::{Boundary, seams}};
+/// use glam::DVec3;
+/// // Two triangles side by side, with vertices of their own.
+/// let points = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X, DVec3::ONE, DVec3::Y];
+/// let mesh = Mesh::new(points, Faces::from_lists([[0, 1, 2], [3, 4, 5]]));
+/// let surface = Surface::examined(mesh, None, Boundary::EdgeAndCorner).unwrap();
+/// assert_eq!(seams(&surface), Some((2, [1, 2])));
+/// ```
+pub fn seams(surface: &Surface) -> Option<(usize, [u32; 2])> {
+    if surface.is_closed() {
+        return None;
+    }
+    let (topology, faces, points) = (surface.topology(), surface.faces(), surface.positions());
+    // Zeros of either sign are one.
+    let key = |v: u32| points[v as usize].to_array().map(|x| (x + 0.0).to_bits());
+    let side = |&c: &u32| {
+        let ends = [c, topology.incidence.next(faces, c)].map(|c| faces.corners()[c as usize]);
+        let [a, b] = ends.map(key);
+        (a.min(b), a.max(b), c, ends)
+    };
+    let mut sides: Vec<_> = topology.boundary_half_edges().iter().map(side).collect();
+    sides.sort_unstable();
+    let groups = sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)).filter(|group| group.len() > 1);
+    let (mut count, mut first) = (0, None);
+    for group in groups {
+        count += group.len();
+        let here = (group[0].2, group[0].3);
+        first = first.map_or(Some(here), |first: (u32, [u32; 2])| Some(first.min(here)));
+    }
+    first.map(|(_, ends)| (count, ends))
+}
+
 /// Umbrellas and valences of all vertices, in parallel. Returns the least and the greatest valence.
-fn examine_vertices(faces: &Faces, topology: &Topology, defects: &mut Vec<Defect>) -> (usize, usize) {
+fn examine_vertices(
+    faces: &Faces,
+    topology: &Topology,
+    boundary: Boundary,
+    defects: &mut Vec<Defect>,
+) -> (usize, usize) {
     let incidence = &topology.incidence;
     let n = incidence.vertices();
     let is_closed = topology.is_closed();
+    let least = if is_closed { 3 } else { boundary.least_valence() };
     let chunks = parallel::map(n, CHUNK, |range| {
         let mut link = Link::default();
         let mut found = Vec::new();
@@ -405,7 +488,7 @@ fn examine_vertices(faces: &Faces, topology: &Topology, defects: &mut Vec<Defect
             if umbrellas > 1 {
                 report(DefectKind::NonManifoldVertex, umbrellas);
             }
-            if valence < 3 {
+            if valence < least {
                 report(DefectKind::LowValence, valence);
             }
         }

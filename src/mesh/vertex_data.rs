@@ -4,8 +4,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::features::is_sharp;
 use super::io::{self, has_mesh_ending};
-use super::magic;
+use super::{Surface, magic};
 use crate::error::{Error, Result};
 use crate::text::{Scanner, quoted};
 
@@ -93,18 +94,75 @@ pub fn numbers(text: &str, vertices: usize, otherwise: f64) -> Result<Vec<f64>> 
     Ok(rows.into_iter().map(value).collect())
 }
 
+/// Reads sharp edges: lines `a b sharpness`, a and b the ends of an edge.
+///
+/// # Errors
+/// Lines of another form, an edge that the mesh lacks, a sharpness that is none, with the line.
+pub fn creases(path: &Path, surface: &Surface) -> Result<Vec<([u32; 2], f64)>> {
+    let mut creases = Vec::new();
+    lines(path, surface.len(), "a b sharpness", |line, ends: [usize; 2], [sharpness]: [f64; 1]| {
+        let ends = ends.map(|v| v as u32);
+        let refuse = |what: String| Error::parse(path, Some(line), format!("edge {}–{} {what}", ends[0], ends[1]));
+        if surface.topology().half_edge(surface.faces(), ends).is_none() {
+            return Err(refuse("is not in the mesh: its vertices, numbered from 0, share no edge".into()));
+        }
+        is_sharp(sharpness).map_err(refuse)?;
+        creases.push((ends, sharpness));
+        Ok(())
+    })?;
+    Ok(creases)
+}
+
+/// Reads sharp vertices: lines `vertex sharpness`.
+///
+/// # Errors
+/// Lines of another form, a vertex that the mesh lacks, a sharpness that is none, with the line.
+pub fn corners(path: &Path, vertices: usize) -> Result<Vec<(u32, f64)>> {
+    let mut corners = Vec::new();
+    lines(path, vertices, "vertex sharpness", |line, [v]: [usize; 1], [sharpness]: [f64; 1]| {
+        is_sharp(sharpness).map_err(|what| Error::parse(path, Some(line), format!("vertex {v} {what}")))?;
+        corners.push((v as u32, sharpness));
+        Ok(())
+    })?;
+    Ok(corners)
+}
+
 /// The lines of a text file as a vertex and K numbers each.
 fn rows<const K: usize>(path: &Path, vertices: usize, form: &str) -> Result<Vec<Option<[f64; K]>>> {
     let mut rows = vec![None; vertices];
+    lines(path, vertices, form, |line, [vertex]: [usize; 1], row: [f64; K]| {
+        if rows[vertex].replace(row).is_some_and(|before| before != row) {
+            let what = format!("vertex {vertex} is given twice, and differently: keep one");
+            return Err(Error::parse(path, Some(line), what));
+        }
+        Ok(())
+    })?;
+    Ok(rows)
+}
+
+/// Calls `visit(line, vertices, numbers)` for the lines of a text file of V vertices and K numbers each.
+fn lines<const V: usize, const K: usize>(
+    path: &Path,
+    vertices: usize,
+    form: &str,
+    mut visit: impl FnMut(usize, [usize; V], [f64; K]) -> Result<()>,
+) -> Result<()> {
     let bytes = read(path)?;
     let mut s = Scanner::new(&bytes, path);
     loop {
         s.skip_space();
         if s.at_end() {
-            return Ok(rows);
+            return Ok(());
         }
-        let vertex: usize =
-            s.unsigned().ok_or_else(|| s.unexpected(format_args!("the vertex (0, 1, 2, …) of a line `{form}`")))?;
+        let line = s.line();
+        let mut ends = [0; V];
+        for (k, end) in ends.iter_mut().enumerate() {
+            s.skip_blanks();
+            let place = s.clone();
+            let which = if k == 0 { "the" } else { "the next" };
+            let what = format_args!("{which} vertex (0, 1, 2, …) of a line `{form}`");
+            *end = s.unsigned().ok_or_else(|| place.unexpected(what))?;
+        }
         let mut row = [0.0; K];
         for x in &mut row {
             s.skip_blanks();
@@ -116,12 +174,10 @@ fn rows<const K: usize>(path: &Path, vertices: usize, form: &str) -> Result<Vec<
         if !s.at_line_end() {
             return Err(s.unexpected(format_args!("the end of a line `{form}`")));
         }
-        let Some(place) = rows.get_mut(vertex) else {
+        if let Some(vertex) = ends.iter().find(|&&v| v >= vertices) {
             return Err(s.error(format!("vertex {vertex} is not in the mesh: it has {vertices}, numbered from 0")));
-        };
-        if place.replace(row).is_some_and(|before| before != row) {
-            return Err(s.error(format!("vertex {vertex} is given twice, and differently: keep one")));
         }
+        visit(line, ends, row)?;
     }
 }
 

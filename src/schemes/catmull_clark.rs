@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
-use super::scheme::{Circulant, Definition, PaperNames, SingularSet};
+use super::scheme::{CUBIC, Circulant, Definition, PaperNames, SingularSet};
 use super::star::{Circle, Tangents, centroid, for_each_star, require_closed, require_room, sides, twin};
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
@@ -38,6 +38,7 @@ pub(super) const DEFINITION: Definition = Definition {
     regular_symbol: (1.0 / 9.0, 4.0 / 9.0),
     refinement: Refinement::CatmullClark,
     first_rule: None,
+    curve_weight: CUBIC,
 };
 
 /// All that defines the refinement.

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
-use super::scheme::{Definition, PaperNames, SingularSet, from_limit_weight};
+use super::scheme::{CUBIC, Definition, PaperNames, SingularSet, from_limit_weight};
 use super::star::{
     Tangents, blend_with_neighbors, prev_in_triangle, push_blends, require_room, require_triangles, ring_tangents, twin,
 };
@@ -56,6 +56,7 @@ pub(super) const DEFINITION: Definition = Definition {
     regular_symbol: (0.25, 0.5),
     refinement: Refinement::Loop,
     first_rule: None,
+    curve_weight: CUBIC,
 };
 
 /// All that defines the refinement.

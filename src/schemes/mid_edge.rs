@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
-use super::scheme::{Definition, PaperNames, SingularSet};
+use super::scheme::{Definition, PaperNames, QUADRATIC, SingularSet};
 use super::star::{Tangents, blend_with_neighbors, require_closed, require_room, ring_tangents, stars, twin};
 use crate::Result;
 use crate::mesh::{Faces, Mesh, Surface, Topology};
@@ -37,6 +37,7 @@ pub(super) const DEFINITION: Definition = Definition {
     regular_symbol: (0.0, 0.5),
     refinement: Refinement::MidEdge,
     first_rule: None,
+    curve_weight: QUADRATIC,
 };
 
 /// All that defines the refinement.

@@ -2,7 +2,7 @@
 
 use super::Refinement;
 use super::doo_sabin::Rule;
-use super::scheme::{Circulant, Definition, PaperNames, SingularSet};
+use super::scheme::{Circulant, Definition, PaperNames, QUADRATIC, SingularSet};
 
 /// h(n) = 1/n; a face of m corners adds the circulant of Doo-Sabin's corner rule: ¼ on its diagonal,
 /// ¾/m + ½cos(2πk/m)/m between corners k steps apart.
@@ -22,4 +22,5 @@ pub(super) const DEFINITION: Definition = Definition {
     regular_symbol: (0.25, 9.0 / 16.0),
     refinement: Refinement::DooSabin,
     first_rule: Some(Rule::DooSabin),
+    curve_weight: QUADRATIC,
 };

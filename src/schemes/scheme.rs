@@ -86,7 +86,14 @@ pub(super) struct Definition {
     pub(super) refinement: Refinement,
     /// The rule of the first step, where that is a Doo-Sabin step.
     pub(super) first_rule: Option<Rule>,
+    /// w: on a curve of sharp edges the limit point is `w a + (1 − 2w) v + w b`, a and b the neighbours along it.
+    pub(super) curve_weight: f64,
 }
+
+/// Of cubic B-splines, as which curves are subdivided by the primal schemes: their value at a knot.
+pub(super) const CUBIC: f64 = 1.0 / 6.0;
+/// Of quadratic B-splines, as which curves are subdivided by the dual schemes: their value in the middle of a span.
+pub(super) const QUADRATIC: f64 = 1.0 / 8.0;
 
 /// A subdivision scheme whose limit points the control mesh is asked to interpolate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -194,6 +201,13 @@ impl Scheme {
     /// The refinement whose surface the limit points A V lie on.
     pub fn refinement(self) -> Refinement {
         self.definition().refinement
+    }
+
+    /// w: on a curve of sharp edges, a boundary or a crease, the limit point is `w a + (1 − 2w) v + w b`, a and b being the
+    /// neighbours along the curve. 1/6, as of cubic B-splines, for the primal schemes; 1/8, as of quadratic ones, for the
+    /// dual.
+    pub fn curve_weight(self) -> f64 {
+        self.definition().curve_weight
     }
 
     /// The rule of the first step, where the [`refinement`](Self::refinement) is Doo-Sabin's.

@@ -17,12 +17,13 @@ pub(super) const CHUNK: usize = 1024;
 /// A normal shorter than this, relative to the reach of its star squared, is rounding: some tens of ε.
 const DEGENERATE: f64 = 1e-14;
 
-/// Refuses a boundary.
+/// Refuses a boundary, and creases.
 pub(crate) fn require_closed(surface: &Surface) -> Result<()> {
-    if surface.is_closed() {
-        return Ok(());
+    match surface.features() {
+        _ if !surface.is_closed() => Err(Error::Open { edges: surface.boundary_edges(), scheme: "subdivision" }),
+        Some(_) => Err(Error::Creased { what: "subdivision" }),
+        None => Ok(()),
     }
-    Err(Error::Open { edges: surface.boundary_edges(), scheme: "subdivision" })
 }
 
 /// Refuses a mesh that is not closed or has a face that is no triangle, naming the first such face.

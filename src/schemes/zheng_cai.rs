@@ -3,7 +3,7 @@
 
 use super::Refinement;
 use super::doo_sabin::Rule;
-use super::scheme::{Circulant, Definition, PaperNames, SingularSet};
+use super::scheme::{Circulant, Definition, PaperNames, QUADRATIC, SingularSet};
 
 /// h(n) = 1/(2n), d(n) = n; a face of m corners adds 1/m between all of them.
 ///
@@ -22,4 +22,5 @@ pub(super) const DEFINITION: Definition = Definition {
     regular_symbol: (0.5, 0.625),
     refinement: Refinement::DooSabin,
     first_rule: Some(Rule::ZhengCai),
+    curve_weight: QUADRATIC,
 };

@@ -217,6 +217,29 @@ impl<'a> Method<'a> {
         }
     }
 
+    /// The order that an in-place sweep goes in, where it is not that of the rows.
+    pub fn order(self) -> Option<&'a [u32]> {
+        match self {
+            Method::GaussSeidel { order } | Method::Sor { order, .. } | Method::Ssor { order, .. } => order,
+            Method::Lu
+            | Method::Cholesky
+            | Method::SecondCholesky
+            | Method::Ldlt
+            | Method::Jacobi { .. }
+            | Method::Thall
+            | Method::Pia
+            | Method::WPia { .. }
+            | Method::Chebyshev { .. }
+            | Method::Cg
+            | Method::PlainCg
+            | Method::PcgJacobi
+            | Method::PcgSsor { .. }
+            | Method::PcgIc0
+            | Method::Anderson { .. }
+            | Method::HeavyBall { .. } => None,
+        }
+    }
+
     /// The same with another ω, where it is swept over ω: `jacobi`, `pia` (which becomes `w-pia`) and `sor`.
     pub fn at_omega(self, omega: f64) -> Option<Self> {
         match self {

@@ -3,10 +3,9 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use limitlab::assemble::LimitSystem;
-use limitlab::interpolate::nasri;
-use limitlab::interpolate::subset::Restriction;
+use limitlab::assemble::{LimitSystem, Stages};
 use limitlab::interpolate::zheng_cai::*;
+use limitlab::interpolate::{nasri, staged};
 use limitlab::mesh::{Mesh, Surface, builtin, io};
 use limitlab::schemes::Scheme;
 use limitlab::schemes::doo_sabin::{self, Rule};
@@ -286,10 +285,10 @@ fn a_subset_is_interpolated_by_every_scheme_and_method() {
     let stop = Stop { tolerance: 1e-12, max_iterations: 5000 };
     for scheme in Scheme::ALL {
         let full = LimitSystem::new(&surface, scheme).unwrap();
-        let part = Restriction::new(&full, &some).unwrap();
+        let part = Stages::new(&surface, scheme, Some(&some)).unwrap();
         let file: Vec<u32> = (0..surface.len() as u32).rev().collect();
         let order = part.order(&file);
-        assert_eq!(order.len(), part.vertices.len());
+        assert_eq!(order.len(), part.vertices().unwrap().len());
         let mut first: Option<Vec<DVec3>> = None;
         for method in [
             Method::Lu,
@@ -300,7 +299,7 @@ fn a_subset_is_interpolated_by_every_scheme_and_method() {
             Method::GaussSeidel { order: Some(&order) },
             Method::Chebyshev { interval: Some((full.bounds.lambda_min.max(0.02), 1.0)) },
         ] {
-            let solution = part.solve(&full, surface.positions(), method, &stop, &mut |_| ControlFlow::Continue(()));
+            let solution = staged::run(&part, surface.positions(), method, &stop);
             assert_eq!(solution.report.outcome, Outcome::Converged, "{scheme} {method:?}");
             for (v, &marked) in some.iter().enumerate() {
                 let value = if marked { full.a.row_times(v, &solution.points) } else { solution.points[v] };
@@ -312,15 +311,12 @@ fn a_subset_is_interpolated_by_every_scheme_and_method() {
             }
         }
     }
-    // All vertices: the whole system, one PIA step ahead.
+    // All vertices: the whole system, from the same start.
     let full = LimitSystem::new(&surface, Scheme::Loop).unwrap();
-    let part = Restriction::new(&full, &vec![true; surface.len()]).unwrap();
-    assert_eq!(part.system.a, full.a);
-    let pia = Method::Pia;
-    let ahead = part.solve(&full, surface.positions(), pia, &Stop { tolerance: 0.0, max_iterations: 4 }, &mut |_| {
-        ControlFlow::Continue(())
-    });
-    let five = run(&full, surface.positions(), pia, &Stop { tolerance: 0.0, max_iterations: 5 });
-    assert!(distance(&ahead.points, &five.points) < ROUNDING);
-    assert!(Restriction::new(&full, &vec![false; surface.len()]).is_err());
+    let part = Stages::new(&surface, Scheme::Loop, Some(&vec![true; surface.len()])).unwrap();
+    assert_eq!(part.block().a, full.a);
+    let stop = Stop { tolerance: 0.0, max_iterations: 5 };
+    let found = staged::run(&part, surface.positions(), Method::Pia, &stop);
+    assert_eq!(found.points, run(&full, surface.positions(), Method::Pia, &stop).points);
+    assert!(Stages::new(&surface, Scheme::Loop, Some(&vec![false; surface.len()])).is_err());
 }

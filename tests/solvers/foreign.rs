@@ -252,7 +252,7 @@ fn rates_are_predicted_where_rows_do_not_sum_to_1() {
     assert!((78.0..80.0).contains(&spectrum.a.max));
     let lines = all_entries(&system, &spectrum);
     let stop = Stop { tolerance: 1e-9, max_iterations: 20_000 };
-    let rows = compare(&system, &spectrum, &points, &lines, &[], &stop, &mut || ()).unwrap();
+    let rows = compare(&system, &spectrum, (&points, &points), &lines, &[], &stop, &mut || ()).unwrap();
     for row in rows {
         let what = format!("{} {}: {:?} {:?}", row.method, row.parameter, row.predicted_rate, row.observed_rate);
         let Named::Ours(method) = row.method else { panic!("{what}") };
@@ -273,7 +273,7 @@ fn rates_are_predicted_where_rows_do_not_sum_to_1() {
     }
     // ω sweeps too: the thresholds are those of this matrix.
     let grids = vec![(Method::Pia, vec![0.01, 0.02, 0.03]), (Method::Jacobi { omega: None }, vec![0.5, 1.5])];
-    let found = sweep(&system, &points, &grids, None, &stop, rounding_floor(2.0), &|_| ()).unwrap();
+    let found = sweep(&system, (&points, &points), &grids, None, &stop, rounding_floor(2.0), &|_| ()).unwrap();
     for row in &found.rows {
         let converges = row.predicted_rho < 1.0;
         assert_eq!(row.outcome == Outcome::Converged, converges, "{row:?}");
@@ -310,7 +310,7 @@ fn what_is_not_positive_definite_ends_as_an_outcome() {
                 assert!(any, "{what}");
             }
         }
-        compare(&system, &spectrum, &points, &lines, &[], &stop, &mut || ()).unwrap();
+        compare(&system, &spectrum, (&points, &points), &lines, &[], &stop, &mut || ()).unwrap();
     }
 }
 
@@ -434,7 +434,7 @@ fn methods_of_one_s_own_are_run_as_ours_and_not_believed() {
     ];
     let lines = entries(&system, &spectrum, &[Method::Jacobi { omega: None }], None, "file").unwrap();
     let mut done = 0;
-    let rows = compare(&system, &spectrum, &points, &lines, &mine, &stop, &mut || done += 1).unwrap();
+    let rows = compare(&system, &spectrum, (&points, &points), &lines, &mine, &stop, &mut || done += 1).unwrap();
     assert_eq!((done, rows.len()), (5, 5));
     let (ours, same) = (&rows[0].solution, &rows[1].solution);
     assert_eq!((&ours.report, &ours.points), (&same.report, &same.points));

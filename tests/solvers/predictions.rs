@@ -121,7 +121,7 @@ fn promised_counts_follow_from_their_norms() {
         let (low, jacobi) = (bounds.lambda_min, (bounds.jacobi_lambda_min, bounds.jacobi_lambda_max));
         for tolerance in [1e-2, 1e-5, 1e-10].map(|t| t * mesh.diagonal()) {
             let least = |start: f64, rho: f64| (0..).find(|&k| start * rho.powi(k) <= tolerance).unwrap();
-            let counts = Promise::new(&bounds).counts(&system, &mesh.positions, tolerance);
+            let counts = Promise::new(&bounds).counts(&system, (&mesh.positions, &mesh.positions), tolerance);
             assert_eq!(counts.pia, f64::from(least(in_h, 1.0 - low)), "{name}");
             assert_eq!(counts.w_pia, f64::from(least(in_h, (1.0 - low) / (1.0 + low))), "{name}");
             let thall = (1.0 - 0.5 * jacobi.0).abs().max((1.0 - 0.5 * jacobi.1).abs());

@@ -70,7 +70,7 @@ fn torus_sweep(grid: &[f64]) -> Sweep {
     let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 20_000 };
     let floor = rounding_floor(mesh.diagonal());
     let grids = [(JACOBI, grid.to_vec())];
-    sweep(&system, &mesh.positions, &grids, None, &stop, floor, &|_| {}).unwrap()
+    sweep(&system, (&mesh.positions, &mesh.positions), &grids, None, &stop, floor, &|_| {}).unwrap()
 }
 
 /// On noisy points the constant vector, which has 9/4, is not excited; its neighbours in frequency are.
@@ -146,7 +146,7 @@ fn a_mode_counts_as_excited_down_to_a_ten_thousand_millionth() {
             let sign = if (v / 10 + v % 10) % 2 == 0 { 1.0 } else { -1.0 };
             *p = *smooth + amplitude * sign * glam::DVec3::ONE;
         }
-        excited(&system, &mesh.positions, Operator::A).unwrap().unwrap().min
+        excited(&system, (&mesh.positions, &mesh.positions), Operator::A).unwrap().unwrap().min
     };
     for amplitude in [1e-2, 1e-5, 1e-8] {
         let found = lowest(amplitude);

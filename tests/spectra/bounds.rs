@@ -132,7 +132,7 @@ fn promised_counts_are_kept_by_runs() {
         add_noise(&mut mesh, 0.1, 5);
         let tolerance = 1e-8 * mesh.diagonal();
         let promise = Promise::new(&system.bounds);
-        let counts = promise.counts(&system, &mesh.positions, tolerance);
+        let counts = promise.counts(&system, (&mesh.positions, &mesh.positions), tolerance);
         let stop = Stop { tolerance, max_iterations: 5000 };
         let mut check = |method: Method, promised: f64| {
             if !promised.is_finite() {

@@ -12,7 +12,9 @@ use limitlab::output::{Batch, check_target, create_dir};
 use limitlab_experiments::cli::{self, CommonFlags, MeshFlags};
 
 /// Writes A, M, H and P of the limit system A V = P, A = H·M, as Matrix Market files with 17 significant digits,
-/// in the vertex order of the mesh.
+/// in the vertex order of the mesh. On an open or creased mesh A is no such product: A.mtx and P.mtx are those of all
+/// vertices, and the folder `smooth` has the five files of the system of the smooth vertices, in ascending order, once
+/// curves and corners are known.
 ///
 /// A.mtx is general, M.mtx symmetric (lower triangle), H.mtx an N×1 array (the diagonal), P.mtx an N×3 array of the
 /// given points, and R.mtx = H⁻¹P, the right-hand side of M V = R. With --scheme zheng-cai, M and R are the paper's
@@ -51,36 +53,53 @@ fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     }
     create_dir(&arguments.out)?;
-    let path = |name: &str| arguments.out.join(name);
     for name in FILES {
-        check_target(&path(name))?;
+        check_target(&arguments.out.join(name))?;
     }
     let input = arguments.mesh.input(&arguments.input, &arguments.common)?;
-    let system = input.system()?;
+    let stages = input.stages()?;
+    let matrix = stages.matrix();
     let points = &*input.given_points();
-    let right_hand_side = system.symmetric_right_hand_side(points);
+    let known = stages.known(points);
+    let mut files = Vec::new();
     let mut batch = Batch::default();
-    batch.write(&path("A.mtx"), |out| matrix_market::write_general(&system.a, out))?;
-    batch.write(&path("M.mtx"), |out| matrix_market::write_symmetric(&system.m, out))?;
-    batch.write(&path("H.mtx"), |out| matrix_market::write_vector(&system.h, out))?;
-    batch.write(&path("P.mtx"), |out| matrix_market::write_points(points, out))?;
-    batch.write(&path("R.mtx"), |out| matrix_market::write_points(&right_hand_side, out))?;
+    let folder = match stages.vertices() {
+        None => arguments.out.clone(),
+        Some(_) => {
+            files = ["A.mtx", "P.mtx"].map(|name| arguments.out.join(name)).to_vec();
+            batch.write(&files[0], |out| matrix_market::write_general(&matrix, out))?;
+            batch.write(&files[1], |out| matrix_market::write_points(points, out))?;
+            let folder = arguments.out.join("smooth");
+            create_dir(&folder)?;
+            folder
+        }
+    };
+    let of_block = FILES.map(|name| folder.join(name));
+    let block = stages.block();
+    let right = stages.right_hand_side(&known);
+    let symmetric = block.symmetric_right_hand_side(&right);
+    batch.write(&of_block[0], |out| matrix_market::write_general(&block.a, out))?;
+    batch.write(&of_block[1], |out| matrix_market::write_symmetric(&block.m, out))?;
+    batch.write(&of_block[2], |out| matrix_market::write_vector(&block.h, out))?;
+    batch.write(&of_block[3], |out| matrix_market::write_points(&right, out))?;
+    batch.write(&of_block[4], |out| matrix_market::write_points(&symmetric, out))?;
     batch.commit()?;
+    files.extend(of_block);
     let names = input.scheme.paper_names();
     arguments.common.remark(format_args!(
         "{}: {} vertices, {} entries; in the paper {} = {}·{}",
         arguments.out.display(),
-        system.len(),
-        system.a.values().len(),
+        stages.len(),
+        matrix.values().len(),
         names.system,
         names.diagonal,
         names.symmetric
     ));
     if arguments.json {
-        let files = FILES.map(|n| path(n).display().to_string());
+        let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
         let object = input.json(json!({
-            "entries": system.a.values().len(),
-            "bandwidth": system.a.pattern().bandwidth(),
+            "entries": matrix.values().len(),
+            "bandwidth": matrix.pattern().bandwidth(),
             "files": files,
         }));
         cli::print_json(&object)?;

@@ -79,7 +79,7 @@ fn run(arguments: &Arguments) -> Result<()> {
 
 /// The rows, their errors in the units of the files.
 fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<Row<'a>>> {
-    let Problem { system, points, .. } = problem;
+    let system = problem.system();
     let asked = match &arguments.method {
         Some(list) => list.0.clone(),
         None => Method::ALL.into_iter().map(Asked::Method).chain([Asked::Auto]).collect(),
@@ -93,7 +93,7 @@ fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<Row<'a
     let count = lines.len() + usize::from(auto);
     let progress = Progress::new(&problem.subject.name, count, arguments.common.quiet);
     let done = &mut || progress.step();
-    let mut rows = comparison::compare(system, &spectrum, points, &lines, &[], &problem.stop, done)?;
+    let mut rows = comparison::compare(system, &spectrum, problem.data(), &lines, &[], &problem.stop, done)?;
     if auto {
         rows.push(study::auto_row(problem.auto()?));
         progress.step();

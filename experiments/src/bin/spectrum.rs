@@ -89,6 +89,9 @@ struct Findings {
     data: [Option<Extremes>; 2],
     modes: Vec<Mode>,
     certificates: [Option<Certificate>; 4],
+    /// On an open or creased mesh the rest is about the smooth vertices. The eigenvalues of its curves, and its corners.
+    curves: Vec<f64>,
+    corners: usize,
 }
 
 /// An end of a spectrum.
@@ -122,6 +125,12 @@ impl Findings {
 
     fn spectrum(&self) -> Spectrum {
         self.ends.spectrum()
+    }
+
+    /// The least eigenvalue of curves and the greatest.
+    fn ends_of_curves(&self) -> Option<(f64, f64)> {
+        let least = self.curves.iter().copied().min_by(f64::total_cmp)?;
+        Some((least, self.curves.iter().copied().max_by(f64::total_cmp)?))
     }
 
     /// How many null vectors there are: by theory on a mesh, else as far as rounding tells.
@@ -207,7 +216,7 @@ fn run(arguments: &Arguments) -> Result<()> {
 fn analyse_any(
     system: Option<&LimitSystem>,
     acting: &impl System,
-    points: &[DVec3],
+    (points, start): (&[DVec3], &[DVec3]),
     parts: Parts,
     progress: &Progress,
     arguments: &Arguments,
@@ -215,7 +224,7 @@ fn analyse_any(
     let Parts { name, bounds, verdict, stop, ends } = parts;
     let promise = Promise::new(&bounds);
     let counts = match stop {
-        Ok(stop) => Some(promise.counts(acting, points, stop.tolerance)),
+        Ok(stop) => Some(promise.counts(acting, (points, start), stop.tolerance)),
         Err(error) => {
             arguments.common.remark(format_args!("no iterations are promised: {error}"));
             None
@@ -235,7 +244,8 @@ fn analyse_any(
     let data = if arguments.no_data {
         [None; 2]
     } else {
-        [excited(acting, points, Operator::A)?, excited(acting, points, Operator::Jacobi)?]
+        let excited = |which| excited(acting, (points, start), which);
+        [excited(Operator::A)?, excited(Operator::Jacobi)?]
     };
     let count = arguments.modes.into();
     let modes = system.filter(|_| count > 0).map(|s| modes(s, Operator::A, End::Lowest, count)).transpose()?;
@@ -254,7 +264,8 @@ fn analyse_any(
     }
     progress.step();
     let modes = modes.unwrap_or_default();
-    Ok(Findings { bounds, ends, full, sweeps, verdict, promise, counts, data, modes, certificates })
+    let (curves, corners) = (Vec::new(), 0);
+    Ok(Findings { bounds, ends, full, sweeps, verdict, promise, counts, data, modes, certificates, curves, corners })
 }
 
 /// What is known otherwise of a mesh and of a system without one.
@@ -266,10 +277,46 @@ struct Parts<'a> {
     ends: &'a dyn Fn() -> Result<Ends>,
 }
 
+/// The smooth vertices of an open or creased mesh.
+fn analyse_stages(input: &Input, arguments: &Arguments) -> Result<Findings> {
+    let stages = input.stages()?;
+    let block = stages.block();
+    let known = stages.known(input.surface.positions());
+    let (right, start) = (stages.right_hand_side(&known), stages.restricted(&known));
+    let progress = Progress::new(&input.name, 5, arguments.common.quiet);
+    let parts = Parts {
+        name: &input.name,
+        bounds: block.bounds,
+        verdict: Some(Singularity::detect(&input.surface, input.scheme)),
+        stop: input.stop(&arguments.stop),
+        ends: &|| ends(block),
+    };
+    let found = analyse_any(Some(block), block, (&right, &start), parts, &progress, arguments);
+    let mut found = found.map_err(|e| input.named(e))?;
+    found.curves = stages.curves().eigenvalues();
+    found.corners = input.surface.len() - stages.curves().len() - block.len();
+    if let Some(full) = &mut found.full {
+        // The other stages have 1 and the eigenvalues of the curves, over their diagonals too.
+        let diagonal = 1.0 - 2.0 * stages.curves().weight();
+        let add = |all: &mut Vec<f64>, scale: f64| {
+            all.extend(found.curves.iter().map(|x| x / scale));
+            all.extend(std::iter::repeat_n(1.0, found.corners));
+            all.sort_unstable_by(f64::total_cmp);
+        };
+        add(&mut full.a, 1.0);
+        add(&mut full.jacobi, diagonal);
+    }
+    Ok(found)
+}
+
 fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
+    if input.surface.features().is_some() {
+        return analyse_stages(input, arguments);
+    }
     // Only some of what can be asked for needs entries.
     let explicit = arguments.full || !arguments.no_sweeps || arguments.modes > 0 || arguments.certify;
-    let system = explicit.then(|| input.system()).transpose()?;
+    let system =
+        explicit.then(|| LimitSystem::new(&input.surface, input.scheme)).transpose().map_err(|e| input.named(e))?;
     let surface = &input.surface;
     let mesh = surface.mesh();
     let operator = limitlab::assemble::Operator::new(surface, input.scheme).map_err(|e| input.named(e))?;
@@ -281,7 +328,8 @@ fn analyse(input: &Input, arguments: &Arguments) -> Result<Findings> {
         stop: input.stop(&arguments.stop),
         ends: &|| mesh_ends(surface, input.scheme),
     };
-    analyse_any(system.as_ref(), &operator, &mesh.positions, parts, &progress, arguments).map_err(|e| input.named(e))
+    analyse_any(system.as_ref(), &operator, (&mesh.positions, &mesh.positions), parts, &progress, arguments)
+        .map_err(|e| input.named(e))
 }
 
 fn analyse_given(given: &Given, arguments: &Arguments) -> Result<Findings> {
@@ -289,7 +337,7 @@ fn analyse_given(given: &Given, arguments: &Arguments) -> Result<Findings> {
     let progress = Progress::new(&subject.name, 5, arguments.common.quiet);
     let stop = given.stop(&arguments.stop);
     let parts = Parts { name: &subject.name, bounds: system.bounds, verdict: None, stop, ends: &|| ends(system) };
-    let found = analyse_any(Some(system), system, points, parts, &progress, arguments);
+    let found = analyse_any(Some(system), system, (points, points), parts, &progress, arguments);
     found.map_err(|e| limitlab::Error::mesh(&subject.name, e.to_string()))
 }
 
@@ -336,6 +384,13 @@ fn eigenvalue_table(subject: &Subject, found: &Findings, n: usize) -> Table {
         found.spectrum().jacobi.critical_omega(),
         found.promise.safe_omega_pia
     ));
+    if let Some((least, greatest)) = found.ends_of_curves() {
+        table.note(format!(
+            "All of this is about the smooth vertices. Those on curves have eigenvalues of their own, {} from {least:.6} to \
+             {greatest:.6}, and each corner has 1: the spectrum of A is the union.",
+            found.curves.len()
+        ));
+    }
     table.note(match &found.counts {
         Some(counts) => format!(
             "Iterations that suffice by proof for this tolerance from V = P: PIA {}, W-PIA {}, Thall {}, Chebyshev {}.",
@@ -369,7 +424,7 @@ fn of_a_mesh(verdict: &Singularity) -> String {
         } else {
             match verdict.set.condition() {
                 Some(condition) => format!("non-singular: no component has {condition}."),
-                None => "non-singular, as on every closed mesh under this scheme.".into(),
+                None => "non-singular, as on every mesh under this scheme.".into(),
             }
         }
     );
@@ -492,6 +547,9 @@ fn json(subject: &Subject, found: &Findings, n: usize) -> Value {
         },
         "singular": found.is_singular(n),
         "kernel_dimension": found.kernel_dimension(n),
+        "curves": found.ends_of_curves().map(|(least, greatest)| json!({
+            "unknowns": found.curves.len(), "lambda_min": number(least), "lambda_max": number(greatest),
+        })),
         "kernel_excited": found.verdict.as_ref().map(|v| v.excited),
     });
     if let Value::Object(map) = &mut object {

@@ -132,8 +132,8 @@ fn sweep_one(
     };
     let written = Mutex::new(Instant::now());
     let found = sweep(
-        &problem.system,
-        &problem.points,
+        problem.system(),
+        problem.data(),
         &grids,
         Some(&problem.order),
         &problem.stop,

@@ -1,7 +1,7 @@
 //! MESH arguments: files or built-in names, noise, scheme, validation.
 
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
@@ -9,14 +9,15 @@ use glam::DVec3;
 use serde_json::{Value, json};
 
 use super::{CommonFlags, StopFlags, advice};
-use limitlab::assemble::LimitSystem;
+use limitlab::assemble::Stages;
 use limitlab::error::{Error, Result, short};
 use limitlab::interpolate::solver::require_memory;
+use limitlab::mesh::features::{Features, Rule, SHARP, Tags, creases_by_angle};
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::io::{self, Loaded, has_mesh_ending};
 use limitlab::mesh::noise::{Noise, move_vertices};
-use limitlab::mesh::validate::{Boundary, validate};
-use limitlab::mesh::{Surface, bounding_box, builtin};
+use limitlab::mesh::validate::{Boundary, seams, validate};
+use limitlab::mesh::{Surface, bounding_box, builtin, vertex_data};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::Stop;
 
@@ -29,9 +30,19 @@ pub struct MeshFlags {
     /// Move every vertex by a Gaussian of standard deviation A × the mean edge length, from SEED (1 unless told)
     #[arg(long, value_name = "A[:SEED]")]
     pub noise: Option<Noise>,
-    /// An open mesh: refuse it, or treat boundary vertices as interior (loop, sqrt3 and mid-edge only)
-    #[arg(long, value_name = "refuse|as-interior", default_value_t = Boundary::Refuse)]
-    pub boundary: Boundary,
+    /// An open mesh: edge-and-corner (boundary edges are sharp, vertices with one face are corners) unless told, edge-only
+    /// (the curve is smooth there), as-interior (boundary vertices as interior ones: loop, sqrt3 and mid-edge only) or refuse
+    #[arg(long, value_name = "RULE")]
+    pub boundary: Option<Boundary>,
+    /// Sharp edges: a file with lines `a b sharpness`, vertices numbered from 0; 10 and more is sharp for ever
+    #[arg(long, value_name = "FILE")]
+    pub creases: Option<PathBuf>,
+    /// Sharp vertices: a file with lines `vertex sharpness`
+    #[arg(long, value_name = "FILE")]
+    pub corners: Option<PathBuf>,
+    /// Make edges sharp whose faces meet at more than this angle between their normals, in degrees
+    #[arg(long, value_name = "DEG", value_parser = angle)]
+    pub crease_angle: Option<f64>,
     /// Print the whole report on the mesh's defects as JSON and stop
     #[arg(long)]
     pub defects: bool,
@@ -56,6 +67,14 @@ pub struct Input {
 
 /// The noise that built-in meshes carry where they stand in for real ones.
 pub const STAND_IN_NOISE: Noise = Noise { amplitude: 0.1, seed: 1 };
+
+/// An angle between normals.
+fn angle(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if (0.0..=180.0).contains(&x) => Ok(x),
+        _ => Err("an angle from 0 to 180 is needed".into()),
+    }
+}
 
 /// The size of a length in words.
 fn one_digit(x: f64) -> String {
@@ -106,7 +125,7 @@ impl MeshFlags {
         let mut results = Vec::with_capacity(names.len());
         for name in names {
             let loaded = self.loaded(name.as_ref(), common)?;
-            results.push(validate(&loaded.mesh, numbers(&loaded.lines), self.boundary));
+            results.push(validate(&loaded.mesh, numbers(&loaded.lines), self.rule()));
         }
         super::print_results(&results)?;
         Ok(true)
@@ -133,10 +152,11 @@ impl MeshFlags {
         let read_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let Loaded { mesh, lines, .. } = loaded;
-        let mut surface = Surface::examined(mesh, numbers(&lines), self.boundary).map_err(|report| {
+        let surface = Surface::examined(mesh, numbers(&lines), self.rule()).map_err(|report| {
             report.remarks.iter().for_each(|remark| common.remark(format_args!("{name}: {remark}")));
             Error::mesh(name, advice::of_defects(&report))
         })?;
+        let mut surface = self.with_features(name, surface)?;
         for remark in surface.remarks() {
             common.remark(format_args!("{name}: {remark}"));
         }
@@ -162,6 +182,42 @@ impl MeshFlags {
             read_seconds,
             check_seconds: start.elapsed().as_secs_f64(),
         })
+    }
+
+    /// What boundary edges are.
+    fn rule(&self) -> Boundary {
+        self.boundary.unwrap_or(Boundary::EdgeAndCorner)
+    }
+
+    /// The mesh with the sharp edges and vertices that are asked for; refused if it is open by a seam, unless that is
+    /// wanted.
+    fn with_features(&self, name: &str, surface: Surface) -> Result<Surface> {
+        if let (None, Some((edges, [a, b]))) = (self.boundary, seams(&surface))
+            && edges == surface.boundary_edges()
+        {
+            return Err(Error::mesh(
+                name,
+                format!(
+                    "all {edges} boundary edges lie on each other (first: vertices {a} and {b}): a seam of duplicate \
+                     vertices at the same positions, no opening; merge them, or use --boundary edge-and-corner to keep \
+                     it open"
+                ),
+            ));
+        }
+        if self.creases.is_none() && self.corners.is_none() && self.crease_angle.is_none() {
+            return Ok(surface);
+        }
+        let mut tags = Tags { boundary: self.rule(), ..Tags::default() };
+        if let Some(path) = &self.creases {
+            tags.creases = vertex_data::creases(path, &surface)?;
+        }
+        if let Some(degrees) = self.crease_angle {
+            tags.creases.extend(creases_by_angle(&surface, degrees).into_iter().map(|ends| (ends, SHARP)));
+        }
+        if let Some(path) = &self.corners {
+            tags.corners = vertex_data::corners(path, surface.len())?;
+        }
+        surface.tagged(&tags).map_err(|e| Error::mesh(name, e.to_string()))
     }
 
     /// Adds the noise to the points of a valid mesh, and takes them to their frame; or a vertex, and what is wrong there.
@@ -257,21 +313,32 @@ impl Input {
     /// # Panics
     /// If `fields` is not an object.
     pub fn json(&self, fields: Value) -> Value {
+        let features = self.surface.features();
+        let count = |rule| features.map_or(0, |f| f.count(rule));
         let head = json!({
             "mesh": self.name,
             "scheme": self.scheme.name(),
             "vertices": self.surface.len(),
             "faces": self.surface.faces().len(),
+            "boundary": self.surface.boundary_edges(),
+            "creases": features.map_or(0, Features::creased_edges),
+            "corners": count(Rule::Corner),
+            "darts": count(Rule::Dart),
+            "blocks": {
+                "corners": count(Rule::Corner),
+                "curves": count(Rule::Crease),
+                "smooth": features.map_or(self.surface.len(), |f| f.count(Rule::Smooth)),
+            },
         });
         all_fields(head, fields)
     }
 
-    /// Assembles the limit system.
+    /// Assembles the limit system in its stages.
     ///
     /// # Errors
-    /// As [`LimitSystem::new`], with the mesh's name.
-    pub fn system(&self) -> Result<LimitSystem> {
-        LimitSystem::new(&self.surface, self.scheme).map_err(|e| self.named(e))
+    /// As [`Stages::new`], with the mesh's name.
+    pub fn stages(&self) -> Result<Stages> {
+        Stages::new(&self.surface, self.scheme, None).map_err(|e| self.named(e))
     }
 
     /// An error of a computation with the mesh's name, and the flags that help.

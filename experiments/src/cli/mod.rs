@@ -258,7 +258,6 @@ pub fn number(x: f64) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use limitlab::mesh::validate::Boundary;
 
     #[test]
     fn a_grid_has_both_ends_and_round_numbers() {
@@ -287,7 +286,15 @@ mod tests {
 
     #[test]
     fn a_tolerance_is_relative_to_the_mesh_unless_it_is_absolute() {
-        let flags = MeshFlags { scheme: None, noise: None, boundary: Boundary::Refuse, defects: false };
+        let flags = MeshFlags {
+            scheme: None,
+            noise: None,
+            boundary: None,
+            creases: None,
+            corners: None,
+            crease_angle: None,
+            defects: false,
+        };
         let common = CommonFlags { threads: None, quiet: true };
         let cube = flags.input("cube", &common).expect("valid");
         let stop = |tol_absolute| {

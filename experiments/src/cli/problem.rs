@@ -7,13 +7,13 @@ use serde_json::{Value, json};
 
 use super::input::{all_fields, plain};
 use super::{CommonFlags, Input, MeshFlags, StopFlags};
-use limitlab::assemble::LimitSystem;
 use limitlab::assemble::matrix_market::{self, is_missing};
+use limitlab::assemble::{LimitSystem, Stages};
 use limitlab::error::{Error, Result};
 use limitlab::interpolate::{interpolate, solve_stored};
+use limitlab::mesh::features::Rule;
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::order::Order;
-use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Surface, diagonal};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Solution, Stop};
@@ -49,12 +49,20 @@ impl Subject {
 }
 
 impl Input {
+    /// The size of the mesh in words, and that of its stages where there are several.
+    fn size(&self) -> String {
+        let whole = format!("{} vertices, {} faces", self.surface.len(), self.surface.faces().len());
+        let Some(features) = self.surface.features() else { return whole };
+        let [smooth, curves, corners] = [Rule::Smooth, Rule::Crease, Rule::Corner].map(|rule| features.count(rule));
+        format!("{whole}; the system of the {smooth} smooth vertices, after {curves} on curves and {corners} corners")
+    }
+
     /// What results on this mesh are about.
     pub fn subject(&self) -> Subject {
         Subject {
             name: self.name.clone(),
             title: format!("{} under {}", self.label, self.scheme),
-            size: format!("{} vertices, {} faces", self.surface.len(), self.surface.faces().len()),
+            size: self.size(),
             unit: "mesh units",
             stem: self.stem(""),
             head: self.json(json!({})),
@@ -85,33 +93,54 @@ impl Given {
 /// A system with its points, whatever it comes from: a MESH, or a SYSTEM_DIR with M.mtx, H.mtx and P.mtx.
 pub struct Problem {
     pub subject: Subject,
-    pub system: LimitSystem,
-    /// In units of [`scale`](Self::scale), as the tolerance of `stop` is.
-    pub points: Vec<DVec3>,
+    source: Source,
+    /// In units of [`scale`](Self::scale), as the tolerance of `stop` is: the right-hand side, and the start.
+    points: Vec<DVec3>,
+    start: Vec<DVec3>,
     pub stop: Stop,
     /// The order of in-place sweeps.
     pub order: Vec<u32>,
-    /// What the system is of, where it is that of a mesh.
-    pub surface: Option<(Surface, Scheme)>,
     /// Lengths in the units of the files are this many times those here.
     pub scale: f64,
 }
 
+/// Where a system comes from.
+enum Source {
+    Mesh(Surface, Scheme, Stages),
+    Folder(LimitSystem),
+}
+
 impl Problem {
+    /// The system; of an open or creased mesh, that of its smooth vertices.
+    pub fn system(&self) -> &LimitSystem {
+        match &self.source {
+            Source::Mesh(_, _, stages) => stages.block(),
+            Source::Folder(system) => system,
+        }
+    }
+
+    /// The right-hand side, and the start of iterations.
+    pub fn data(&self) -> (&[DVec3], &[DVec3]) {
+        (&self.points, &self.start)
+    }
+
     /// By `auto`: the whole chain on a mesh, conjugate gradients and LDLᵀ on a system without one.
     ///
     /// # Errors
     /// As [`interpolate`].
     pub fn auto(&self) -> Result<Solution> {
-        match &self.surface {
-            Some((surface, scheme)) => interpolate(surface, *scheme, &self.stop.into()),
-            None => Ok(solve_stored(&self.system, &self.points, &self.stop)),
+        match &self.source {
+            Source::Mesh(surface, scheme, _) => interpolate(surface, *scheme, &self.stop.into()),
+            Source::Folder(system) => Ok(solve_stored(system, &self.points, &self.stop)),
         }
     }
 
     /// The diagonal of the bounding box of the points.
     pub fn diagonal(&self) -> f64 {
-        diagonal(&self.points)
+        match &self.source {
+            Source::Mesh(surface, ..) => surface.diagonal(),
+            Source::Folder(_) => diagonal(&self.points),
+        }
     }
 }
 
@@ -128,9 +157,14 @@ impl MeshFlags {
         }
         let (system, mut points) = matrix_market::read_system(path)?;
         let refuse = |what: String| Err(Error::mesh(name, what));
-        let as_interior = self.boundary == Boundary::AsInterior;
-        let flags =
-            [("--scheme", self.scheme.is_some()), ("--noise", self.noise.is_some()), ("--boundary", as_interior)];
+        let flags = [
+            ("--scheme", self.scheme.is_some()),
+            ("--noise", self.noise.is_some()),
+            ("--boundary", self.boundary.is_some()),
+            ("--creases", self.creases.is_some()),
+            ("--corners", self.corners.is_some()),
+            ("--crease-angle", self.crease_angle.is_some()),
+        ];
         if let Some((flag, _)) = flags.into_iter().find(|f| f.1) {
             return refuse(format!("{flag} is about a mesh, and this is a system without one: leave it out"));
         }
@@ -176,23 +210,25 @@ impl MeshFlags {
         Ok(Problem {
             stop: given.stop(stop)?,
             order: numbers,
-            surface: None,
             scale: given.frame.scale(),
             subject: given.subject,
-            system: given.system,
+            source: Source::Folder(given.system),
+            start: given.points.clone(),
             points: given.points,
         })
     }
 }
 
 fn of_mesh(input: Input, stop: &StopFlags, order: Order) -> Result<Problem> {
+    let stages = input.stages()?;
+    let known = stages.known(input.surface.positions());
     Ok(Problem {
         stop: input.stop(stop)?,
         subject: input.subject(),
-        system: input.system()?,
-        points: input.surface.positions().to_vec(),
-        order: order.order(input.surface.mesh(), input.surface.incidence()),
+        points: stages.right_hand_side(&known),
+        start: stages.restricted(&known),
+        order: stages.order(&order.order(input.surface.mesh(), input.surface.incidence())),
         scale: input.frame.scale(),
-        surface: Some((input.surface, input.scheme)),
+        source: Source::Mesh(input.surface, input.scheme, stages),
     })
 }

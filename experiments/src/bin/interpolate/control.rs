@@ -9,11 +9,10 @@ use limitlab::analysis::failed::Failed;
 use limitlab::assemble::Operator;
 use limitlab::error::Error;
 use limitlab::interpolate::zheng_cai::{self, PhaseOne, Sweep};
-use limitlab::interpolate::{Options, Tolerance, interpolate_watched};
+use limitlab::interpolate::{Options, Tolerance, interpolate_watched, limit_points};
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::order::Order;
 use limitlab::solvers::gauss_seidel::by_colours;
-use limitlab::solvers::system::Rows;
 use limitlab::solvers::{Errors, Method, Outcome, Report, Step, Stop};
 use limitlab_experiments::cli::{Input, Progress, advice};
 
@@ -61,6 +60,7 @@ fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Contr
     }
     if let (Choice::Solver(method @ (Method::GaussSeidel { .. } | Method::Sor { .. })), Order::Multicolour, None) =
         (arguments.method, arguments.order, &wishes.interpolated)
+        && input.surface.features().is_none()
     {
         return by_colour(arguments, input, wishes, method, &stop);
     }
@@ -95,8 +95,7 @@ fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Contr
     check(arguments, input, wishes, found.method, &found.report, &stop)?;
     Ok(Control {
         method: found.method,
-        // The start on some vertices only is what one PIA step makes of V = P.
-        iterations: found.report.iterations + usize::from(interpolated.is_some()),
+        iterations: found.report.iterations,
         status: found.report.outcome.name(),
         errors: found.report.last(),
         tolerance,
@@ -159,12 +158,11 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
 
 /// How far the limit points of control points are from those interpolated.
 fn limit_errors(input: &Input, marks: Option<&[bool]>, control: &[DVec3]) -> Result<Errors> {
-    let operator = Operator::new(&input.surface, input.scheme).map_err(|e| input.named(e))?;
+    let surface = input.surface.with_positions(control.to_vec());
+    let limits = limit_points(&surface, input.scheme).map_err(|e| input.named(e))?;
     let points = input.surface.positions();
-    let mut distances = vec![0.0; points.len()];
-    Rows::new(points.len()).residual(&operator, points, control, &mut distances, |_, e, out, _| *out = e.length());
-    let marked = distances.iter().enumerate().filter(|(v, _)| marks.is_none_or(|m| m[*v]));
-    let distances: Vec<f64> = marked.map(|(_, d)| *d).collect();
+    let marked = (0..points.len()).filter(|&v| marks.is_none_or(|m| m[v]));
+    let distances: Vec<f64> = marked.map(|v| limits[v].distance(points[v])).collect();
     Ok(Errors {
         max: distances.iter().copied().fold(0.0, f64::max),
         mean: distances.iter().sum::<f64>() / distances.len() as f64,

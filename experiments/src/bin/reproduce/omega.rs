@@ -89,7 +89,8 @@ fn one(context: &mut Context, subject: &Subject, scheme: Scheme) -> Result<Sweep
     let grids: Vec<(Method, Vec<f64>)> = METHODS.iter().map(|&m| (m, study::default_grid(m))).collect();
     let size = subject.surface.diagonal();
     let stop = Stop { tolerance: TOLERANCE * size, max_iterations: LIMIT };
-    let found = sweep(&system, subject.surface.positions(), &grids, None, &stop, rounding_floor(size), &|_| {})?;
+    let points = subject.surface.positions();
+    let found = sweep(&system, (points, points), &grids, None, &stop, rounding_floor(size), &|_| {})?;
     let stem = format!("{}--{}-{scheme}", SWEEPS.id, subject.name.replace([':', ' '], "-"));
     let title = format!("{} under {scheme}", subject.name);
     let about = format!(

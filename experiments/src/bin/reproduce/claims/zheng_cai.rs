@@ -8,8 +8,7 @@ use glam::DVec3;
 use limitlab::Result;
 use limitlab::analysis::order_study::order_study;
 use limitlab::analysis::spectral_radius::sweep_radius;
-use limitlab::assemble::LimitSystem;
-use limitlab::interpolate::subset::Restriction;
+use limitlab::assemble::{LimitSystem, Stages};
 use limitlab::interpolate::zheng_cai::{Constraints, PhaseOne, interpolate};
 use limitlab::mesh::Surface;
 use limitlab::mesh::order::Order;
@@ -419,7 +418,7 @@ fn nasri_non_singular(lab: &Lab) -> Result<Finding> {
             let whole = ends(&system)?;
             // Every third vertex interpolated: a principal submatrix.
             let marks: Vec<bool> = (0..system.len()).map(|v| v % 3 == 0).collect();
-            let part = ends(&Restriction::new(&system, &marks)?.system)?;
+            let part = ends(Stages::new(&subject.surface, Scheme::Nasri, Some(&marks))?.block())?;
             Ok([whole.min, whole.max, part.min, part.max])
         })
     };
@@ -447,8 +446,7 @@ fn subset(lab: &Lab) -> Result<Finding> {
         let constraints = Constraints { interpolated: Some(&marks), ..Constraints::default() };
         let phase = PhaseOne { max_iterations: 500, eps: 1e-12, ..PhaseOne::default() };
         let done = interpolate(&subject.surface, &constraints, &phase)?;
-        let system = subject.system(Scheme::ZhengCai)?;
-        let part = ends(&Restriction::new(&system, &marks)?.system)?;
+        let part = ends(Stages::new(&subject.surface, Scheme::ZhengCai, Some(&marks))?.block())?;
         let free = (0..marks.len()).filter(|&v| !marks[v]);
         let moved = free.map(|v| done.auxiliary.surface.positions()[v].distance(subject.surface.positions()[v]));
         let held = (0..marks.len()).filter(|&v| marks[v]);

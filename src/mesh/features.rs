@@ -1,0 +1,259 @@
+//! Creases, corners and boundaries: which rule every vertex of an open or creased mesh follows, and the curves along which
+//! sharp edges run.
+//!
+//! Conventions are those of OpenSubdiv and USD. Boundary edges are sharp, and so are edges and vertices that are tagged
+//! with a sharpness of [`SHARP`] or more. With k sharp edges, a vertex is smooth (k = 0), a *dart* (1), on a *crease* (2) or a
+//! *corner* (3 and more, or tagged itself).
+
+use glam::DVec3;
+
+use super::incidence::next_in;
+use super::validate::Boundary;
+use super::{Faces, Surface, Topology};
+use crate::error::{Error, Result, short};
+use crate::parallel;
+
+/// From this sharpness on, an edge or vertex is sharp at every level of refinement.
+pub const SHARP: f64 = 10.0;
+/// Vertices of one task.
+const CHUNK: usize = 4096;
+
+/// What is sharp beside the boundary, and what the boundary is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tags {
+    /// What boundary edges are.
+    pub boundary: Boundary,
+    /// Sharp edges by their ends, with their sharpness. Of an edge that is named twice the greater one counts.
+    pub creases: Vec<([u32; 2], f64)>,
+    /// Sharp vertices with their sharpness.
+    pub corners: Vec<(u32, f64)>,
+}
+
+/// The rule that a vertex follows at every level of refinement.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Rule {
+    /// No sharp edge.
+    #[default]
+    Smooth,
+    /// One sharp edge ends here.
+    Dart,
+    /// Two sharp edges: a point of a curve.
+    Crease,
+    /// It rests.
+    Corner,
+}
+
+/// Sharp edges from one vertex to the next, each inner vertex a [`Rule::Crease`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Curve {
+    /// In order. Of a curve that is not closed, the first and the last are no creases: corners, or darts.
+    pub vertices: Vec<u32>,
+    /// Whether the last vertex is joined to the first, which is a crease too.
+    pub closed: bool,
+}
+
+/// Rules and curves of a mesh.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Features {
+    rules: Vec<Rule>,
+    sharp: Vec<u32>,
+    creased: usize,
+    curves: Vec<Curve>,
+}
+
+impl Features {
+    /// Those of faces with this topology; `None` if all vertices are smooth, or are treated as such. O(N), and O(k log k)
+    /// for k sharp edges.
+    ///
+    /// # Errors
+    /// [`Error::Tag`]: a sharpness that is negative, not a number, or below [`SHARP`] but not 0; an edge or a vertex
+    /// that does not exist; any tag where the boundary is treated as interior.
+    pub fn new(faces: &Faces, topology: &Topology, tags: &Tags) -> Result<Option<Self>> {
+        let mut sharp = Vec::new();
+        for &(ends, sharpness) in &tags.creases {
+            let edge = || format!("edge {}\u{2013}{}", ends[0], ends[1]);
+            let side = topology.half_edge(faces, ends);
+            let side = side.ok_or_else(|| Error::Tag(format!("{} does not exist", edge())))?;
+            if is_sharp(sharpness).map_err(|what| Error::Tag(format!("{} {what}", edge())))? {
+                sharp.push(topology.twin(side).map_or(side, |twin| twin.min(side)));
+            }
+        }
+        let n = topology.incidence.vertices();
+        let mut resting = Vec::new();
+        for &(v, sharpness) in &tags.corners {
+            if v as usize >= n {
+                return Err(Error::Tag(format!("vertex {v} does not exist: there are {n}")));
+            }
+            if is_sharp(sharpness).map_err(|what| Error::Tag(format!("vertex {v} {what}")))? {
+                resting.push(v);
+            }
+        }
+        match tags.boundary {
+            Boundary::AsInterior if !(sharp.is_empty() && resting.is_empty()) => {
+                let what =
+                    "sharp edges and vertices, and a boundary that is treated as interior, contradict each other";
+                return Err(Error::Tag(what.into()));
+            }
+            Boundary::AsInterior => return Ok(None),
+            Boundary::EdgeAndCorner | Boundary::EdgeOnly | Boundary::Refuse => {}
+        }
+        sharp.extend_from_slice(topology.boundary_half_edges());
+        sharp.sort_unstable();
+        sharp.dedup();
+        if sharp.is_empty() && resting.is_empty() {
+            return Ok(None);
+        }
+        let corners = faces.corners();
+        let end = |c: u32| corners[next_in(&faces.range(topology.incidence.face_of(c)), c) as usize];
+        let mut pairs: Vec<[u32; 2]> =
+            sharp.iter().flat_map(|&c| [[corners[c as usize], end(c)], [end(c), corners[c as usize]]]).collect();
+        pairs.sort_unstable();
+        let mut rules = vec![Rule::Smooth; n];
+        for at in pairs.chunk_by(|a, b| a[0] == b[0]) {
+            rules[at[0][0] as usize] = match at.len() {
+                1 => Rule::Dart,
+                2 => Rule::Crease,
+                _ => Rule::Corner,
+            };
+        }
+        if tags.boundary == Boundary::EdgeAndCorner {
+            for &c in topology.boundary_half_edges() {
+                let v = corners[c as usize] as usize;
+                if topology.incidence.face_count(v) == 1 {
+                    rules[v] = Rule::Corner;
+                }
+            }
+        }
+        for v in resting {
+            rules[v as usize] = Rule::Corner;
+        }
+        let curves = curves(&pairs, &rules);
+        let creased = sharp.len() - topology.boundary_edges();
+        Ok(Some(Features { rules, sharp, creased, curves }))
+    }
+
+    /// The rule of every vertex.
+    pub fn rules(&self) -> &[Rule] {
+        &self.rules
+    }
+
+    /// Whether a vertex is smooth.
+    pub fn is_smooth(&self, v: usize) -> bool {
+        self.rules[v] == Rule::Smooth
+    }
+
+    /// One half-edge of each sharp edge, ascending: the only one, or that of the smaller index.
+    pub fn sharp_half_edges(&self) -> &[u32] {
+        &self.sharp
+    }
+
+    /// The number of sharp edges with two faces.
+    pub fn creased_edges(&self) -> usize {
+        self.creased
+    }
+
+    /// The curves that have inner vertices.
+    pub fn curves(&self) -> &[Curve] {
+        &self.curves
+    }
+
+    /// How many vertices follow a rule.
+    pub fn count(&self, rule: Rule) -> usize {
+        let counts =
+            parallel::map(self.rules.len(), CHUNK, |range| self.rules[range].iter().filter(|&&r| r == rule).count());
+        counts.into_iter().sum()
+    }
+}
+
+/// Whether a sharpness is one for ever; or what is wrong with it, as the rest of a sentence.
+pub(super) fn is_sharp(sharpness: f64) -> std::result::Result<bool, String> {
+    if sharpness >= SHARP {
+        return Ok(true);
+    }
+    if sharpness == 0.0 {
+        return Ok(false);
+    }
+    let sharpness = short(sharpness);
+    Err(match sharpness.starts_with(['-', 'N']) {
+        true => format!("has the sharpness {sharpness}: a number from 0 on is needed"),
+        false => format!(
+            "has the sharpness {sharpness}: semi-sharp edges and vertices have no rows here yet; give {SHARP} or more for \
+             a sharp one, 0 for a smooth one"
+        ),
+    })
+}
+
+/// The edges with two faces whose normals differ by more than `degrees`, by their ends. O(corners).
+///
+/// ```
+/// use limitlab::mesh::{Surface, builtin, features::creases_by_angle};
+/// let cube = Surface::new(builtin::builtin("cube")?)?;
+/// assert_eq!(creases_by_angle(&cube, 60.0).len(), 12);
+/// assert!(creases_by_angle(&cube, 95.0).is_empty());
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn creases_by_angle(surface: &Surface, degrees: f64) -> Vec<[u32; 2]> {
+    let (faces, topology, points) = (surface.faces(), surface.topology(), surface.positions());
+    let normals = parallel::collect(faces.len(), |f| {
+        // Newell's: twice the area, of faces that are not flat too.
+        let face = faces.face(f);
+        let origin = points[face[0] as usize];
+        let fan = face.windows(2).map(|w| (points[w[0] as usize] - origin).cross(points[w[1] as usize] - origin));
+        fan.sum::<DVec3>()
+    });
+    let incidence = &topology.incidence;
+    let corners = faces.corners();
+    let sharp = parallel::flat_map(corners.len(), CHUNK, |range| {
+        let side = |c: u32| {
+            let twin = topology.twin(c).filter(|&twin| c < twin)?;
+            let [a, b] = [c, twin].map(|c| normals[incidence.face_of(c)]);
+            let angle = a.cross(b).length().atan2(a.dot(b)).to_degrees();
+            let is_sharp = a != DVec3::ZERO && b != DVec3::ZERO && angle > degrees;
+            let end = next_in(&faces.range(incidence.face_of(c)), c);
+            is_sharp.then(|| [corners[c as usize], corners[end as usize]])
+        };
+        range.filter_map(|c| side(c as u32)).collect()
+    });
+    sharp
+}
+
+/// The curves along sharp edges, of which `pairs` holds both directions, in order.
+fn curves(pairs: &[[u32; 2]], rules: &[Rule]) -> Vec<Curve> {
+    let mut places = vec![0u32; rules.len()];
+    for (k, pair) in pairs.iter().enumerate().rev() {
+        places[pair[0] as usize] = k as u32;
+    }
+    let is_crease = |v: u32| rules[v as usize] == Rule::Crease;
+    let mut seen = vec![false; rules.len()];
+    // On from `from` over the crease `v`, to the first vertex that is none, or was seen.
+    let mut walk = |from: u32, v: u32, vertices: &mut Vec<u32>| {
+        let (mut last, mut here) = (from, v);
+        while is_crease(here) && !std::mem::replace(&mut seen[here as usize], true) {
+            vertices.push(here);
+            let place = places[here as usize] as usize;
+            let [first, second] = [pairs[place][1], pairs[place + 1][1]];
+            (last, here) = (here, if first == last { second } else { first });
+        }
+        here
+    };
+    let mut found = Vec::new();
+    for &[end, v] in pairs.iter().filter(|pair| !is_crease(pair[0]) && is_crease(pair[1])) {
+        let mut vertices = vec![end];
+        let last = walk(end, v, &mut vertices);
+        // Otherwise it was found from its other end.
+        if vertices.len() > 1 {
+            vertices.push(last);
+            found.push(Curve { vertices, closed: false });
+        }
+    }
+    for &[v, next] in pairs.iter().filter(|pair| is_crease(pair[0])) {
+        let mut vertices = Vec::new();
+        // Begun as if it came from the one neighbour, it goes on to the other.
+        walk(next, v, &mut vertices);
+        if !vertices.is_empty() {
+            found.push(Curve { vertices, closed: true });
+        }
+    }
+    found
+}
