@@ -5,6 +5,7 @@ mod common;
 mod files;
 mod fuzz;
 mod meshes;
+mod open;
 mod operator;
 mod pipelines;
 mod schemes;
