@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 
+use super::limit_points;
 use super::normals::{Rotation, rotate_rings};
 use super::zheng_cai::{Constraints, FirstRefinement};
 use crate::mesh::Surface;
@@ -85,7 +86,7 @@ pub fn surface(control: Surface, scheme: Scheme, points: &[DVec3], request: &Req
             Some(_) => Some(Rule::DooSabin),
             None => None,
         };
-        let scheme = scheme.refinement();
+        let (system, scheme) = (scheme, scheme.refinement());
         let fine = &made.surface;
         if request.normals {
             made.normals = Some(match rule {
@@ -95,6 +96,7 @@ pub fn surface(control: Surface, scheme: Scheme, points: &[DVec3], request: &Req
         }
         if request.limit {
             let limits = match rule {
+                _ if fine.features().is_some() => limit_points(fine, system)?,
                 Some(rule) => doo_sabin::limit_positions(rule, fine)?,
                 None => scheme.limit_positions(fine)?,
             };

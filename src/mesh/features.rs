@@ -204,7 +204,7 @@ pub fn creases_by_angle(surface: &Surface, degrees: f64) -> Vec<[u32; 2]> {
     });
     let incidence = &topology.incidence;
     let corners = faces.corners();
-    let sharp = parallel::flat_map(corners.len(), CHUNK, |range| {
+    parallel::flat_map(corners.len(), CHUNK, |range| {
         let side = |c: u32| {
             let twin = topology.twin(c).filter(|&twin| c < twin)?;
             let [a, b] = [c, twin].map(|c| normals[incidence.face_of(c)]);
@@ -214,8 +214,7 @@ pub fn creases_by_angle(surface: &Surface, degrees: f64) -> Vec<[u32; 2]> {
             is_sharp.then(|| [corners[c as usize], corners[end as usize]])
         };
         range.filter_map(|c| side(c as u32)).collect()
-    });
-    sharp
+    })
 }
 
 /// The curves along sharp edges, of which `pairs` holds both directions, in order.

@@ -25,6 +25,7 @@ pub mod surface;
 pub mod topology;
 pub mod validate;
 pub mod vertex_data;
+pub mod weld;
 
 use std::sync::OnceLock;
 

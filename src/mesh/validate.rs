@@ -177,12 +177,14 @@ impl Validation {
         format!("{}; {}", groups.join("; "), self.advice(first.kind))
     }
 
-    /// Whether the first kind of defects is a boundary, and the mesh would be valid, and one of triangles, if boundary vertices
-    /// were [treated as interior](Boundary::AsInterior).
-    pub fn boundary_could_be_interior(&self) -> bool {
-        let open = self.defects.first().is_some_and(|d| d.kind == DefectKind::BoundaryEdge);
-        let triangles = self.counts.as_ref().is_some_and(|c| c.max_face_size == 3);
-        open && triangles && !self.totals().contains_key(&DefectKind::LowValence)
+    /// Whether a boundary that is [refused](Boundary::Refuse) is all that is wrong, vertices of valence 2 aside, which an
+    /// open mesh may have.
+    pub fn is_open_only(&self) -> bool {
+        let least = self.counts.as_ref().map_or(0, |c| c.min_valence);
+        let kinds = self.totals();
+        kinds.contains_key(&DefectKind::BoundaryEdge)
+            && kinds.keys().all(|kind| matches!(kind, DefectKind::BoundaryEdge | DefectKind::LowValence))
+            && least >= Boundary::EdgeAndCorner.least_valence()
     }
 
     fn advice(&self, kind: DefectKind) -> String {

@@ -65,7 +65,7 @@ fn vertices_that_are_joined_twice_are_refused() {
 #[test]
 fn an_open_mesh_needs_masks_of_edges_alone() {
     let Error::Defects(report) = Surface::new(open_torus()).unwrap_err() else { panic!("an open mesh") };
-    assert!(report.boundary_could_be_interior());
+    assert!(report.is_open_only());
     let surface = Surface::examined(open_torus(), None, Boundary::AsInterior).unwrap();
     for scheme in [Scheme::CatmullClark, Scheme::Nasri, Scheme::ZhengCai] {
         let error = refused(&surface, scheme);

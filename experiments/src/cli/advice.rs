@@ -3,8 +3,8 @@
 use limitlab::analysis::failed::Failed;
 use limitlab::error::{Error, one_of};
 use limitlab::mesh::Surface;
-use limitlab::mesh::validate::Validation;
-use limitlab::schemes::{Masks, Scheme, SingularSet};
+use limitlab::mesh::validate::{Boundary, Validation};
+use limitlab::schemes::{Scheme, SingularSet};
 use limitlab::solvers::Outcome;
 
 /// What a singular system leaves to do, whatever the points.
@@ -14,8 +14,8 @@ const ANOTHER_SYSTEM: &str = "use --scheme nasri, which is never singular, or --
 /// The defects of a mesh, and the flags that would do without mending them.
 pub fn of_defects(report: &Validation) -> String {
     let line = report.summary_line();
-    match report.boundary_could_be_interior() {
-        true => format!("{line}, or use --boundary as-interior with --scheme loop or sqrt3"),
+    match report.is_open_only() {
+        true => format!("{line}, or leave out --boundary refuse"),
         false => line,
     }
 }
@@ -28,9 +28,8 @@ pub fn of_error(error: &Error, surface: &Surface) -> String {
         Error::NotTriangles { .. } if surface.is_closed() => {
             with(format!(" or use --scheme {}", names(|s| !s.needs_triangles())))
         }
-        Error::Open { .. } if surface.faces().uniform_size() == Some(3) => {
-            let regular = |s: Scheme| s.edges_only() && s.singular_set() == SingularSet::Never;
-            with(format!(", or use --boundary as-interior with --scheme {}", names(regular)))
+        Error::Open { .. } if surface.boundary() == Boundary::AsInterior => {
+            with(", or use --boundary edge-and-corner".into())
         }
         Error::NotOffered { what, schemes } => format!("{what}: use --scheme {}", one_of(schemes)),
         Error::TooFewLevels { needed, .. } => with(format!(": use --subdivide {needed} or more")),
@@ -108,20 +107,15 @@ mod tests {
 
         let report = Surface::examined(opened("icosphere:1"), None, Boundary::Refuse).unwrap_err();
         let line = of_defects(&report);
-        assert!(
-            line.ends_with("stitch the faces, or use --boundary as-interior with --scheme loop or sqrt3"),
-            "{line}"
-        );
+        assert!(line.ends_with("stitch the faces, or leave out --boundary refuse"), "{line}");
         let open = Surface::examined(opened("icosphere:1"), None, Boundary::AsInterior).unwrap();
         let line = refused(&open, Scheme::CatmullClark);
-        assert!(line.ends_with("close the holes, or use --boundary as-interior with --scheme loop or sqrt3"), "{line}");
+        assert!(line.ends_with("close the holes, or use --boundary edge-and-corner"), "{line}");
         assert!(LimitSystem::new(&open, Scheme::Loop).is_ok());
 
-        // Of quads: no scheme would do, and none is named.
-        let report = Surface::examined(opened("torus:5x4"), None, Boundary::Refuse).unwrap_err();
-        assert!(of_defects(&report).ends_with("stitch the faces"));
+        // Of quads: no other scheme would do as interior, and none is named.
         let open = Surface::examined(opened("torus:5x4"), None, Boundary::AsInterior).unwrap();
-        assert!(refused(&open, Scheme::CatmullClark).ends_with("close the holes"));
+        assert!(refused(&open, Scheme::CatmullClark).ends_with("or use --boundary edge-and-corner"));
         assert!(refused(&open, Scheme::Loop).ends_with("triangulate the mesh"));
     }
 }

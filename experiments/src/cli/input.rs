@@ -17,7 +17,8 @@ use limitlab::mesh::frame::Frame;
 use limitlab::mesh::io::{self, Loaded, has_mesh_ending};
 use limitlab::mesh::noise::{Noise, move_vertices};
 use limitlab::mesh::validate::{Boundary, seams, validate};
-use limitlab::mesh::{Surface, bounding_box, builtin, vertex_data};
+use limitlab::mesh::weld::{Welded, weld};
+use limitlab::mesh::{Faces, Mesh, Surface, bounding_box, builtin, vertex_data};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::Stop;
 
@@ -34,6 +35,9 @@ pub struct MeshFlags {
     /// (the curve is smooth there), as-interior (boundary vertices as interior ones: loop, sqrt3 and mid-edge only) or refuse
     #[arg(long, value_name = "RULE")]
     pub boundary: Option<Boundary>,
+    /// Make one vertex of those at the same position: seams are closed; the control mesh keeps the file's vertices
+    #[arg(long)]
+    pub weld: bool,
     /// Sharp edges: a file with lines `a b sharpness`, vertices numbered from 0; 10 and more is sharp for ever
     #[arg(long, value_name = "FILE")]
     pub creases: Option<PathBuf>,
@@ -59,6 +63,8 @@ pub struct Input {
     /// Where the file's own points lie: all lengths of this mesh times [`Frame::scale`] are in mesh units.
     pub frame: Frame,
     pub scheme: Scheme,
+    /// Where the vertices of the file went, and its faces, with --weld.
+    pub welded: Option<(Vec<u32>, Faces)>,
     /// Reading the file or making the built-in mesh.
     pub read_seconds: f64,
     /// Validation and topology.
@@ -151,7 +157,8 @@ impl MeshFlags {
         let loaded = self.loaded(name, common)?;
         let read_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let Loaded { mesh, lines, .. } = loaded;
+        let Loaded { mut mesh, mut lines, .. } = loaded;
+        let welded = self.weld.then(|| self.welded(name, &mut mesh, &mut lines, common)).flatten();
         let surface = Surface::examined(mesh, numbers(&lines), self.rule()).map_err(|report| {
             report.remarks.iter().for_each(|remark| common.remark(format_args!("{name}: {remark}")));
             Error::mesh(name, advice::of_defects(&report))
@@ -179,9 +186,40 @@ impl MeshFlags {
             surface,
             frame,
             scheme,
+            welded,
             read_seconds,
             check_seconds: start.elapsed().as_secs_f64(),
         })
+    }
+
+    /// Makes one vertex of those at the same position, unless a face names a vertex that is not there, which validation
+    /// tells.
+    fn welded(
+        &self,
+        name: &str,
+        mesh: &mut Mesh,
+        lines: &mut Option<io::Lines>,
+        common: &CommonFlags,
+    ) -> Option<(Vec<u32>, Faces)> {
+        let n = mesh.len();
+        if mesh.faces.corners().iter().any(|&v| v as usize >= n) {
+            return None;
+        }
+        let Welded { mesh: joined, place } = weld(mesh);
+        let faces = std::mem::replace(mesh, joined).faces;
+        if let Some(lines) = lines {
+            // The line of the first vertex at each position.
+            let mut next = 0;
+            let first = (0..n).filter(|&v| {
+                place[v] == next && {
+                    next += 1;
+                    true
+                }
+            });
+            lines.vertices = first.map(|v| lines.vertices[v]).collect();
+        }
+        common.remark(format_args!("{name}: {n} vertices at {} positions", mesh.len()));
+        Some((place, faces))
     }
 
     /// What boundary edges are.
@@ -192,15 +230,15 @@ impl MeshFlags {
     /// The mesh with the sharp edges and vertices that are asked for; refused if it is open by a seam, unless that is
     /// wanted.
     fn with_features(&self, name: &str, surface: Surface) -> Result<Surface> {
-        if let (None, Some((edges, [a, b]))) = (self.boundary, seams(&surface))
-            && edges == surface.boundary_edges()
-        {
+        if let (None, Some((edges, [a, b]))) = (self.boundary, seams(&surface)) {
+            let all = surface.boundary_edges();
+            let of = if edges == all { format!("all {all}") } else { format!("{edges} of {all}") };
+            let which = if self.weld { "" } else { "use --weld to make one of them, or " };
             return Err(Error::mesh(
                 name,
                 format!(
-                    "all {edges} boundary edges lie on each other (first: vertices {a} and {b}): a seam of duplicate \
-                     vertices at the same positions, no opening; merge them, or use --boundary edge-and-corner to keep \
-                     it open"
+                    "{of} boundary edges lie on each other (first: vertices {a} and {b}): a seam of duplicate vertices \
+                     at the same positions, no opening; {which}use --boundary edge-and-corner to keep it open"
                 ),
             ));
         }

@@ -293,6 +293,7 @@ mod tests {
             creases: None,
             corners: None,
             crease_angle: None,
+            weld: false,
             defects: false,
         };
         let common = CommonFlags { threads: None, quiet: true };

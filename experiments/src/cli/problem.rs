@@ -106,8 +106,8 @@ pub struct Problem {
 
 /// Where a system comes from.
 enum Source {
-    Mesh(Surface, Scheme, Stages),
-    Folder(LimitSystem),
+    Mesh(Surface, Scheme, Box<Stages>),
+    Folder(Box<LimitSystem>),
 }
 
 impl Problem {
@@ -164,6 +164,7 @@ impl MeshFlags {
             ("--creases", self.creases.is_some()),
             ("--corners", self.corners.is_some()),
             ("--crease-angle", self.crease_angle.is_some()),
+            ("--weld", self.weld),
         ];
         if let Some((flag, _)) = flags.into_iter().find(|f| f.1) {
             return refuse(format!("{flag} is about a mesh, and this is a system without one: leave it out"));
@@ -212,7 +213,7 @@ impl MeshFlags {
             order: numbers,
             scale: given.frame.scale(),
             subject: given.subject,
-            source: Source::Folder(given.system),
+            source: Source::Folder(Box::new(given.system)),
             start: given.points.clone(),
             points: given.points,
         })
@@ -229,6 +230,6 @@ fn of_mesh(input: Input, stop: &StopFlags, order: Order) -> Result<Problem> {
         start: stages.restricted(&known),
         order: stages.order(&order.order(input.surface.mesh(), input.surface.incidence())),
         scale: input.frame.scale(),
-        source: Source::Mesh(input.surface, input.scheme, stages),
+        source: Source::Mesh(input.surface, input.scheme, Box::new(stages)),
     })
 }

@@ -12,10 +12,12 @@ use std::time::Instant;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser};
 
+use glam::DVec3;
+
 use limitlab::Result;
 use limitlab::error::Error;
-use limitlab::mesh::io;
 use limitlab::mesh::order::Order;
+use limitlab::mesh::{Mesh, io};
 use limitlab::output::{allow_replacing, check_target};
 use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::Method;
@@ -235,11 +237,19 @@ fn run(arguments: &Arguments) -> Result<()> {
     require_finite(&input, &result.made)?;
 
     let start = Instant::now();
-    let normals = result.made.normals.as_deref();
     if in_place {
         allow_replacing(&arguments.output)?;
     }
-    io::write(&arguments.output, result.made.surface.mesh(), normals)?;
+    let made = &result.made;
+    match input.welded.as_ref().filter(|_| made.surface.len() == input.surface.len()) {
+        None => io::write(&arguments.output, made.surface.mesh(), made.normals.as_deref())?,
+        // The file's own vertices and faces, one position for each that was made one.
+        Some((place, faces)) => {
+            let spread = |values: &[DVec3]| -> Vec<DVec3> { place.iter().map(|&v| values[v as usize]).collect() };
+            let mesh = Mesh::new(spread(made.surface.positions()), faces.clone());
+            io::write(&arguments.output, &mesh, made.normals.as_deref().map(spread).as_deref())?;
+        }
+    }
     result.seconds.write = start.elapsed().as_secs_f64();
     tell(arguments, &input, &wishes, &result)
 }

@@ -1,0 +1,52 @@
+//! Welding: vertices at the same position become one, as seams ask for that an exporter has left.
+
+use rayon::slice::ParallelSliceMut;
+
+use super::{Faces, Mesh};
+
+/// A mesh without vertices at the same position, and where those of the original went.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Welded {
+    /// In the order of the first vertex at each position; the faces, corner for corner.
+    pub mesh: Mesh,
+    /// The new number of every old vertex.
+    pub place: Vec<u32>,
+}
+
+/// Joins vertices whose coordinates are equal, zeros of either sign alike. A face may name a vertex twice then: the validator
+/// tells. O(N log N), in parallel.
+///
+/// ```
+/// use limitlab::mesh::{Faces, Mesh, weld::weld};
+/// use glam::DVec3;
+/// // Two triangles side by side, with vertices of their own.
+/// let points = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X, DVec3::ONE, DVec3::Y];
+/// let welded = weld(&Mesh::new(points, Faces::from_lists([[0, 1, 2], [3, 4, 5]])));
+/// assert_eq!(welded.place, [0, 1, 2, 1, 3, 2]);
+/// assert_eq!(welded.mesh.faces.face(1), [1, 3, 2]);
+/// ```
+///
+/// # Panics
+/// If a face names a vertex that is not there.
+pub fn weld(mesh: &Mesh) -> Welded {
+    let key = |v: u32| mesh.positions[v as usize].to_array().map(|x| (x + 0.0).to_bits());
+    let mut sorted: Vec<u32> = (0..mesh.len() as u32).collect();
+    sorted.par_sort_unstable_by_key(|&v| (key(v), v));
+    let mut first = vec![0u32; mesh.len()];
+    for group in sorted.chunk_by(|&a, &b| key(a) == key(b)) {
+        group.iter().for_each(|&v| first[v as usize] = group[0]);
+    }
+    let mut place = vec![0u32; mesh.len()];
+    let mut positions = Vec::with_capacity(mesh.len());
+    for v in 0..mesh.len() {
+        let lead = first[v] as usize;
+        // The first of a group comes before the others.
+        place[v] = if lead == v { positions.len() as u32 } else { place[lead] };
+        if lead == v {
+            positions.push(mesh.positions[v]);
+        }
+    }
+    let mut faces: Faces = mesh.faces.clone();
+    faces.corners_mut().iter_mut().for_each(|v| *v = place[*v as usize]);
+    Welded { mesh: Mesh::new(positions, faces), place }
+}
