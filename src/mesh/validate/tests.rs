@@ -98,12 +98,12 @@ fn an_open_mesh_is_refused_or_treated_as_interior() {
     open.faces = Faces::from_lists(open.faces.iter().skip(1));
     let report = refuse(&open);
     assert_eq!(kinds(&report), [(DefectKind::BoundaryEdge, 3)]);
-    assert!(report.boundary_could_be_interior());
-    // Which works on triangles only.
-    let mut open_cube = builtin::torus(4, 5);
-    open_cube.faces = Faces::from_lists(open_cube.faces.iter().skip(1));
-    let line = refuse(&open_cube).summary_line();
-    assert!(line.contains("4 boundary edges") && !line.contains("as-interior"), "{line}");
+    assert!(report.is_open_only());
+    let sharp = validate(&open, None, Boundary::EdgeAndCorner);
+    assert!(sharp.is_valid() && sharp.remarks[0].starts_with("3 boundary edges in 1 loop: they are sharp"));
+    let mut twice = open.clone();
+    twice.faces.push(&[0, 1, 1]);
+    assert!(!refuse(&twice).is_open_only());
     let report = validate(&open, None, Boundary::AsInterior);
     assert!(report.is_valid());
     assert_eq!(report.remarks, ["3 boundary edges in 1 loop: boundary vertices are treated as interior"]);
@@ -112,6 +112,7 @@ fn an_open_mesh_is_refused_or_treated_as_interior() {
     // A single triangle has valence 2 whatever is made of its boundary.
     let report = validate(&mesh(3, &[&[0, 1, 2]]), None, Boundary::AsInterior);
     assert_eq!(kinds(&report), [(DefectKind::LowValence, 3)]);
+    assert!(validate(&mesh(3, &[&[0, 1, 2]]), None, Boundary::EdgeOnly).is_valid());
 }
 
 #[test]
