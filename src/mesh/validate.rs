@@ -397,9 +397,8 @@ fn boundary_remark(edges: usize, loops: Option<usize>, boundary: Boundary) -> St
 pub(super) fn remarks(surface: &Surface) -> Vec<String> {
     let mut remarks = Vec::new();
     if !surface.is_closed() {
-        let topology = surface.topology();
-        let loops = topology.boundary_loops(surface.faces()).len();
-        remarks.push(boundary_remark(topology.boundary_edges(), Some(loops), surface.boundary()));
+        let (edges, loops) = (surface.boundary_edges(), surface.boundary_loops());
+        remarks.push(boundary_remark(edges, Some(loops), surface.boundary()));
     }
     if let Some(features) = surface.features() {
         let creased = features.creased_edges();
@@ -437,15 +436,15 @@ pub fn seams(surface: &Surface) -> Option<(usize, [u32; 2])> {
     if surface.is_closed() {
         return None;
     }
-    let (topology, faces, points) = (surface.topology(), surface.faces(), surface.positions());
+    let (incidence, faces, points) = (surface.incidence(), surface.faces(), surface.positions());
     // Zeros of either sign are one.
     let key = |v: u32| points[v as usize].to_array().map(|x| (x + 0.0).to_bits());
     let side = |&c: &u32| {
-        let ends = [c, topology.incidence.next(faces, c)].map(|c| faces.corners()[c as usize]);
+        let ends = [c, incidence.next(faces, c)].map(|c| faces.corners()[c as usize]);
         let [a, b] = ends.map(key);
         (a.min(b), a.max(b), c, ends)
     };
-    let mut sides: Vec<_> = topology.boundary_half_edges().iter().map(side).collect();
+    let mut sides: Vec<_> = surface.boundary_half_edges().iter().map(side).collect();
     sides.sort_unstable();
     let groups = sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)).filter(|group| group.len() > 1);
     let (mut count, mut first) = (0, None);
