@@ -66,6 +66,26 @@ pub enum Error {
         /// A way out, as an imperative.
         advice: &'static str,
     },
+    /// A method that needs A = H·M with a symmetric M, on a mesh with darts or semi-sharp vertices.
+    #[error(
+        "vertex {vertex} is a dart or semi-sharp, so that no diagonal makes the matrix symmetric, as {method} needs it; use auto or lu"
+    )]
+    Unsymmetric {
+        /// The first such vertex, from 0.
+        vertex: usize,
+        /// The method by name.
+        method: &'static str,
+    },
+    /// A vertex that is semi-sharp, or at a semi-sharp edge.
+    #[error(
+        "vertex {vertex} is semi-sharp, or ends a semi-sharp edge, and {scheme} has no row for it; give it the sharpness 0, or 10 and more"
+    )]
+    SemiSharp {
+        /// The number of the vertex, from 0.
+        vertex: usize,
+        /// The scheme by name.
+        scheme: &'static str,
+    },
     /// Sharp edges or vertices, where all vertices must be smooth.
     #[error("{what} needs a mesh without creases, corners and boundaries")]
     Creased {

@@ -4,7 +4,8 @@
 //! Theory, on closed meshes with all valences ≥ 3: each scheme has its [`SingularSet`]. Under Catmull-Clark A is singular
 //! exactly when some connected component has all valences 3 and a bipartite edge graph; its null vector is the ±1
 //! colouring. Schemes with positive lower bounds are never singular. A component with a boundary, crease or corner vertex
-//! is none of these: its null vector would vanish there, and with the sums over its edges everywhere.
+//! is none of these: its null vector would vanish there, and with the sums over its edges everywhere. Darts and semi-sharp
+//! vertices alone cure nothing: one step takes the ±1 vector to 0, whatever the sharpness.
 
 use glam::DVec3;
 
@@ -15,6 +16,7 @@ use super::{dense, eigen::Eigenvalue};
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::Surface;
+use crate::mesh::features::Rule;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::schemes::{Scheme, SingularSet};
 use crate::solvers::{Accelerated, Method};
@@ -90,7 +92,7 @@ impl Singularity {
         let mut regular = vec![false; components];
         for v in 0..mesh.len() {
             let bad = valence.is_some_and(|valence| topology.incidence.face_count(v) != valence)
-                || surface.features().is_some_and(|features| !features.is_smooth(v))
+                || surface.features().is_some_and(|f| matches!(f.rules()[v], Rule::Crease | Rule::Corner))
                 || neighbours(surface, v).any(|w| colour[w] == colour[v]);
             if bad {
                 regular[component[v] as usize] = true;

@@ -15,6 +15,7 @@ mod neighbours;
 pub mod operator;
 mod parts;
 pub mod stages;
+pub mod stars;
 pub mod system;
 
 pub use csr::Csr;

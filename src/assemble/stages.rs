@@ -10,6 +10,8 @@
 //!     ⎝ A_SK  A_SC  A_SS ⎠
 //! ```
 //!
+//! At darts and semi-sharp vertices A has [rows of another kind](StarRows), of the last stage too.
+//!
 //! Curves come [first](Curves), exactly and in O(|C|). All faces and edges at a smooth vertex are there, so that its row is
 //! that of a closed mesh, and what is proven of M carries over to M_SS: the valence bounds of the smooth vertices, and, as
 //! null vectors would have to vanish at K and C, no singularity in components that have a vertex there.
@@ -21,6 +23,7 @@ use glam::DVec3;
 use super::bounds::SpectralBounds;
 use super::csr::{Csr, Pattern};
 use super::curves::Curves;
+use super::stars::StarRows;
 use super::system::{LimitSystem, check, rows_of};
 use crate::error::{Error, Result};
 use crate::mesh::Surface;
@@ -56,6 +59,7 @@ use crate::schemes::Scheme;
 pub struct Stages {
     curves: Curves,
     block: LimitSystem,
+    stars: Option<StarRows>,
     part: Option<Part>,
 }
 
@@ -75,14 +79,16 @@ impl Stages {
     /// The stages under `scheme`, with V_j = P_j at vertices that are not marked in `interpolated`. O(corners).
     ///
     /// # Errors
-    /// As [`LimitSystem::new`], but for boundaries and creases; a [dart](Error::Dart); no vertex marked.
+    /// As [`LimitSystem::new`], but for boundaries and creases; darts and semi-sharp edges under schemes that have no rule for
+    /// them; no vertex marked.
     ///
     /// # Panics
     /// If there is not one mark a vertex.
     pub fn new(surface: &Surface, scheme: Scheme, interpolated: Option<&[bool]>) -> Result<Self> {
         check(surface, scheme)?;
         let Some(free) = free(surface, interpolated)? else {
-            return Ok(Stages { curves: Curves::default(), block: LimitSystem::new(surface, scheme)?, part: None });
+            let (curves, block) = (Curves::default(), LimitSystem::new(surface, scheme)?);
+            return Ok(Stages { curves, block, stars: None, part: None });
         };
         let full = rows_of(surface, &scheme, Some(&free))?;
         let vertices: Vec<u32> = (0..surface.len() as u32).filter(|&v| free[v as usize]).collect();
@@ -112,7 +118,8 @@ impl Stages {
             false => SpectralBounds::gershgorin(&diagonal),
         };
         Ok(Stages {
-            curves: curves(surface, scheme, interpolated),
+            curves: Curves::new(surface, scheme, interpolated)?,
+            stars: StarRows::new(surface, scheme, interpolated)?,
             block: LimitSystem { diagonal, bounds, h, m, a },
             part: Some(Part { vertices, rows: full.a }),
         })
@@ -126,6 +133,11 @@ impl Stages {
     /// The curves, C.
     pub fn curves(&self) -> &Curves {
         &self.curves
+    }
+
+    /// The rows at darts and semi-sharp vertices, which belong to the block but are no rows of H·M.
+    pub fn stars(&self) -> Option<&StarRows> {
+        self.stars.as_ref()
     }
 
     /// The number of vertices N.
@@ -159,7 +171,8 @@ impl Stages {
             .map_or_else(|| values.to_vec(), |vertices| vertices.iter().map(|&v| values[v as usize]).collect())
     }
 
-    /// The control points that are known without the block: V at K and C, P at S. O(|C|) beside the copy.
+    /// The control points that are known without the block: V at K and C, P at S, at darts and at semi-sharp vertices. O(|C|)
+    /// beside the copy.
     ///
     /// # Panics
     /// If there is not one point a vertex.
@@ -184,19 +197,31 @@ impl Stages {
     /// The whole of A: rows of curves, of I at known vertices, and those of the smooth ones. O(entries).
     pub fn matrix(&self) -> Csr {
         let Some(part) = &self.part else { return self.block.a.clone() };
-        let mut beside = vec![None; self.len()];
-        self.curves.rows(|v, ends| beside[v] = Some(ends));
-        let w = self.curves.weight();
+        /// Where a row comes from.
+        #[derive(Clone, Copy)]
+        enum Of {
+            Block,
+            Curve(f64, [usize; 2]),
+            Star(usize),
+        }
+        let mut rows = vec![Of::Block; self.len()];
+        self.curves.rows(|v, w, ends| rows[v] = Of::Curve(w, ends));
+        let stars = self.stars.iter().flat_map(|stars| stars.vertices().iter().enumerate());
+        stars.for_each(|(k, &v)| rows[v as usize] = Of::Star(k));
         let mut offsets = Vec::with_capacity(self.len() + 1);
         offsets.push(0u32);
         let (mut columns, mut values) = (Vec::new(), Vec::new());
-        for (v, beside) in beside.iter().enumerate() {
-            match *beside {
-                None => part.rows.row(v).for_each(|(j, a)| {
+        for (v, of) in rows.into_iter().enumerate() {
+            match of {
+                Of::Block => part.rows.row(v).for_each(|(j, a)| {
                     columns.push(j as u32);
                     values.push(a);
                 }),
-                Some([a, b]) => {
+                Of::Star(k) => self.stars.iter().flat_map(|stars| stars.row(k)).for_each(|(j, a)| {
+                    columns.push(j as u32);
+                    values.push(a);
+                }),
+                Of::Curve(w, [a, b]) => {
                     let mut row = vec![(v, 1.0 - 2.0 * w), (a, w)];
                     match a == b {
                         true => row[1].1 += w,
@@ -256,11 +281,6 @@ pub(crate) fn free(surface: &Surface, interpolated: Option<&[bool]>) -> Result<O
             Some((0..surface.len()).map(|v| features.is_smooth(v) && marks.is_none_or(|m| m[v])).collect())
         }
     })
-}
-
-/// The curves of a surface.
-pub(crate) fn curves(surface: &Surface, scheme: Scheme, interpolated: Option<&[bool]>) -> Curves {
-    surface.features().map_or_else(Curves::default, |features| Curves::new(features, scheme, interpolated))
 }
 
 pub(crate) fn nothing() -> Error {

@@ -8,7 +8,6 @@ use super::bounds::SpectralBounds;
 use super::csr::{Csr, Pattern};
 use super::gather::Rows;
 use crate::error::{Error, Result};
-use crate::mesh::features::Rule;
 use crate::mesh::{Faces, Surface};
 use crate::parallel;
 use crate::schemes::{Masks, Scheme};
@@ -133,23 +132,13 @@ pub(super) fn require_one_block(surface: &Surface) -> Result<()> {
     }
 }
 
-/// Refuses faces, boundaries and darts that `scheme` is not defined on.
+/// Refuses faces and boundaries that `scheme` is not defined on.
 pub(super) fn check(surface: &Surface, scheme: Scheme) -> Result<()> {
     let faces = surface.faces();
     if let Some(face) = scheme.first_unsuitable_face(faces) {
         return Err(Error::NotTriangles { face, corners: faces.face(face).len(), scheme: scheme.name() });
     }
-    if let Some(features) = surface.features() {
-        return match features.rules().iter().position(|&rule| rule == Rule::Dart) {
-            Some(vertex) => Err(Error::Dart {
-                vertex,
-                scheme: scheme.name(),
-                advice: "make it a corner, or lead the crease on to a boundary, a corner or another crease",
-            }),
-            None => Ok(()),
-        };
-    }
-    if !surface.is_closed() && !scheme.edges_only() {
+    if !surface.is_closed() && surface.features().is_none() && !scheme.edges_only() {
         return Err(Error::Open { edges: surface.boundary_edges(), scheme: scheme.name() });
     }
     Ok(())

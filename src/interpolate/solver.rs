@@ -22,6 +22,9 @@
 //! V_j = P_j at corners and at vertices that are not interpolated. From these, and P at all others, the unknown is a
 //! difference X, zero where V is known: the rows there are fixed, and A_SS X_S = (P − A V)_S is solved by the same chain.
 //!
+//! *Darts and semi-sharp vertices.* Their rows are not those of H·M. They are held while the others are solved for, and moved by
+//! GMRES on what is left of A at them, a solution of the others for each product; LU of all takes the place of LDLᵀ.
+//!
 //! Direct methods lose at every size tried, by `reports/scaling.md`.
 
 use std::ops::ControlFlow;
@@ -33,17 +36,21 @@ use super::staged;
 use crate::analysis::comparison::with_spectrum;
 use crate::analysis::failed::Failed;
 use crate::analysis::spectrum::spectrum;
+use crate::assemble::bounds::SpectralBounds;
 use crate::assemble::curves::Curves;
-use crate::assemble::stages::{curves, free};
+use crate::assemble::stages::free;
+use crate::assemble::stars::StarRows;
 use crate::assemble::{LimitSystem, Operator, Stages};
 use crate::error::{Error, Result};
 use crate::memory::require;
 use crate::mesh::breadth_first::{in_fronts, in_kinds};
+use crate::mesh::features::Features;
 use crate::mesh::order::Numbering;
 use crate::mesh::{Mesh, Surface, diagonal};
 use crate::parallel;
 use crate::schemes::Scheme;
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
+use crate::solvers::gmres::gmres;
 use crate::solvers::mixed::{self, Workspace};
 use crate::solvers::system::Rows;
 use crate::solvers::{Iterate, Method, Outcome, Report, Solution, Step, Stop, run, solve};
@@ -178,7 +185,9 @@ pub fn interpolate_watched(
         return Ok(found);
     }
     drop(interpolator);
-    let direct = by_method(surface, scheme, marks, Method::Ldlt, &stop, watch)?;
+    let unsymmetric = surface.features().is_some_and(Features::has_stars);
+    let last = if unsymmetric { Method::Lu } else { Method::Ldlt };
+    let direct = by_method(surface, scheme, marks, last, &stop, watch)?;
     Ok(Solution { setup_seconds: setup_seconds + solve_seconds + direct.setup_seconds, ..direct })
 }
 
@@ -221,9 +230,13 @@ pub fn limit_points(surface: &Surface, scheme: Scheme) -> Result<Vec<DVec3>> {
                 *limit = v;
             }
         }
-        let curves = curves(surface, scheme, None);
-        let w = curves.weight();
-        curves.rows(|v, [a, b]| limits[v] = (1.0 - 2.0 * w) * control[v] + w * (control[a] + control[b]));
+        let curves = Curves::new(surface, scheme, None)?;
+        curves.rows(|v, w, [a, b]| limits[v] = (1.0 - 2.0 * w) * control[v] + w * (control[a] + control[b]));
+        if let Some(stars) = StarRows::new(surface, scheme, None)? {
+            for (&v, limit) in stars.vertices().iter().zip(stars.product(control)) {
+                limits[v as usize] = limit;
+            }
+        }
     }
     Ok(limits)
 }
@@ -253,11 +266,30 @@ fn by_method(
 ) -> Result<Solution> {
     let start = Instant::now();
     let stages = Stages::new(surface, scheme, marks)?;
+    if let Some(stars) = stages.stars() {
+        return match method {
+            Method::Lu => lu_of_all(&stages, surface.positions(), stop),
+            _ => Err(Error::Unsymmetric { vertex: stars.vertices()[0] as usize, method: method.name() }),
+        };
+    }
     let order = method.order().map(|order| stages.order(order));
     let block = stages.block();
     let method = with_spectrum(block, method.in_order(order.as_deref()), &|| spectrum(block))?;
     let seconds = start.elapsed().as_secs_f64();
     let mut solution = staged::run_watched(&stages, surface.positions(), method, stop, watch);
+    solution.setup_seconds += seconds;
+    Ok(solution)
+}
+
+/// By LU of the whole matrix, which no diagonal makes symmetric where there are darts and semi-sharp vertices.
+fn lu_of_all(stages: &Stages, points: &[DVec3], stop: &Stop) -> Result<Solution> {
+    let start = Instant::now();
+    let a = stages.matrix();
+    // LU reads the columns of A off the rows of M, as it may where M is symmetric.
+    let (h, m, diagonal) = (vec![1.0; a.len()], a.transpose(), a.diagonal());
+    let bounds = SpectralBounds::gershgorin(&diagonal);
+    let seconds = start.elapsed().as_secs_f64();
+    let mut solution = run(&LimitSystem { h, m, a, diagonal, bounds }, points, Method::Lu, stop);
     solution.setup_seconds += seconds;
     Ok(solution)
 }
@@ -303,6 +335,8 @@ pub struct Interpolator {
     numbering: Option<Numbering>,
     /// What is solved first.
     curves: Curves,
+    /// What is solved with the block, and not by its operator.
+    stars: Option<StarRows>,
     /// By row: those of the block, where some are not.
     free: Option<Vec<bool>>,
     rows: Rows,
@@ -350,7 +384,8 @@ impl Interpolator {
         let workspace = Workspace::new(&operator);
         let [known, points, right, iterate] = [const { Vec::new() }; 4];
         Ok(Interpolator {
-            curves: curves(surface, scheme, interpolated),
+            curves: Curves::new(surface, scheme, interpolated)?,
+            stars: StarRows::new(surface, scheme, interpolated)?,
             rows: Rows::new(surface.len()),
             operator,
             numbering,
@@ -379,6 +414,90 @@ impl Interpolator {
 
     /// As [`solve`](Self::solve), with the name of the method that came to the end.
     fn solve_into(&mut self, points: &[DVec3], control: &mut Vec<DVec3>, stop: &Stop) -> (&'static str, Report) {
+        match self.stars.take() {
+            None => self.solve_block(points, control, stop),
+            Some(stars) => {
+                let found = self.solve_with(&stars, points, control, stop);
+                self.stars = Some(stars);
+                found
+            }
+        }
+    }
+
+    /// With darts and semi-sharp vertices D beside the smooth ones S: `(A_DD − A_DS A_SS⁻¹ A_SD) V_D` is known by a solution
+    /// on S for each product, and V_D is found by GMRES.
+    fn solve_with(
+        &mut self,
+        stars: &StarRows,
+        points: &[DVec3],
+        control: &mut Vec<DVec3>,
+        stop: &Stop,
+    ) -> (&'static str, Report) {
+        /// What the solutions on S are asked for, in parts of what is needed.
+        const PART: f64 = 0.1;
+        /// Relative to a direction of GMRES.
+        const DIRECTION: f64 = 1e-12;
+        const PRODUCTS: usize = 300;
+        /// Rounds of GMRES: the second corrects what the directions' solutions have left.
+        const ROUNDS: usize = 4;
+        let at = |values: &[DVec3]| -> Vec<DVec3> { stars.vertices().iter().map(|&v| values[v as usize]).collect() };
+        let wanted = at(points);
+        let mut held = points.to_vec();
+        if !control.is_empty() {
+            stars.vertices().iter().for_each(|&v| held[v as usize] = control[v as usize]);
+        }
+        let inner = Stop { tolerance: PART * stop.tolerance, ..*stop };
+        let mut history = Vec::new();
+        let mut iterations = 0;
+        let count = points.len() as f64;
+        let mut round = 0;
+        loop {
+            let (method, found) = self.solve_block(&held, control, &inner);
+            iterations += found.iterations;
+            let residual: Vec<DVec3> = wanted.iter().zip(stars.product(control)).map(|(&p, ax)| p - ax).collect();
+            let mut errors = found.last();
+            errors.mean += residual.iter().map(|r| r.length()).sum::<f64>() / count;
+            errors.max =
+                residual.iter().map(|r| r.length()).fold(errors.max, |a, b| if b > a || b.is_nan() { b } else { a });
+            history.push(errors);
+            let met = errors.max <= stop.tolerance;
+            if met || no_progress(found.outcome) || round == ROUNDS {
+                let outcome = match found.outcome {
+                    Outcome::Converged if !met => Outcome::Stagnated,
+                    other => other,
+                };
+                return (method, Report { outcome, iterations, history, detail: found.detail });
+            }
+            let mut moved = Vec::new();
+            let solved = gmres(
+                |direction| {
+                    let mut held = vec![DVec3::ZERO; points.len()];
+                    for (&v, &x) in stars.vertices().iter().zip(direction) {
+                        held[v as usize] = x;
+                    }
+                    moved.clear();
+                    let (_, found) = self.solve_block(&held, &mut moved, &Stop { tolerance: DIRECTION, ..*stop });
+                    iterations += found.iterations;
+                    if no_progress(found.outcome) && !(found.last().max <= DIRECTION.sqrt()) {
+                        return Err(());
+                    }
+                    Ok(stars.product(&moved))
+                },
+                &residual,
+                PART * stop.tolerance / errors.max,
+                PRODUCTS,
+            );
+            if let Ok(solved) = solved {
+                for (&v, &x) in stars.vertices().iter().zip(&solved.solution) {
+                    held[v as usize] += x;
+                }
+            }
+            round += 1;
+        }
+    }
+
+    /// The smooth vertices, all others held.
+    fn solve_block(&mut self, points: &[DVec3], control: &mut Vec<DVec3>, stop: &Stop) -> (&'static str, Report) {
         let n = self.operator.len();
         assert!(points.len() == n && (control.is_empty() || control.len() == n), "one point a vertex");
         let cold = control.is_empty();

@@ -3,7 +3,8 @@
 //!
 //! Conventions are those of OpenSubdiv and USD. Boundary edges are sharp, and so are edges and vertices that are tagged
 //! with a sharpness of [`SHARP`] or more. With k sharp edges, a vertex is smooth (k = 0), a *dart* (1), on a *crease* (2) or a
-//! *corner* (3 and more, or tagged itself).
+//! *corner* (3 and more, or tagged itself). Of less sharpness, edges and vertices are *semi-sharp*: each step of refinement
+//! takes 1 of it.
 
 use glam::DVec3;
 
@@ -36,8 +37,10 @@ pub enum Rule {
     /// No sharp edge.
     #[default]
     Smooth,
-    /// One sharp edge ends here.
+    /// One edge that is sharp for ever ends here.
     Dart,
+    /// Smooth in the end, but for some levels not: an edge is semi-sharp, or the vertex itself.
+    SemiSharp,
     /// Two sharp edges: a point of a curve.
     Crease,
     /// It rests.
@@ -54,12 +57,15 @@ pub struct Curve {
 }
 
 /// Rules and curves of a mesh.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Features {
     rules: Vec<Rule>,
     sharp: Vec<u32>,
     creased: usize,
     curves: Vec<Curve>,
+    /// By half-edge, as in `sharp`, and by vertex.
+    semi_sharp: Vec<(u32, f64)>,
+    semi_sharp_vertices: Vec<(u32, f64)>,
 }
 
 impl Features {
@@ -67,32 +73,40 @@ impl Features {
     /// such. O(N), and O(k log k) for k sharp edges.
     ///
     /// # Errors
-    /// [`Error::Tag`]: a sharpness that is negative, not a number, or below [`SHARP`] but not 0; an edge or a vertex
-    /// that does not exist; any tag where the boundary is treated as interior.
+    /// [`Error::Tag`]: a sharpness that is negative or not a number; an edge or a vertex that does not exist; any tag where
+    /// the boundary is treated as interior.
     pub fn new(faces: &Faces, incidence: &Incidence, boundary: &[u32], tags: &Tags) -> Result<Option<Self>> {
-        let mut sharp = Vec::new();
+        let (mut sharp, mut semi_sharp) = (Vec::new(), Vec::new());
         for &(ends, sharpness) in &tags.creases {
             let edge = || format!("edge {}\u{2013}{}", ends[0], ends[1]);
             let side = incidence.half_edge(faces, ends);
             let side = side.ok_or_else(|| Error::Tag(format!("{} does not exist", edge())))?;
-            if is_sharp(sharpness).map_err(|what| Error::Tag(format!("{} {what}", edge())))? {
-                // The other side too, where there is one.
-                let other = incidence.half_edge(faces, [ends[1], ends[0]]).unwrap_or(side);
-                sharp.push(side.min(other));
+            checked(sharpness).map_err(|what| Error::Tag(format!("{} {what}", edge())))?;
+            // The other side too, where there is one.
+            let side = side.min(incidence.half_edge(faces, [ends[1], ends[0]]).unwrap_or(side));
+            if sharpness >= SHARP {
+                sharp.push(side);
+            } else if sharpness > 0.0 {
+                semi_sharp.push((side, sharpness));
             }
         }
         let n = incidence.vertices();
-        let mut resting = Vec::new();
+        let (mut resting, mut semi_sharp_vertices) = (Vec::new(), Vec::new());
         for &(v, sharpness) in &tags.corners {
             if v as usize >= n {
                 return Err(Error::Tag(format!("vertex {v} does not exist: there are {n}")));
             }
-            if is_sharp(sharpness).map_err(|what| Error::Tag(format!("vertex {v} {what}")))? {
+            checked(sharpness).map_err(|what| Error::Tag(format!("vertex {v} {what}")))?;
+            if sharpness >= SHARP {
                 resting.push(v);
+            } else if sharpness > 0.0 {
+                semi_sharp_vertices.push((v, sharpness));
             }
         }
+        let tagged =
+            !(sharp.is_empty() && resting.is_empty() && semi_sharp.is_empty() && semi_sharp_vertices.is_empty());
         match tags.boundary {
-            Boundary::AsInterior if !(sharp.is_empty() && resting.is_empty()) => {
+            Boundary::AsInterior if tagged => {
                 let what =
                     "sharp edges and vertices, and a boundary that is treated as interior, contradict each other";
                 return Err(Error::Tag(what.into()));
@@ -103,8 +117,14 @@ impl Features {
         sharp.extend_from_slice(boundary);
         sharp.sort_unstable();
         sharp.dedup();
-        if sharp.is_empty() && resting.is_empty() {
+        if sharp.is_empty() && !tagged {
             return Ok(None);
+        }
+        semi_sharp.retain(|(side, _)| sharp.binary_search(side).is_err());
+        for list in [&mut semi_sharp, &mut semi_sharp_vertices] {
+            // Of several the greatest.
+            list.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+            list.dedup_by_key(|entry| entry.0);
         }
         let corners = faces.corners();
         let end = |c: u32| corners[next_in(&faces.range(incidence.face_of(c)), c) as usize];
@@ -130,9 +150,17 @@ impl Features {
         for v in resting {
             rules[v as usize] = Rule::Corner;
         }
+        let ends_of = |&(c, _): &(u32, f64)| [corners[c as usize], end(c)];
+        let semi = semi_sharp.iter().flat_map(ends_of).chain(semi_sharp_vertices.iter().map(|s| s.0));
+        for v in semi {
+            let rule = &mut rules[v as usize];
+            if *rule == Rule::Smooth {
+                *rule = Rule::SemiSharp;
+            }
+        }
         let curves = curves(&pairs, &rules);
         let creased = sharp.len() - boundary.len();
-        Ok(Some(Features { rules, sharp, creased, curves }))
+        Ok(Some(Features { rules, sharp, creased, curves, semi_sharp, semi_sharp_vertices }))
     }
 
     /// The rule of every vertex.
@@ -150,6 +178,47 @@ impl Features {
         &self.sharp
     }
 
+    /// The semi-sharp edges, as [`sharp_half_edges`](Self::sharp_half_edges), with their sharpness.
+    pub fn semi_sharp_edges(&self) -> &[(u32, f64)] {
+        &self.semi_sharp
+    }
+
+    /// The semi-sharp vertices, ascending, with their sharpness.
+    pub fn semi_sharp_vertices(&self) -> &[(u32, f64)] {
+        &self.semi_sharp_vertices
+    }
+
+    /// The sharpness of the edge with this half-edge, of the two the smaller one; [`SHARP`] if it is sharp for ever.
+    pub fn sharpness(&self, side: u32) -> f64 {
+        if self.sharp.binary_search(&side).is_ok() {
+            return SHARP;
+        }
+        let found = self.semi_sharp.binary_search_by_key(&side, |s| s.0);
+        found.map_or(0.0, |at| self.semi_sharp[at].1)
+    }
+
+    /// The sharpness of a vertex by itself: [`SHARP`] at a corner.
+    pub fn vertex_sharpness(&self, v: u32) -> f64 {
+        if self.rules[v as usize] == Rule::Corner {
+            return SHARP;
+        }
+        let found = self.semi_sharp_vertices.binary_search_by_key(&v, |s| s.0);
+        found.map_or(0.0, |at| self.semi_sharp_vertices[at].1)
+    }
+
+    /// The vertices on curves where a semi-sharp edge ends, or that are semi-sharp themselves, ascending, with their rule.
+    pub(crate) fn semi_sharp_on_curves(&self, surface: &Surface) -> Vec<(u32, Rule)> {
+        let (faces, incidence) = (surface.faces(), surface.incidence());
+        let corners = faces.corners();
+        let ends = |&(c, _): &(u32, f64)| [corners[c as usize], corners[incidence.next(faces, c) as usize]];
+        let all = self.semi_sharp.iter().flat_map(ends).chain(self.semi_sharp_vertices.iter().map(|s| s.0));
+        let mut found: Vec<(u32, Rule)> =
+            all.map(|v| (v, self.rules[v as usize])).filter(|s| s.1 == Rule::Crease).collect();
+        found.sort_unstable_by_key(|s| s.0);
+        found.dedup();
+        found
+    }
+
     /// The number of sharp edges with two faces.
     pub fn creased_edges(&self) -> usize {
         self.creased
@@ -160,6 +229,13 @@ impl Features {
         &self.curves
     }
 
+    /// Whether there are darts, or semi-sharp vertices beside curves.
+    pub fn has_stars(&self) -> bool {
+        !self.semi_sharp.is_empty()
+            || !self.semi_sharp_vertices.is_empty()
+            || !parallel::all(self.rules.len(), |v| self.rules[v] != Rule::Dart)
+    }
+
     /// How many vertices follow a rule.
     pub fn count(&self, rule: Rule) -> usize {
         let counts =
@@ -168,22 +244,12 @@ impl Features {
     }
 }
 
-/// Whether a sharpness is one for ever; or what is wrong with it, as the rest of a sentence.
-pub(super) fn is_sharp(sharpness: f64) -> std::result::Result<bool, String> {
-    if sharpness >= SHARP {
-        return Ok(true);
+/// What is wrong with a sharpness, as the rest of a sentence.
+pub(super) fn checked(sharpness: f64) -> std::result::Result<(), String> {
+    match sharpness >= 0.0 {
+        true => Ok(()),
+        false => Err(format!("has the sharpness {}: a number from 0 on is needed", short(sharpness))),
     }
-    if sharpness == 0.0 {
-        return Ok(false);
-    }
-    let sharpness = short(sharpness);
-    Err(match sharpness.starts_with(['-', 'N']) {
-        true => format!("has the sharpness {sharpness}: a number from 0 on is needed"),
-        false => format!(
-            "has the sharpness {sharpness}: semi-sharp edges and vertices have no rows here yet; give {SHARP} or more for \
-             a sharp one, 0 for a smooth one"
-        ),
-    })
 }
 
 /// The edges with two faces whose normals differ by more than `degrees`, by their ends. O(corners).

@@ -402,8 +402,12 @@ pub(super) fn remarks(surface: &Surface) -> Vec<String> {
     }
     if let Some(features) = surface.features() {
         let creased = features.creased_edges();
-        let parts =
-            [(creased, "creased edge"), (features.count(Rule::Corner), "corner"), (features.count(Rule::Dart), "dart")];
+        let parts = [
+            (creased, "creased edge"),
+            (features.count(Rule::Corner), "corner"),
+            (features.count(Rule::Dart), "dart"),
+            (features.semi_sharp_edges().len(), "semi-sharp edge"),
+        ];
         let parts: Vec<String> = parts.iter().filter(|p| p.0 > 0).map(|&(count, one)| counted(count, one)).collect();
         if !parts.is_empty() {
             remarks.push(parts.join(", "));

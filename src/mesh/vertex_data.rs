@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::features::is_sharp;
+use super::features::checked;
 use super::io::{self, has_mesh_ending};
 use super::{Surface, magic};
 use crate::error::{Error, Result};
@@ -106,7 +106,7 @@ pub fn creases(path: &Path, surface: &Surface) -> Result<Vec<([u32; 2], f64)>> {
         if surface.incidence().half_edge(surface.faces(), ends).is_none() {
             return Err(refuse("is not in the mesh: its vertices, numbered from 0, share no edge".into()));
         }
-        is_sharp(sharpness).map_err(refuse)?;
+        checked(sharpness).map_err(refuse)?;
         creases.push((ends, sharpness));
         Ok(())
     })?;
@@ -120,7 +120,7 @@ pub fn creases(path: &Path, surface: &Surface) -> Result<Vec<([u32; 2], f64)>> {
 pub fn corners(path: &Path, vertices: usize) -> Result<Vec<(u32, f64)>> {
     let mut corners = Vec::new();
     lines(path, vertices, "vertex sharpness", |line, [v]: [usize; 1], [sharpness]: [f64; 1]| {
-        is_sharp(sharpness).map_err(|what| Error::parse(path, Some(line), format!("vertex {v} {what}")))?;
+        checked(sharpness).map_err(|what| Error::parse(path, Some(line), format!("vertex {v} {what}")))?;
         corners.push((v as u32, sharpness));
         Ok(())
     })?;

@@ -6,6 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
+use super::local_limit::StarRule;
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Circulant, Definition, PaperNames, SingularSet};
@@ -39,6 +40,7 @@ pub(super) const DEFINITION: Definition = Definition {
     refinement: Refinement::CatmullClark,
     first_rule: None,
     curve_weight: CUBIC,
+    star_rule: Some(StarRule::CatmullClark),
 };
 
 /// All that defines the refinement.

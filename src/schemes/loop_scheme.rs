@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
+use super::local_limit::StarRule;
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Definition, PaperNames, SingularSet, from_limit_weight};
@@ -57,6 +58,7 @@ pub(super) const DEFINITION: Definition = Definition {
     refinement: Refinement::Loop,
     first_rule: None,
     curve_weight: CUBIC,
+    star_rule: Some(StarRule::Loop),
 };
 
 /// All that defines the refinement.

@@ -38,6 +38,7 @@ pub(super) const DEFINITION: Definition = Definition {
     refinement: Refinement::MidEdge,
     first_rule: None,
     curve_weight: QUADRATIC,
+    star_rule: None,
 };
 
 /// All that defines the refinement.

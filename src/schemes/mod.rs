@@ -34,6 +34,7 @@ pub mod catmull_clark;
 pub mod doo_sabin;
 mod interpolatory;
 pub mod labsik_greiner;
+pub(crate) mod local_limit;
 pub mod loop_scheme;
 pub mod mid_edge;
 mod nasri;

@@ -5,6 +5,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::doo_sabin::Rule;
+use super::local_limit::StarRule;
 use super::{Refinement, catmull_clark, loop_scheme, mid_edge, nasri, sqrt3, zheng_cai};
 use crate::error::Error;
 use crate::mesh::Faces;
@@ -88,6 +89,8 @@ pub(super) struct Definition {
     pub(super) first_rule: Option<Rule>,
     /// w: on a curve of sharp edges the limit point is `w a + (1 − 2w) v + w b`, a and b the neighbours along it.
     pub(super) curve_weight: f64,
+    /// How stars with darts and semi-sharp edges are refined; `None` if the scheme has no rule for these.
+    pub(super) star_rule: Option<StarRule>,
 }
 
 /// Of cubic B-splines, as which curves are subdivided by the primal schemes: their value at a knot.
@@ -201,6 +204,10 @@ impl Scheme {
     /// The refinement whose surface the limit points A V lie on.
     pub fn refinement(self) -> Refinement {
         self.definition().refinement
+    }
+
+    pub(crate) fn star_rule(self) -> Option<StarRule> {
+        self.definition().star_rule
     }
 
     /// w: on a curve of sharp edges, a boundary or a crease, the limit point is `w a + (1 − 2w) v + w b`, a and b being the

@@ -60,6 +60,7 @@ pub(super) const DEFINITION: Definition = Definition {
     refinement: Refinement::Sqrt3,
     first_rule: None,
     curve_weight: CUBIC,
+    star_rule: None,
 };
 
 /// All that defines the refinement.

@@ -23,4 +23,5 @@ pub(super) const DEFINITION: Definition = Definition {
     refinement: Refinement::DooSabin,
     first_rule: Some(Rule::ZhengCai),
     curve_weight: QUADRATIC,
+    star_rule: None,
 };

@@ -7,6 +7,7 @@ pub mod coloured;
 pub mod conjugate_gradient;
 pub mod direct;
 pub mod gauss_seidel;
+pub mod gmres;
 pub mod heavy_ball;
 pub mod incomplete_cholesky;
 pub mod iteration;

@@ -63,6 +63,27 @@ pub fn random_creased(scheme: Scheme, seed: u64) -> Option<(Surface, Tags)> {
     Some((surface.tagged(&tags).unwrap(), tags))
 }
 
+/// As [`random_creased`], with darts and semi-sharp edges and vertices beside.
+pub fn random_semi_sharp(scheme: Scheme, seed: u64) -> Option<(Surface, Tags)> {
+    let (surface, mut tags) = random_creased(scheme, seed)?;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed + 991);
+    let some = |rng: &mut ChaCha8Rng| {
+        let face = surface.faces().face(rng.random_range(0..surface.faces().len()));
+        let k = rng.random_range(0..face.len());
+        [face[k], face[(k + 1) % face.len()]]
+    };
+    for _ in 0..rng.random_range(1..9) {
+        let edge = some(&mut rng);
+        // Whole numbers too, where a rule changes without a blend.
+        let sharpness = if rng.random_range(0..3) == 0 { 2.0 } else { rng.random_range(0.1..4.0) };
+        tags.creases.push((edge, if rng.random_range(0..4) == 0 { 10.0 } else { sharpness }));
+    }
+    for _ in 0..rng.random_range(0..3) {
+        tags.corners.push((some(&mut rng)[0], rng.random_range(0.1..3.0)));
+    }
+    Some((surface.tagged(&tags).unwrap(), tags))
+}
+
 /// A grid of p × q vertices, of quads or of triangles.
 pub fn grid(p: usize, q: usize, triangles: bool) -> Mesh {
     let mut faces = Faces::default();

@@ -1,18 +1,23 @@
 //! Refinement with sharp edges by hash maps, straight from the rules, as a witness for the rows.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use glam::DVec3;
 use limitlab::mesh::features::Tags;
 use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Faces, Mesh, Surface};
 
-/// A mesh with its sharp edges, those of the boundary too, and its corners.
+/// A mesh with the sharpness of its edges, those of the boundary too, and of its vertices; 10 and more is for ever.
 #[derive(Clone)]
 pub struct Creased {
     pub mesh: Mesh,
-    pub sharp: BTreeSet<[u32; 2]>,
-    pub corners: BTreeSet<u32>,
+    pub sharp: BTreeMap<[u32; 2], f64>,
+    pub corners: BTreeMap<u32, f64>,
+}
+
+/// What is left of a sharpness after a step.
+fn lowered(sharpness: f64) -> f64 {
+    if sharpness >= 10.0 { sharpness } else { sharpness - 1.0 }
 }
 
 pub fn edge(a: u32, b: u32) -> [u32; 2] {
@@ -36,16 +41,22 @@ impl Creased {
     pub fn of(surface: &Surface, tags: &Tags) -> Self {
         let mesh = surface.mesh().clone();
         let edges = faces_by_edge(&mesh);
-        let mut sharp: BTreeSet<[u32; 2]> = tags.creases.iter().map(|&([a, b], _)| edge(a, b)).collect();
-        sharp.extend(edges.iter().filter(|(_, faces)| faces.len() == 1).map(|(side, _)| *side));
-        let mut corners: BTreeSet<u32> = tags.corners.iter().map(|c| c.0).collect();
+        let mut sharp: BTreeMap<[u32; 2], f64> = BTreeMap::new();
+        for &([a, b], s) in &tags.creases {
+            let here = sharp.entry(edge(a, b)).or_insert(0.0);
+            *here = here.max(s);
+        }
+        sharp.extend(edges.iter().filter(|(_, faces)| faces.len() == 1).map(|(side, _)| (*side, 10.0)));
+        let mut corners: BTreeMap<u32, f64> = BTreeMap::new();
+        for &(v, s) in &tags.corners {
+            let here = corners.entry(v).or_insert(0.0);
+            *here = here.max(s);
+        }
         for v in 0..mesh.len() as u32 {
             let at = mesh.faces.iter().filter(|face| face.contains(&v)).count();
             let is_boundary = edges.iter().any(|(side, faces)| faces.len() == 1 && side.contains(&v));
-            if sharp.iter().filter(|side| side.contains(&v)).count() > 2
-                || (at == 1 && is_boundary && tags.boundary == Boundary::EdgeAndCorner)
-            {
-                corners.insert(v);
+            if at == 1 && is_boundary && tags.boundary == Boundary::EdgeAndCorner {
+                corners.insert(v, 10.0);
             }
         }
         Creased { mesh, sharp, corners }
@@ -56,34 +67,63 @@ impl Creased {
         let surface = Surface::examined(self.mesh.clone(), None, Boundary::EdgeOnly).unwrap();
         let tags = Tags {
             boundary: Boundary::EdgeOnly,
-            creases: self.sharp.iter().map(|&side| (side, 10.0)).collect(),
-            corners: self.corners.iter().map(|&v| (v, 10.0)).collect(),
+            creases: self.sharp.iter().map(|(&side, &s)| (side, s)).collect(),
+            corners: self.corners.iter().map(|(&v, &s)| (v, s)).collect(),
         };
         surface.tagged(&tags).unwrap()
     }
 
-    fn is_sharp(&self, v: u32) -> bool {
-        self.corners.contains(&v) || self.sharp.iter().any(|side| side.contains(&v))
+    /// The sharp edges at a vertex, by their other ends, after so many lowerings.
+    fn sharp_at(&self, v: u32, later: bool) -> Vec<(u32, f64)> {
+        let left = |s: f64| if later { lowered(s) } else { s };
+        let at = self.sharp.iter().filter(|(side, _)| side.contains(&v));
+        at.map(|(&[a, b], &s)| (if a == v { b } else { a }, left(s))).filter(|e| e.1 > 0.0).collect()
     }
 
-    /// Where a vertex goes, but for smooth ones.
-    fn sharp_vertex(&self, v: u32) -> Option<DVec3> {
+    /// Where a vertex goes by its rule now, or by the one of the next level; `smooth` is where it goes without sharp edges.
+    fn by_rule(&self, v: u32, later: bool, smooth: DVec3) -> (Vec<u32>, bool, DVec3) {
         let at = |v: u32| self.mesh.positions[v as usize];
-        if self.corners.contains(&v) {
-            return Some(at(v));
+        let own = self.corners.get(&v).copied().unwrap_or(0.0);
+        let own = if later { lowered(own) } else { own };
+        let ends: Vec<u32> = self.sharp_at(v, later).into_iter().map(|e| e.0).collect();
+        let is_corner = own > 0.0 || ends.len() > 2;
+        let place = match ends[..] {
+            _ if is_corner => at(v),
+            [a, b] => 0.75 * at(v) + 0.125 * (at(a) + at(b)),
+            _ => smooth,
+        };
+        // Darts follow the rule of smooth vertices, and are told apart from them.
+        (ends, is_corner, place)
+    }
+
+    /// Where a vertex goes.
+    fn vertex_point(&self, v: u32, smooth: DVec3) -> DVec3 {
+        let (now, corner, here) = self.by_rule(v, false, smooth);
+        let (then, later_corner, there) = self.by_rule(v, true, smooth);
+        let kind = |ends: &[u32], corner: bool| if corner { 3 } else { ends.len() };
+        if kind(&now, corner) == kind(&then, later_corner) && (corner || now == then) {
+            return here;
         }
-        let ends: Vec<u32> =
-            self.sharp.iter().filter(|side| side.contains(&v)).map(|&[a, b]| if a == v { b } else { a }).collect();
-        match ends[..] {
-            [] => None,
-            [a, b] => Some(0.75 * at(v) + 0.125 * (at(a) + at(b))),
-            _ => panic!("a dart, or a corner that is not listed"),
-        }
+        let mut vanishing: Vec<f64> = self.sharp_at(v, false).into_iter().map(|e| e.1).collect();
+        vanishing.extend(self.corners.get(&v));
+        vanishing.retain(|&s| s > 0.0 && s <= 1.0);
+        let w = (vanishing.iter().sum::<f64>() / vanishing.len() as f64).min(1.0);
+        w * here + (1.0 - w) * there
+    }
+
+    /// The sharpness of an edge.
+    fn of_edge(&self, side: [u32; 2]) -> f64 {
+        self.sharp.get(&side).copied().unwrap_or(0.0)
     }
 
     /// The children of sharp edges, whose midpoints have these numbers.
-    fn children(&self, midpoints: &BTreeMap<[u32; 2], u32>) -> BTreeSet<[u32; 2]> {
-        self.sharp.iter().flat_map(|side| side.map(|v| edge(v, midpoints[side]))).collect()
+    fn children(&self, midpoints: &BTreeMap<[u32; 2], u32>) -> BTreeMap<[u32; 2], f64> {
+        let left = self.sharp.iter().map(|(side, &s)| (side, lowered(s))).filter(|e| e.1 > 0.0);
+        left.flat_map(|(side, s)| side.map(|v| (edge(v, midpoints[side]), s))).collect()
+    }
+
+    fn lowered_corners(&self) -> BTreeMap<u32, f64> {
+        self.corners.iter().map(|(&v, &s)| (v, lowered(s))).filter(|e| e.1 > 0.0).collect()
     }
 
     /// A Catmull-Clark step. The old vertices keep their numbers.
@@ -94,15 +134,12 @@ impl Creased {
             mesh.faces.iter().map(|face| face.iter().map(|&v| at(v)).sum::<DVec3>() / face.len() as f64).collect();
         let mut positions: Vec<DVec3> = (0..mesh.len() as u32)
             .map(|v| {
-                self.sharp_vertex(v).unwrap_or_else(|| {
-                    let around: Vec<usize> =
-                        (0..mesh.faces.len()).filter(|&f| mesh.faces.face(f).contains(&v)).collect();
-                    let n = around.len() as f64;
-                    let faces = around.iter().map(|&f| centroids[f]).sum::<DVec3>() / n;
-                    let middles = edges.keys().filter(|side| side.contains(&v));
-                    let middles = middles.map(|&[a, b]| 0.5 * (at(a) + at(b))).sum::<DVec3>() / n;
-                    (faces + 2.0 * middles + (n - 3.0) * at(v)) / n
-                })
+                let around: Vec<usize> = (0..mesh.faces.len()).filter(|&f| mesh.faces.face(f).contains(&v)).collect();
+                let n = around.len() as f64;
+                let faces = around.iter().map(|&f| centroids[f]).sum::<DVec3>() / n;
+                let middles = edges.keys().filter(|side| side.contains(&v));
+                let middles = middles.map(|&[a, b]| 0.5 * (at(a) + at(b))).sum::<DVec3>() / n;
+                self.vertex_point(v, (faces + 2.0 * middles + (n - 3.0) * at(v)) / n)
             })
             .collect();
         let mut midpoints = BTreeMap::new();
@@ -110,7 +147,10 @@ impl Creased {
             midpoints.insert(side, positions.len() as u32);
             let middle = 0.5 * (at(side[0]) + at(side[1]));
             positions.push(match faces[..] {
-                [f, g] if !self.sharp.contains(&side) => 0.5 * middle + 0.25 * (centroids[f] + centroids[g]),
+                [f, g] => {
+                    let s = self.of_edge(side).min(1.0);
+                    (1.0 - s) * (0.5 * middle + 0.25 * (centroids[f] + centroids[g])) + s * middle
+                }
                 _ => middle,
             });
         }
@@ -124,7 +164,7 @@ impl Creased {
             }
         }
         let sharp = self.children(&midpoints);
-        Creased { mesh: Mesh::new(positions, faces), sharp, corners: self.corners.clone() }
+        Creased { mesh: Mesh::new(positions, faces), sharp, corners: self.lowered_corners() }
     }
 
     /// A Loop step.
@@ -133,16 +173,11 @@ impl Creased {
         let at = |v: u32| mesh.positions[v as usize];
         let mut positions: Vec<DVec3> = (0..mesh.len() as u32)
             .map(|v| {
-                self.sharp_vertex(v).unwrap_or_else(|| {
-                    let ring: Vec<u32> = edges
-                        .keys()
-                        .filter(|side| side.contains(&v))
-                        .map(|&[a, b]| if a == v { b } else { a })
-                        .collect();
-                    let n = ring.len() as f64;
-                    let part = 0.625 - (0.375 + 0.25 * (std::f64::consts::TAU / n).cos()).powi(2);
-                    (1.0 - part) * at(v) + part * ring.iter().map(|&w| at(w)).sum::<DVec3>() / n
-                })
+                let ring: Vec<u32> =
+                    edges.keys().filter(|side| side.contains(&v)).map(|&[a, b]| if a == v { b } else { a }).collect();
+                let n = ring.len() as f64;
+                let part = 0.625 - (0.375 + 0.25 * (std::f64::consts::TAU / n).cos()).powi(2);
+                self.vertex_point(v, (1.0 - part) * at(v) + part * ring.iter().map(|&w| at(w)).sum::<DVec3>() / n)
             })
             .collect();
         let mut midpoints = BTreeMap::new();
@@ -151,7 +186,10 @@ impl Creased {
             let middle = 0.5 * (at(side[0]) + at(side[1]));
             let opposite = |f: usize| mesh.faces.face(f).iter().copied().find(|v| !side.contains(v)).unwrap();
             positions.push(match faces[..] {
-                [f, g] if !self.sharp.contains(&side) => 0.75 * middle + 0.125 * (at(opposite(f)) + at(opposite(g))),
+                [f, g] => {
+                    let s = self.of_edge(side).min(1.0);
+                    (1.0 - s) * (0.75 * middle + 0.125 * (at(opposite(f)) + at(opposite(g)))) + s * middle
+                }
                 _ => middle,
             });
         }
@@ -162,7 +200,7 @@ impl Creased {
             [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]].iter().for_each(|face| faces.push(face));
         }
         let sharp = self.children(&midpoints);
-        Creased { mesh: Mesh::new(positions, faces), sharp, corners: self.corners.clone() }
+        Creased { mesh: Mesh::new(positions, faces), sharp, corners: self.lowered_corners() }
     }
 
     /// A √3 step: centroids, smooth vertices relaxed, edges flipped that are not sharp; all that is sharp rests.
@@ -171,7 +209,7 @@ impl Creased {
         let at = |v: u32| mesh.positions[v as usize];
         let mut positions: Vec<DVec3> = (0..mesh.len() as u32)
             .map(|v| {
-                if self.is_sharp(v) {
+                if self.corners.contains_key(&v) || !self.sharp_at(v, false).is_empty() {
                     return at(v);
                 }
                 let ring: Vec<u32> =
@@ -190,7 +228,7 @@ impl Creased {
                 let side = edge(v, w);
                 match edges[&side][..] {
                     // Once for both sides: the two triangles across the flipped edge.
-                    [a, b] if !self.sharp.contains(&side) => {
+                    [a, b] if !self.sharp.contains_key(&side) => {
                         if f == a {
                             faces.push(&[v, first + b as u32, first + a as u32]);
                             faces.push(&[w, first + a as u32, first + b as u32]);

@@ -4,12 +4,13 @@
 use glam::DVec3;
 use limitlab::assemble::{LimitSystem, Stages};
 use limitlab::interpolate::limit_points;
+use limitlab::mesh::features::Tags;
 use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Faces, Mesh, Surface};
 use limitlab::schemes::Scheme;
 
 use super::naive::Creased;
-use super::{open, random_creased, random_points};
+use super::{open, random_creased, random_points, random_semi_sharp};
 use crate::common::meshes::{built_in, small_mesh};
 
 fn limits(surface: &Surface, scheme: Scheme) -> Vec<DVec3> {
@@ -22,14 +23,16 @@ fn limits(surface: &Surface, scheme: Scheme) -> Vec<DVec3> {
     by_rows
 }
 
+type Random = fn(Scheme, u64) -> Option<(Surface, Tags)>;
+
 fn hold_against_a_step(
-    scheme: Scheme,
+    (scheme, random): (Scheme, Random),
     step: fn(&Creased) -> Creased,
     is_held: impl Fn(&Surface, usize) -> bool,
 ) -> usize {
     let mut held = 0;
     for seed in 0..200 {
-        let Some((surface, tags)) = random_creased(scheme, seed) else { continue };
+        let Some((surface, tags)) = random(scheme, seed) else { continue };
         let coarse = limits(&surface, scheme);
         let finer = step(&Creased::of(&surface, &tags));
         let fine = limits(&finer.surface(), scheme);
@@ -44,13 +47,23 @@ fn hold_against_a_step(
 
 #[test]
 fn rows_are_kept_by_a_step_of_catmull_clark() {
-    let held = hold_against_a_step(Scheme::CatmullClark, Creased::catmull_clark, |_, _| true);
+    let held = hold_against_a_step((Scheme::CatmullClark, random_creased), Creased::catmull_clark, |_, _| true);
     assert!(held > 3000, "{held}");
 }
 
 #[test]
 fn rows_are_kept_by_a_step_of_loop() {
-    let held = hold_against_a_step(Scheme::Loop, Creased::loop_step, |_, _| true);
+    let held = hold_against_a_step((Scheme::Loop, random_creased), Creased::loop_step, |_, _| true);
+    assert!(held > 3000, "{held}");
+}
+
+/// Darts, semi-sharp edges and vertices: what is left of the sharpness on the finer mesh gives the row there.
+#[test]
+fn rows_with_darts_and_semi_sharp_edges_are_kept_by_a_step() {
+    let random = random_semi_sharp as Random;
+    let held = hold_against_a_step((Scheme::CatmullClark, random), Creased::catmull_clark, |_, _| true);
+    assert!(held > 3000, "{held}");
+    let held = hold_against_a_step((Scheme::Loop, random), Creased::loop_step, |_, _| true);
     assert!(held > 3000, "{held}");
 }
 
@@ -58,7 +71,7 @@ fn rows_are_kept_by_a_step_of_loop() {
 #[test]
 fn rows_of_smooth_vertices_are_kept_by_a_step_of_sqrt3() {
     let smooth = |surface: &Surface, v: usize| surface.features().is_none_or(|f| f.is_smooth(v));
-    let held = hold_against_a_step(Scheme::Sqrt3, Creased::sqrt3, smooth);
+    let held = hold_against_a_step((Scheme::Sqrt3, random_creased), Creased::sqrt3, smooth);
     assert!(held > 1000, "{held}");
 }
 

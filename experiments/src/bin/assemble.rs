@@ -14,7 +14,7 @@ use limitlab_experiments::cli::{self, CommonFlags, MeshFlags};
 /// Writes A, M, H and P of the limit system A V = P, A = H·M, as Matrix Market files with 17 significant digits,
 /// in the vertex order of the mesh. On an open or creased mesh A is no such product: A.mtx and P.mtx are those of all
 /// vertices, and the folder `smooth` has the five files of the system of the smooth vertices, in ascending order, once
-/// curves and corners are known.
+/// curves and corners are known; with darts and semi-sharp edges there is no such system.
 ///
 /// A.mtx is general, M.mtx symmetric (lower triangle), H.mtx an N×1 array (the diagonal), P.mtx an N×3 array of the
 /// given points, and R.mtx = H⁻¹P, the right-hand side of M V = R. With --scheme zheng-cai, M and R are the paper's
@@ -63,28 +63,29 @@ fn run(arguments: &Arguments) -> Result<()> {
     let known = stages.known(points);
     let mut files = Vec::new();
     let mut batch = Batch::default();
-    let folder = match stages.vertices() {
-        None => arguments.out.clone(),
-        Some(_) => {
-            files = ["A.mtx", "P.mtx"].map(|name| arguments.out.join(name)).to_vec();
-            batch.write(&files[0], |out| matrix_market::write_general(&matrix, out))?;
-            batch.write(&files[1], |out| matrix_market::write_points(points, out))?;
-            let folder = arguments.out.join("smooth");
-            create_dir(&folder)?;
-            folder
-        }
-    };
-    let of_block = FILES.map(|name| folder.join(name));
-    let block = stages.block();
-    let right = stages.right_hand_side(&known);
-    let symmetric = block.symmetric_right_hand_side(&right);
-    batch.write(&of_block[0], |out| matrix_market::write_general(&block.a, out))?;
-    batch.write(&of_block[1], |out| matrix_market::write_symmetric(&block.m, out))?;
-    batch.write(&of_block[2], |out| matrix_market::write_vector(&block.h, out))?;
-    batch.write(&of_block[3], |out| matrix_market::write_points(&right, out))?;
-    batch.write(&of_block[4], |out| matrix_market::write_points(&symmetric, out))?;
+    let whole = ["A.mtx", "P.mtx"].map(|name| arguments.out.join(name));
+    let mut folder = arguments.out.clone();
+    if stages.vertices().is_some() {
+        batch.write(&whole[0], |out| matrix_market::write_general(&matrix, out))?;
+        batch.write(&whole[1], |out| matrix_market::write_points(points, out))?;
+        files.extend(whole);
+        folder.push("smooth");
+    }
+    // With darts and semi-sharp vertices the smooth ones have no system of their own.
+    if stages.stars().is_none() {
+        create_dir(&folder)?;
+        let of_block = FILES.map(|name| folder.join(name));
+        let block = stages.block();
+        let right = stages.right_hand_side(&known);
+        let symmetric = block.symmetric_right_hand_side(&right);
+        batch.write(&of_block[0], |out| matrix_market::write_general(&block.a, out))?;
+        batch.write(&of_block[1], |out| matrix_market::write_symmetric(&block.m, out))?;
+        batch.write(&of_block[2], |out| matrix_market::write_vector(&block.h, out))?;
+        batch.write(&of_block[3], |out| matrix_market::write_points(&right, out))?;
+        batch.write(&of_block[4], |out| matrix_market::write_points(&symmetric, out))?;
+        files.extend(of_block);
+    }
     batch.commit()?;
-    files.extend(of_block);
     let names = input.scheme.paper_names();
     arguments.common.remark(format_args!(
         "{}: {} vertices, {} entries; in the paper {} = {}·{}",

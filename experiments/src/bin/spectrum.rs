@@ -279,7 +279,7 @@ struct Parts<'a> {
 
 /// The smooth vertices of an open or creased mesh.
 fn analyse_stages(input: &Input, arguments: &Arguments) -> Result<Findings> {
-    let stages = input.stages()?;
+    let stages = input.symmetric_stages()?;
     let block = stages.block();
     let known = stages.known(input.surface.positions());
     let (right, start) = (stages.right_hand_side(&known), stages.restricted(&known));

@@ -38,7 +38,8 @@ pub struct MeshFlags {
     /// Make one vertex of those at the same position: seams are closed; the control mesh keeps the file's vertices
     #[arg(long)]
     pub weld: bool,
-    /// Sharp edges: a file with lines `a b sharpness`, vertices numbered from 0; 10 and more is sharp for ever
+    /// Sharp edges: a file with lines `a b sharpness`, vertices numbered from 0; 10 and more is sharp for ever,
+    /// less is taken 1 at each level (semi-sharp: catmull-clark and loop)
     #[arg(long, value_name = "FILE")]
     pub creases: Option<PathBuf>,
     /// Sharp vertices: a file with lines `vertex sharpness`
@@ -163,7 +164,7 @@ impl MeshFlags {
             report.remarks.iter().for_each(|remark| common.remark(format_args!("{name}: {remark}")));
             Error::mesh(name, advice::of_defects(&report))
         })?;
-        let mut surface = self.with_features(name, surface)?;
+        let mut surface = self.with_features(name, surface, common)?;
         for remark in surface.remarks() {
             common.remark(format_args!("{name}: {remark}"));
         }
@@ -227,12 +228,19 @@ impl MeshFlags {
         self.boundary.unwrap_or(Boundary::EdgeAndCorner)
     }
 
-    /// The mesh with the sharp edges and vertices that are asked for; refused if it is open by a seam, unless that is
-    /// wanted.
-    fn with_features(&self, name: &str, surface: Surface) -> Result<Surface> {
+    /// The mesh with the sharp edges and vertices that are asked for; refused if nine tenths of its boundary are a seam,
+    /// unless that is wanted.
+    fn with_features(&self, name: &str, surface: Surface, common: &CommonFlags) -> Result<Surface> {
         if let (None, Some((edges, [a, b]))) = (self.boundary, seams(&surface)) {
             let all = surface.boundary_edges();
             let of = if edges == all { format!("all {all}") } else { format!("{edges} of {all}") };
+            // Real openings have seams at their ends now and then.
+            if 10 * edges < 9 * all {
+                common.remark(format_args!(
+                    "{name}: {of} boundary edges lie on each other (first: vertices {a} and {b}): seams, which --weld closes"
+                ));
+                return self.with_tags(name, surface);
+            }
             let which = if self.weld { "" } else { "use --weld to make one of them, or " };
             return Err(Error::mesh(
                 name,
@@ -242,6 +250,10 @@ impl MeshFlags {
                 ),
             ));
         }
+        self.with_tags(name, surface)
+    }
+
+    fn with_tags(&self, name: &str, surface: Surface) -> Result<Surface> {
         if self.creases.is_none() && self.corners.is_none() && self.crease_angle.is_none() {
             return Ok(surface);
         }
@@ -307,6 +319,25 @@ impl Input {
         flags.rule(self.surface.diagonal(), self.frame.scale()).map_err(|what| Error::mesh(&self.name, what))
     }
 
+    /// The same, of a mesh whose block is symmetric.
+    ///
+    /// # Errors
+    /// Darts and semi-sharp vertices.
+    pub fn symmetric_stages(&self) -> Result<Stages> {
+        let stages = self.stages()?;
+        match stages.stars() {
+            None => Ok(stages),
+            Some(stars) => Err(Error::mesh(
+                &self.name,
+                format!(
+                    "vertex {} is a dart or semi-sharp: no diagonal makes the matrix symmetric there, as the methods and spectra \
+                     of this program need it; make it a corner, or use interpolate",
+                    stars.vertices()[0]
+                ),
+            )),
+        }
+    }
+
     /// The points as they were given, with their noise: in mesh units.
     pub fn given_points(&self) -> Cow<'_, [DVec3]> {
         let mut points = Cow::Borrowed(self.surface.positions());
@@ -362,9 +393,11 @@ impl Input {
             "creases": features.map_or(0, Features::creased_edges),
             "corners": count(Rule::Corner),
             "darts": count(Rule::Dart),
+            "semi_sharp": count(Rule::SemiSharp),
             "blocks": {
                 "corners": count(Rule::Corner),
                 "curves": count(Rule::Crease),
+                "stars": count(Rule::Dart) + count(Rule::SemiSharp),
                 "smooth": features.map_or(self.surface.len(), |f| f.count(Rule::Smooth)),
             },
         });

@@ -221,7 +221,7 @@ impl MeshFlags {
 }
 
 fn of_mesh(input: Input, stop: &StopFlags, order: Order) -> Result<Problem> {
-    let stages = input.stages()?;
+    let stages = input.symmetric_stages()?;
     let known = stages.known(input.surface.positions());
     Ok(Problem {
         stop: input.stop(stop)?,
