@@ -6,6 +6,7 @@
 //! *corner* (3 and more, or tagged itself).
 
 use glam::DVec3;
+use rayon::slice::ParallelSliceMut;
 
 use super::incidence::next_in;
 use super::validate::Boundary;
@@ -104,11 +105,7 @@ impl Features {
         if sharp.is_empty() && resting.is_empty() {
             return Ok(None);
         }
-        let corners = faces.corners();
-        let end = |c: u32| corners[next_in(&faces.range(topology.incidence.face_of(c)), c) as usize];
-        let mut pairs: Vec<[u32; 2]> =
-            sharp.iter().flat_map(|&c| [[corners[c as usize], end(c)], [end(c), corners[c as usize]]]).collect();
-        pairs.sort_unstable();
+        let pairs = pairs(faces, topology, &sharp);
         let mut rules = vec![Rule::Smooth; n];
         for at in pairs.chunk_by(|a, b| a[0] == b[0]) {
             rules[at[0][0] as usize] = match at.len() {
@@ -118,6 +115,7 @@ impl Features {
             };
         }
         if tags.boundary == Boundary::EdgeAndCorner {
+            let corners = faces.corners();
             for &c in topology.boundary_half_edges() {
                 let v = corners[c as usize] as usize;
                 if topology.incidence.face_count(v) == 1 {
@@ -131,6 +129,54 @@ impl Features {
         let curves = curves(&pairs, &rules);
         let creased = sharp.len() - topology.boundary_edges();
         Ok(Some(Features { rules, sharp, creased, curves }))
+    }
+
+    /// Those of the mesh after a step that splits every edge in two by a vertex of its own, from its faces and topology: old
+    /// vertices come first and keep their rules, new ones on sharp edges are creases, all others smooth. `halves(c)` are the
+    /// half-edges of the finer mesh along half-edge `c`, in this order. O(N), and O(k log k) for k sharp edges.
+    pub(crate) fn refined(
+        &self,
+        faces: &Faces,
+        topology: &Topology,
+        coarse: &Topology,
+        halves: impl Fn(u32) -> [u32; 2],
+    ) -> Self {
+        let mut sharp: Vec<u32> = Vec::with_capacity(2 * self.sharp.len());
+        for &c in &self.sharp {
+            let along = halves(c);
+            // The twin's halves, in the order of this side.
+            let back = coarse.twin(c).map_or(along, |t| {
+                let [first, second] = halves(t);
+                [second, first]
+            });
+            sharp.extend([along[0].min(back[0]), along[1].min(back[1])]);
+        }
+        sharp.par_sort_unstable();
+        let pairs = pairs(faces, topology, &sharp);
+        let mut rules = self.rules.clone();
+        rules.resize(topology.incidence.vertices(), Rule::Smooth);
+        for pair in pairs.iter().filter(|pair| pair[0] as usize >= self.rules.len()) {
+            rules[pair[0] as usize] = Rule::Crease;
+        }
+        let curves = curves(&pairs, &rules);
+        Features { rules, sharp, creased: 2 * self.creased, curves }
+    }
+
+    /// Calls `visit(v, [a, b])` for every crease vertex and its two neighbours along the curve.
+    pub(crate) fn for_each_crease(&self, mut visit: impl FnMut(usize, [usize; 2])) {
+        for Curve { vertices, closed } in &self.curves {
+            let n = vertices.len();
+            let at = |i: usize| vertices[i % n] as usize;
+            let inner = if *closed { 0..n } else { 1..n - 1 };
+            for i in inner {
+                visit(at(i), [at(i + n - 1), at(i + 1)]);
+            }
+        }
+    }
+
+    /// The vertices that follow a rule, ascending.
+    pub(crate) fn with_rule(&self, rule: Rule) -> Vec<usize> {
+        parallel::flat_map(self.rules.len(), CHUNK, |range| range.filter(|&v| self.rules[v] == rule).collect())
     }
 
     /// The rule of every vertex.
@@ -215,6 +261,16 @@ pub fn creases_by_angle(surface: &Surface, degrees: f64) -> Vec<[u32; 2]> {
         };
         range.filter_map(|c| side(c as u32)).collect()
     })
+}
+
+/// Both directions of every sharp edge by its ends, in order.
+fn pairs(faces: &Faces, topology: &Topology, sharp: &[u32]) -> Vec<[u32; 2]> {
+    let corners = faces.corners();
+    let end = |c: u32| corners[next_in(&faces.range(topology.incidence.face_of(c)), c) as usize];
+    let mut pairs: Vec<[u32; 2]> =
+        sharp.iter().flat_map(|&c| [[corners[c as usize], end(c)], [end(c), corners[c as usize]]]).collect();
+    pairs.par_sort_unstable();
+    pairs
 }
 
 /// The curves along sharp edges, of which `pairs` holds both directions, in order.

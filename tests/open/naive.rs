@@ -75,9 +75,10 @@ impl Creased {
         let ends: Vec<u32> =
             self.sharp.iter().filter(|side| side.contains(&v)).map(|&[a, b]| if a == v { b } else { a }).collect();
         match ends[..] {
-            [] => None,
+            // A dart follows the smooth rule.
+            [] | [_] => None,
             [a, b] => Some(0.75 * at(v) + 0.125 * (at(a) + at(b))),
-            _ => panic!("a dart, or a corner that is not listed"),
+            _ => panic!("a corner that is not listed"),
         }
     }
 
