@@ -78,7 +78,7 @@ pub enum Error {
     },
     /// A vertex that is semi-sharp, or at a semi-sharp edge.
     #[error(
-        "vertex {vertex} is semi-sharp, or ends a semi-sharp edge, and {scheme} has no row for it; give it the sharpness 0, or 10 and more"
+        "vertex {vertex} is semi-sharp, or ends a semi-sharp edge, and {scheme} has no rule for it; give it the sharpness 0, or 10 and more"
     )]
     SemiSharp {
         /// The number of the vertex, from 0.

@@ -113,12 +113,12 @@ impl SurfaceMesh {
     }
 }
 
-/// The last topology by index arithmetic if it is needed.
+/// The last topology by index arithmetic if it is needed, or sharp edges are to be carried over.
 fn refine(scheme: Refinement, control: Surface, levels: usize, topology: bool) -> Result<Surface> {
     // A control mesh that stays is not copied: it may be as large as memory allows.
     match levels {
         0 => Ok(control),
-        _ if topology => scheme.refined_n(&control, levels),
+        _ if topology || control.features().is_some() => scheme.refined_n(&control, levels),
         _ => Ok(Surface::of_valid(scheme.refine_n(&control, levels)?)),
     }
 }

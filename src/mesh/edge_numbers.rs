@@ -1,18 +1,19 @@
-//! Numbers for the edges of a closed mesh, without a table.
+//! Numbers for the edges of a mesh, without a table.
 
 use crate::parallel;
 
-/// The edges of a closed mesh, numbered by their first half-edges: the order of
+/// The edges of a manifold, numbered by their first half-edges: the order of
 /// [`Topology::edge_sides`](super::Topology::edge_sides). A number comes from a bit and half a bit of counts a half-edge,
 /// few enough to stay in a cache, instead of from a table.
 pub(crate) struct EdgeNumbers<'a> {
     twins: &'a [u32],
     /// For every 64 half-edges: which are first, and how many before them are.
     words: Vec<(u64, u32)>,
+    edges: u32,
 }
 
 impl<'a> EdgeNumbers<'a> {
-    /// From the opposite of every half-edge.
+    /// From the opposite of every half-edge, [`NONE`](super::topology::NONE), the greatest number, on a boundary.
     pub(super) fn new(twins: &'a [u32]) -> Self {
         let mut words: Vec<(u64, u32)> = parallel::collect(twins.len().div_ceil(64), |k| {
             let mut bits = 0;
@@ -25,7 +26,7 @@ impl<'a> EdgeNumbers<'a> {
         for (_, count) in &mut words {
             before += std::mem::replace(count, before);
         }
-        EdgeNumbers { twins, words }
+        EdgeNumbers { twins, words, edges: before }
     }
 
     /// The edge of half-edge `c`.
@@ -39,12 +40,12 @@ impl<'a> EdgeNumbers<'a> {
     /// The first half-edges of the edges from number `edge` on, ascending.
     pub(crate) fn firsts_from(&self, edge: u32) -> impl Iterator<Item = u32> {
         let mut cursor = Cursor { next: u32::MAX, word: 0, bits: 0 };
-        (edge..self.twins.len() as u32 / 2).map(move |edge| cursor.first_of(edge, &self.words))
+        (edge..self.edges).map(move |edge| cursor.first_of(edge, &self.words))
     }
 
     /// Appends to `values` what `value` makes of the first half-edge of every edge.
     pub(crate) fn extend<T: Send>(&self, values: &mut Vec<T>, value: impl Fn(u32) -> T + Sync) {
-        parallel::extend(values, self.twins.len() / 2, |first| {
+        parallel::extend(values, self.edges as usize, |first| {
             let mut firsts = self.firsts_from(first as u32);
             let value = &value;
             move |_| value(firsts.next().expect("as many first half-edges as edges"))

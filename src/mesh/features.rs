@@ -7,10 +7,11 @@
 //! takes 1 of it.
 
 use glam::DVec3;
+use rayon::slice::ParallelSliceMut;
 
 use super::incidence::next_in;
 use super::validate::Boundary;
-use super::{Faces, Incidence, Surface};
+use super::{Faces, Incidence, Surface, Topology};
 use crate::error::{Error, Result, short};
 use crate::parallel;
 
@@ -127,10 +128,8 @@ impl Features {
             list.dedup_by_key(|entry| entry.0);
         }
         let corners = faces.corners();
-        let end = |c: u32| corners[next_in(&faces.range(incidence.face_of(c)), c) as usize];
-        let mut pairs: Vec<[u32; 2]> =
-            sharp.iter().flat_map(|&c| [[corners[c as usize], end(c)], [end(c), corners[c as usize]]]).collect();
-        pairs.sort_unstable();
+        let end = |c: u32| corners[incidence.next(faces, c) as usize];
+        let pairs = pairs(faces, incidence, &sharp);
         let mut rules = vec![Rule::Smooth; n];
         for at in pairs.chunk_by(|a, b| a[0] == b[0]) {
             rules[at[0][0] as usize] = match at.len() {
@@ -161,6 +160,56 @@ impl Features {
         let curves = curves(&pairs, &rules);
         let creased = sharp.len() - boundary.len();
         Ok(Some(Features { rules, sharp, creased, curves, semi_sharp, semi_sharp_vertices }))
+    }
+
+    /// Those of the mesh after a step that splits every edge in two by a vertex of its own, from its faces and topology: old
+    /// vertices come first and keep their rules, new ones on sharp edges are creases, all others smooth. `halves(c)` are the
+    /// half-edges of the finer mesh along half-edge `c`, in this order. O(N), and O(k log k) for k sharp edges.
+    pub(crate) fn refined(
+        &self,
+        faces: &Faces,
+        topology: &Topology,
+        coarse: &Topology,
+        halves: impl Fn(u32) -> [u32; 2],
+    ) -> Self {
+        let mut sharp: Vec<u32> = Vec::with_capacity(2 * self.sharp.len());
+        for &c in &self.sharp {
+            let along = halves(c);
+            // The twin's halves, in the order of this side.
+            let back = coarse.twin(c).map_or(along, |t| {
+                let [first, second] = halves(t);
+                [second, first]
+            });
+            sharp.extend([along[0].min(back[0]), along[1].min(back[1])]);
+        }
+        sharp.par_sort_unstable();
+        let incidence = &topology.incidence;
+        let pairs = pairs(faces, incidence, &sharp);
+        let mut rules = self.rules.clone();
+        rules.resize(incidence.vertices(), Rule::Smooth);
+        for pair in pairs.iter().filter(|pair| pair[0] as usize >= self.rules.len()) {
+            rules[pair[0] as usize] = Rule::Crease;
+        }
+        let curves = curves(&pairs, &rules);
+        let (semi_sharp, semi_sharp_vertices) = (Vec::new(), Vec::new());
+        Features { rules, sharp, creased: 2 * self.creased, curves, semi_sharp, semi_sharp_vertices }
+    }
+
+    /// Calls `visit(v, [a, b])` for every crease vertex and its two neighbours along the curve.
+    pub(crate) fn for_each_crease(&self, mut visit: impl FnMut(usize, [usize; 2])) {
+        for Curve { vertices, closed } in &self.curves {
+            let n = vertices.len();
+            let at = |i: usize| vertices[i % n] as usize;
+            let inner = if *closed { 0..n } else { 1..n - 1 };
+            for i in inner {
+                visit(at(i), [at(i + n - 1), at(i + 1)]);
+            }
+        }
+    }
+
+    /// The vertices that follow a rule, ascending.
+    pub(crate) fn with_rule(&self, rule: Rule) -> Vec<usize> {
+        parallel::flat_map(self.rules.len(), CHUNK, |range| range.filter(|&v| self.rules[v] == rule).collect())
     }
 
     /// The rule of every vertex.
@@ -229,11 +278,14 @@ impl Features {
         &self.curves
     }
 
+    /// Whether any edge or vertex is semi-sharp.
+    pub fn is_semi_sharp(&self) -> bool {
+        !self.semi_sharp.is_empty() || !self.semi_sharp_vertices.is_empty()
+    }
+
     /// Whether there are darts, or semi-sharp vertices beside curves.
     pub fn has_stars(&self) -> bool {
-        !self.semi_sharp.is_empty()
-            || !self.semi_sharp_vertices.is_empty()
-            || !parallel::all(self.rules.len(), |v| self.rules[v] != Rule::Dart)
+        self.is_semi_sharp() || !parallel::all(self.rules.len(), |v| self.rules[v] != Rule::Dart)
     }
 
     /// How many vertices follow a rule.
@@ -283,6 +335,16 @@ pub fn creases_by_angle(surface: &Surface, degrees: f64) -> Vec<[u32; 2]> {
         };
         range.filter_map(|c| side(c as u32)).collect()
     })
+}
+
+/// Both directions of every sharp edge by its ends, in order.
+fn pairs(faces: &Faces, incidence: &Incidence, sharp: &[u32]) -> Vec<[u32; 2]> {
+    let corners = faces.corners();
+    let end = |c: u32| corners[incidence.next(faces, c) as usize];
+    let mut pairs: Vec<[u32; 2]> =
+        sharp.iter().flat_map(|&c| [[corners[c as usize], end(c)], [end(c), corners[c as usize]]]).collect();
+    pairs.par_sort_unstable();
+    pairs
 }
 
 /// The curves along sharp edges, of which `pairs` holds both directions, in order.

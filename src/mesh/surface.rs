@@ -107,7 +107,8 @@ impl Surface {
         Self::of_parts(mesh, topology, Boundary::Refuse, None)
     }
 
-    fn of_parts(mesh: Mesh, topology: Topology, boundary: Boundary, features: Option<Features>) -> Self {
+    /// As [`of_topology`](Self::of_topology), open or with sharp edges and vertices.
+    pub(crate) fn of_parts(mesh: Mesh, topology: Topology, boundary: Boundary, features: Option<Features>) -> Self {
         debug_assert!(topology.incidence.vertices() == mesh.len() && topology.irregular_edges().is_empty());
         let connectivity = Connectivity {
             boundary,

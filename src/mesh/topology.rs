@@ -118,12 +118,17 @@ impl Topology {
         }
     }
 
+    /// As [`closed`](Self::closed), of an open manifold: `boundary` are the half-edges without a twin, ascending.
+    pub(crate) fn open(incidence: Incidence, twin: Vec<u32>, boundary: Vec<u32>) -> Self {
+        Topology { edges: (twin.len() + boundary.len()) / 2, boundary, ..Self::closed(incidence, twin) }
+    }
+
     /// The opposite of every half-edge, [`NONE`] where it has none.
     pub(crate) fn twins(&self) -> &[u32] {
         &self.twin
     }
 
-    /// The numbers of the edges of a closed mesh.
+    /// The numbers of the edges of a manifold.
     pub(crate) fn edge_numbers(&self) -> EdgeNumbers<'_> {
         EdgeNumbers::new(&self.twin)
     }

@@ -1,6 +1,6 @@
-//! Catmull-Clark subdivision (Catmull & Clark 1978) of any closed polygon mesh: new face points at centroids,
+//! Catmull-Clark subdivision (Catmull & Clark 1978) of any polygon mesh: new face points at centroids,
 //! edge points (Thall Eq. 12), vertex points (Thall Eq. 13); limit and tangent masks after Halstead, Kass &
-//! DeRose 1993, beside non-quads by the regularisation of Thall §2.3.
+//! DeRose 1993, beside non-quads by the regularisation of Thall §2.3. Sharp edges after DeRose, Kass & Truong 1998.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,9 +10,13 @@ use super::local_limit::StarRule;
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Circulant, Definition, PaperNames, SingularSet};
-use super::star::{Circle, Tangents, centroid, for_each_star, require_closed, require_room, sides, twin};
+use super::sharp::{self, Across};
+use super::star::{
+    Circle, Tangents, across, centroid, for_each_star, require_closed, require_room, require_rules, sides, twin,
+};
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
+use crate::mesh::features::Rule;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
@@ -50,6 +54,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     needs_triangles: false,
     refine,
     refined_topology,
+    halves: Some(refined::halves_in_quads),
     size: |c| Size { vertices: c.vertices + c.edges() + c.faces, faces: c.corners, corners: 4 * c.corners },
     limit_positions,
     limit_normals,
@@ -61,12 +66,15 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// for each face. Faces of the result: one quad for each old corner, in corner order, as
 /// (vertex, edge leaving it, face, edge entering it).
 ///
+/// The points of sharp edges are their midpoints, of crease vertices (a + 6v + b)/8 with the neighbours a and b along the
+/// curve; corners rest; darts follow the rule of smooth vertices.
+///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or the
-/// result too large for 32-bit indices.
+/// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
+/// [`Error::TooLarge`](crate::Error::TooLarge) if 32-bit indices do not reach the result.
 pub fn refine(surface: &Surface) -> Result<Mesh> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_closed(surface)?;
+    require_rules(surface)?;
     require_room(mesh, 4)?;
     let (old, incidence) = (&mesh.positions, &topology.incidence);
     let corners = mesh.faces.corners();
@@ -87,9 +95,10 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
     parallel::extend(&mut positions, mesh.len(), |_| vertex);
     edges.extend(&mut positions, |c| {
         let [one, other] =
-            [c, twin(topology, c)].map(|c| old[corners[c as usize] as usize] + centers[incidence.face_of(c)]);
+            [c, across(topology, c)].map(|c| old[corners[c as usize] as usize] + centers[incidence.face_of(c)]);
         0.25 * one + 0.25 * other
     });
+    sharp::set_refined(&mut positions, surface, &edges);
     positions.append(&mut centers);
     Ok(Mesh::new(positions, split(surface, &edges)))
 }
@@ -105,7 +114,7 @@ pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
 /// middle line of the printed Eq. 22 has −(1/n²)v for −(1/n)v; its last line, used here, is right.)
 ///
 /// # Errors
-/// As [`refine`].
+/// As [`refine`]; a mesh with sharp edges or vertices.
 pub fn refine_in_place(mut surface: Surface) -> Result<Mesh> {
     require_closed(&surface)?;
     require_room(surface.mesh(), 4)?;
@@ -164,13 +173,14 @@ pub fn limit_mask(n: usize) -> [f64; 3] {
 
 /// The limit points of all vertices, of any valence and beside faces of any size:
 /// ((n²−n) v + Σ_j 2 e_j + Σ_F 4 c_F)/(n(n+5)), c_F the centroids, which is [`limit_mask`] with the
-/// opposite corner of each face replaced by 4c_F − v − e_j − e_{j+1} (Thall Eq. 14).
+/// opposite corner of each face replaced by 4c_F − v − e_j − e_{j+1} (Thall Eq. 14). On curves (a + 4v + b)/6 with the
+/// neighbours a and b along the curve; corners rest; at darts [`dart_mask`], with opposite corners replaced likewise.
 ///
 /// # Errors
-/// [`Error::Open`](crate::Error::Open).
+/// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior.
 pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_closed(surface)?;
+    require_rules(surface)?;
     let mut limits = vec![DVec3::ZERO; mesh.len()];
     for face in mesh.faces.iter() {
         let center = 4.0 * centroid(&mesh.positions, face);
@@ -182,7 +192,100 @@ pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
         let n = topology.incidence.face_count(v) as f64;
         *limit = ((n * n - n) * mesh.positions[v] + *limit) / (n * (n + 5.0));
     }
+    if let Some(features) = surface.features() {
+        sharp::set_limits(&mut limits, surface, CUBIC);
+        let mut star = Vec::new();
+        for v in features.with_rule(Rule::Dart) {
+            sharp::dart_star(surface, features, v, &mut star);
+            let mask = dart_mask(star.len());
+            let seen = |c: u32| mesh.positions[mesh.faces.corners()[c as usize] as usize] - mesh.positions[v];
+            let masks = star.iter().zip(mask[1..].as_chunks::<2>().0);
+            let moved = masks.map(|(&c, &[edge, face])| {
+                edge * seen(topology.incidence.next(&mesh.faces, c)) + face * opposite(surface, c, v)
+            });
+            limits[v] = mesh.positions[v] + moved.sum::<DVec3>();
+        }
+    }
     Ok(limits)
+}
+
+/// The regularised opposite corner of the face of corner `c` of `v`, seen from there: 4c_F − v − e_j − e_{j+1} − v. In a quad
+/// it is the opposite corner.
+fn opposite(surface: &Surface, c: u32, v: usize) -> DVec3 {
+    let (mesh, incidence) = (surface.mesh(), surface.incidence());
+    let seen = |c: u32| mesh.positions[mesh.faces.corners()[c as usize] as usize] - mesh.positions[v];
+    let center = centroid(&mesh.positions, mesh.faces.face(incidence.face_of(c)));
+    4.0 * (center - mesh.positions[v]) - seen(incidence.next(&mesh.faces, c)) - seen(incidence.prev(&mesh.faces, c))
+}
+
+/// The limit mask of a dart of valence `n` among quads: the weight of the vertex, then for each of its n edges,
+/// counter-clockwise from the sharp one, of the edge neighbour and of the opposite corner of the quad that follows. The left
+/// eigenvector for 1 of a step on its star, by repetition: O(n).
+///
+/// ```
+/// use limitlab::schemes::catmull_clark::dart_mask;
+/// let mask = dart_mask(3);
+/// let exact = [81. / 200., 1. / 5., 11. / 400., 3. / 20., 1. / 25., 3. / 20., 11. / 400.];
+/// assert!(mask.iter().zip(exact).all(|(found, exact)| (found - exact).abs() < 1e-15));
+/// ```
+pub fn dart_mask(n: usize) -> Vec<f64> {
+    let count = n as f64;
+    let share = 1.0 / (count * count);
+    let mut smooth = vec![count * count];
+    smooth.extend([4.0, 1.0].repeat(n));
+    let (edge, face) = (|j: usize| 1 + 2 * (j % n), |j: usize| 2 + 2 * (j % n));
+    sharp::left_eigenvector(smooth, |from, to| {
+        // v' = ((n−2) v + Σ (e_j + f'_j)/n)/n.
+        to[0] += (count - 2.0) / count * from[0];
+        for j in 0..n {
+            to[edge(j)] += share * from[0];
+            // f'_j = (v + e_j + e_{j+1} + f_j)/4.
+            let quarter = 0.25 * (from[face(j)] + share * from[0]);
+            for k in [0, edge(j), edge(j + 1), face(j)] {
+                to[k] += quarter;
+            }
+            if j == 0 {
+                // The midpoint.
+                for k in [0, edge(0)] {
+                    to[k] += 0.5 * from[edge(0)];
+                }
+                continue;
+            }
+            // e'_j = (6v + 6e_j + e_{j−1} + e_{j+1} + f_{j−1} + f_j)/16.
+            let part = from[edge(j)] / 16.0;
+            for k in [0, edge(j)] {
+                to[k] += 6.0 * part;
+            }
+            for k in [edge(j - 1), edge(j + 1), face(j - 1), face(j)] {
+                to[k] += part;
+            }
+        }
+    })
+}
+
+/// The weights of the tangent across the boundary at a vertex of `m` faces there. `None` from four on: the limit normals of
+/// its faces differ.
+///
+/// With θ = π/m and λ = (5 + cos θ + cos(θ/2)√(2(9 + cos θ)))/16, the left eigenvector for λ of a step on the star is
+/// (8λ − 2) sin jθ on the inner neighbours e_1 … e_{m−1}, cos(θ/2) sin (j − ½)θ on the opposite corners; its sum is 0; and the
+/// column of e_0 leaves its weight there, q − s/8 over λ − 1/4, where q is what comes from the inner weights beside it and s the
+/// sum of all inner ones. With one face λ = 1/4 is double, and e_0 + e_1 − 2v its only left eigenvector.
+fn across_boundary(m: usize) -> Option<Across> {
+    let theta = PI / m as f64;
+    let half = (0.5 * theta).cos();
+    let lambda = (5.0 + theta.cos() + half * (2.0 * (9.0 + theta.cos())).sqrt()) / 16.0;
+    match m {
+        1 => return Some(Across { edges: vec![1.0; 2], faces: vec![0.0] }),
+        2 | 3 => {}
+        _ => return None,
+    }
+    let mut edges: Vec<f64> = (0..=m).map(|j| (8.0 * lambda - 2.0) * (theta * j as f64).sin()).collect();
+    let faces: Vec<f64> = (0..m).map(|j| half * (theta * (j as f64 + 0.5)).sin()).collect();
+    let sum: f64 = edges[1..m].iter().chain(&faces).sum();
+    let beside = edges[1] / 16.0 + faces[0] / 4.0;
+    let end = (beside - sum / 8.0) / (lambda - 0.25);
+    (edges[0], edges[m]) = (end, end);
+    Some(Across { edges, faces })
 }
 
 /// A_n = 1 + cos(2π/n) + cos(π/n)·√(2(9 + cos(2π/n))) (Thall Eq. 15): the subdominant eigenvalue is (4+A_n)/16.
@@ -202,13 +305,16 @@ pub fn tangent_mask(n: usize) -> Vec<[f64; 2]> {
     (0..n).map(|j| [constant * circle[j].x, circle[j].x + circle[(j + 1) % n].x]).collect()
 }
 
-/// The tangents of the limit surface at all vertices.
+/// The tangents of the limit surface at all vertices. At a boundary vertex with up to three faces and no sharp edge between
+/// them one goes along the boundary and one across it; at a corner with one face they go along its sides. All others that are
+/// not smooth have none: from four faces on the normals of the faces at a boundary vertex differ, a crease has one normal a
+/// side, a corner one a face; those of darts are not computed.
 ///
 /// # Errors
-/// [`Error::Open`](crate::Error::Open).
+/// As [`limit_positions`].
 pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_closed(surface)?;
+    require_rules(surface)?;
     let corners = mesh.faces.corners();
     let mut tangents = Vec::with_capacity(mesh.len());
     let mut circle = Circle::default();
@@ -231,6 +337,7 @@ pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
         }
         tangents.push(pair);
     });
+    sharp::set_tangents(&mut tangents, surface, across_boundary, |c, v| opposite(surface, c, v));
     Ok(tangents)
 }
 

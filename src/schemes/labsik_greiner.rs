@@ -87,6 +87,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     needs_triangles: true,
     refine,
     refined_topology,
+    halves: None,
     size: Size::in_three,
     limit_positions: |surface| vertices(NAME, surface),
     limit_normals,

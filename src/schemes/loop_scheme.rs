@@ -1,6 +1,7 @@
-//! Loop subdivision (Loop 1987) of closed triangle meshes, with Loop's own weights at extraordinary vertices.
+//! Loop subdivision (Loop 1987) of triangle meshes, with Loop's own weights at extraordinary vertices; sharp edges after Hoppe et al.
+//! 1994, with a rule for creases alone that does not depend on what lies beside them.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
@@ -8,13 +9,17 @@ use super::local_limit::StarRule;
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Definition, PaperNames, SingularSet, from_limit_weight};
+use super::sharp::{self, Across};
 use super::star::{
-    Tangents, blend_with_neighbors, prev_in_triangle, push_blends, require_room, require_triangles, ring_tangents, twin,
+    Tangents, across, blend_with_neighbors, next_in_triangle, prev_in_triangle, push_blends, refuse, require_room,
+    require_triangles_alone, ring_tangents,
 };
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
+use crate::mesh::features::Rule;
 use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
+use crate::parallel::find_first;
 
 /// The mask of the vertex point at valence `n`: the weight of the vertex, 3/8 + (3/8 + ¼cos(2π/n))², and of
 /// each neighbour, the rest over n.
@@ -68,6 +73,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     needs_triangles: true,
     refine,
     refined_topology,
+    halves: Some(refined::halves_in_fours),
     size: Size::in_four,
     limit_positions,
     limit_normals,
@@ -79,31 +85,53 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// the result: four for each old face, one at each of its corners as (vertex, edge leaving it, edge entering
 /// it), then the middle one.
 ///
+/// The points of sharp edges are their midpoints, of crease vertices (a + 6v + b)/8 with the neighbours a and b along the
+/// curve; corners rest; darts follow the rule of smooth vertices.
+///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary, a face is
-/// no triangle (the first is named), or the result is too large for 32-bit indices.
+/// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
+/// [`Error::NotTriangles`](crate::Error::NotTriangles) with the first face that is none,
+/// [`Error::TooLarge`](crate::Error::TooLarge) if 32-bit indices do not reach the result; [`Error::Mesh`](crate::Error::Mesh)
+/// with a vertex of two triangles that have all corners in common (a part of an open mesh that is closed): their middle
+/// triangles would share all corners too.
 pub fn refine(surface: &Surface) -> Result<Mesh> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_triangles(surface, "loop")?;
+    require_triangles_alone(surface, "loop")?;
     require_room(mesh, 4)?;
+    require_no_pillow(surface)?;
     let (old, corners) = (&mesh.positions, mesh.faces.corners());
     let edges = topology.edge_numbers();
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
     push_blends(&mut positions, surface, vertex_mask);
     edges.extend(&mut positions, |c| {
         // 3/8 of the vertex that a side leaves, 1/8 of the vertex opposite to it.
-        let [one, other] = [c, twin(topology, c)].map(|c| {
+        let [one, other] = [c, across(topology, c)].map(|c| {
             let opposite = old[corners[prev_in_triangle(c)] as usize];
             0.375 * old[corners[c as usize] as usize] + 0.125 * opposite
         });
         one + other
     });
+    sharp::set_refined(&mut positions, surface, &edges);
     Ok(Mesh::new(positions, split_in_four(mesh, &edges)))
 }
 
 /// The topology of `refined`, which is what [`refine`] or [`butterfly`](super::butterfly) made of the surface.
 pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
     refined::of_fours(surface.topology(), refined)
+}
+
+/// Refuses two triangles with the same corners, which a valid mesh has only beside a part with a boundary.
+fn require_no_pillow(surface: &Surface) -> Result<()> {
+    if surface.is_closed() {
+        return Ok(());
+    }
+    let (topology, incidence) = (surface.topology(), surface.incidence());
+    let is_inside = |&c: &u32| topology.twin(c).is_some() && topology.twin(prev_in_triangle(c) as u32).is_some();
+    let has_two = |v: usize| incidence.face_count(v) == 2 && incidence.corners_at(v).iter().all(is_inside);
+    match find_first(surface.len(), has_two) {
+        Some(v) => refuse(format!("vertex {v} has two triangles with the same corners; remove them")),
+        None => Ok(()),
+    }
 }
 
 /// The faces of a 1-to-4 split of triangles.
@@ -120,25 +148,99 @@ pub(super) fn split_in_four(mesh: &Mesh, edges: &EdgeNumbers) -> Faces {
     Faces::of_size(3, corners)
 }
 
-/// The limit points of all vertices.
+/// The limit points of all vertices: [`limit_mask`]; on curves (a + 4v + b)/6 with the neighbours a and b along the curve;
+/// corners rest; at darts [`dart_mask`].
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or a face
-/// is no triangle.
+/// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
+/// [`Error::NotTriangles`](crate::Error::NotTriangles) with the first face that is none.
 pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
-    require_triangles(surface, "loop")?;
-    Ok(blend_with_neighbors(surface, limit_mask))
+    require_triangles_alone(surface, "loop")?;
+    let mut limits = blend_with_neighbors(surface, limit_mask);
+    if let Some(features) = surface.features() {
+        sharp::set_limits(&mut limits, surface, CUBIC);
+        let (old, corners) = (surface.positions(), surface.faces().corners());
+        let mut star = Vec::new();
+        for v in features.with_rule(Rule::Dart) {
+            sharp::dart_star(surface, features, v, &mut star);
+            let mask = dart_mask(star.len());
+            let ring = star.iter().zip(&mask[1..]);
+            let moved = ring.map(|(&c, &weight)| weight * (old[corners[next_in_triangle(c)] as usize] - old[v]));
+            limits[v] = old[v] + moved.sum::<DVec3>();
+        }
+    }
+    Ok(limits)
+}
+
+/// The limit mask of a dart of valence `n`: the weight of the vertex, then of its neighbours, counter-clockwise from that
+/// along the sharp edge. The left eigenvector for 1 of a step on its star, by repetition: O(n).
+///
+/// ```
+/// use limitlab::schemes::loop_scheme::dart_mask;
+/// let mask = dart_mask(3);
+/// let exact = [16. / 37., 9. / 37., 6. / 37., 6. / 37.];
+/// assert!(mask.iter().zip(exact).all(|(found, exact)| (found - exact).abs() < 1e-15));
+/// ```
+pub fn dart_mask(n: usize) -> Vec<f64> {
+    let [vertex, neighbor] = vertex_mask(n);
+    let [own, other] = limit_mask(n);
+    let mut smooth = vec![own];
+    smooth.extend(vec![other; n]);
+    let edge = |j: usize| 1 + j % n;
+    sharp::left_eigenvector(smooth, |from, to| {
+        to[0] += vertex * from[0];
+        for j in 0..n {
+            to[edge(j)] += neighbor * from[0];
+            let part = from[edge(j)] / 8.0;
+            if j == 0 {
+                // The midpoint.
+                for k in [0, edge(0)] {
+                    to[k] += 4.0 * part;
+                }
+                continue;
+            }
+            for k in [0, edge(j)] {
+                to[k] += 3.0 * part;
+            }
+            for k in [edge(j - 1), edge(j + 1)] {
+                to[k] += part;
+            }
+        }
+    })
+}
+
+/// The weights of the tangent across the boundary at a vertex of `m` triangles there. `None` from six on: the limit normals of
+/// its faces differ.
+///
+/// With θ = π/m and λ = 3/8 + ¼cos θ, the left eigenvector for λ of a step on the star is sin jθ on the inner neighbours
+/// e_1 … e_{m−1}; its sum is 0; and the column of e_0 leaves its weight there, (sin θ − Σ sin jθ)/8 over λ − 1/4. With one
+/// triangle it is e_0 + e_1 − 2v, for 1/4.
+fn across_boundary(m: usize) -> Option<Across> {
+    match m {
+        1 => return Some(Across { edges: vec![1.0; 2], faces: Vec::new() }),
+        2..=5 => {}
+        _ => return None,
+    }
+    let theta = PI / m as f64;
+    let mut edges: Vec<f64> = (0..=m).map(|j| (theta * j as f64).sin()).collect();
+    let end = (edges[1] - edges[1..m].iter().sum::<f64>()) / (1.0 + 2.0 * theta.cos());
+    (edges[0], edges[m]) = (end, end);
+    Some(Across { edges, faces: Vec::new() })
 }
 
 /// The tangents of the limit surface at all vertices: cos(2πj/n) and sin(2πj/n) on the neighbours in
-/// counter-clockwise order.
+/// counter-clockwise order. At a boundary vertex with up to five triangles and no sharp edge between them one goes along the
+/// boundary and one across it; at a corner with one triangle they go along its sides. All others that are not smooth have none:
+/// from six triangles on the normals of the faces at a boundary vertex differ, a crease has one normal a side, a corner one a
+/// face; those of darts are not computed.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or a face
-/// is no triangle.
+/// As [`limit_positions`].
 pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
-    require_triangles(surface, "loop")?;
-    Ok(ring_tangents(surface))
+    require_triangles_alone(surface, "loop")?;
+    let mut tangents = ring_tangents(surface);
+    sharp::set_tangents(&mut tangents, surface, across_boundary, |_, _| DVec3::ZERO);
+    Ok(tangents)
 }
 
 /// The unit normals of the limit surface at all vertices; zero where [`Tangents::normal`] is.

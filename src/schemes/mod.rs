@@ -13,7 +13,10 @@
 //! | [`butterfly`] | modified Butterfly, Zorin, Schröder & Sweldens 1996 | triangles | yes |
 //! | [`labsik_greiner`] | interpolatory √3, Labsik & Greiner 2000 | triangles | yes |
 //!
-//! Meshes are closed: an open one is refused with an [`Error::Open`](crate::Error::Open). A step takes time and memory
+//! Catmull-Clark and Loop take open and creased meshes too: edges with one face and tagged ones are
+//! [sharp](crate::mesh::features), their curves cubic B-splines. All others refuse them with an
+//! [`Error::NotOffered`](crate::Error::NotOffered), and all of them refuse a boundary that is treated as interior with an
+//! [`Error::Open`](crate::Error::Open). A step takes time and memory
 //! proportional to the mesh, with flat arrays only, in parallel: every new point is gathered from the old ones, with
 //! the same result for any number of threads; new faces, and their topology, come from index arithmetic on half-edges.
 //!
@@ -42,6 +45,7 @@ mod refined;
 mod refinement;
 mod ring;
 mod scheme;
+mod sharp;
 pub mod sqrt3;
 mod star;
 pub mod unified_sqrt3;

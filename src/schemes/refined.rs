@@ -7,7 +7,8 @@
 //! valid too.
 
 use super::star::{next_in_triangle, prev_in_triangle, stars};
-use crate::mesh::topology::Scatter;
+use crate::mesh::incidence::split_rows;
+use crate::mesh::topology::{NONE, Scatter};
 use crate::mesh::{Incidence, Mesh, Surface, Topology};
 use crate::pages::large;
 use crate::parallel;
@@ -17,6 +18,9 @@ const CHUNK: usize = 4096;
 
 /// After the split of every face into quads, one a corner: quad c is (vertex, edge of c, face, edge of prev c).
 pub(super) fn of_quads(surface: &Surface, refined: &Mesh) -> Topology {
+    if !surface.is_closed() {
+        return of_quads_with_boundary(surface, refined);
+    }
     let (mesh, topology) = (surface.mesh(), surface.topology());
     let (faces, incidence, twin) = (&mesh.faces, &topology.incidence, topology.twins());
     let count = twin.len();
@@ -50,10 +54,11 @@ pub(super) fn of_quads(surface: &Surface, refined: &Mesh) -> Topology {
 /// After the split of every triangle f in four: triangle 4f + i is (vertex, edge of c, edge of prev c) with c = 3f + i,
 /// triangle 4f + 3 has the three edges.
 pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
+    if !topology.is_closed() {
+        return of_fours_with_boundary(topology, refined);
+    }
     let (incidence, twin) = (&topology.incidence, topology.twins());
     let count = twin.len();
-    // The first corner of the triangle at corner c.
-    let outer = |c: u32| 3 * (c + c / 3);
     let mut twins = large(vec![0; 4 * count]);
     set_rows(&mut twins, |f| {
         let mut twins = [0; 12];
@@ -74,12 +79,8 @@ pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
     let mut corners = large(vec![0; 4 * count]);
     let (at_vertices, at_edges) = corners.split_at_mut(count);
     scale(at_vertices, incidence.corners(), outer);
-    let three = |c: u32| {
-        let (here, after) = (outer(c) + 1, outer(next_in_triangle(c) as u32) + 2);
-        [here.min(after), here.max(after), 12 * (c / 3) + 9 + c % 3]
-    };
     set_by_edge(at_edges, topology, |c| {
-        let ([a, b, m], [d, e, n]) = (three(c), three(twin[c as usize]));
+        let ([a, b, m], [d, e, n]) = (at_side(c), at_side(twin[c as usize]));
         [a, b, m, d, e, n]
     });
 
@@ -87,6 +88,140 @@ pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
     parallel::append(&mut offsets, incidence.offsets());
     push_ends(&mut offsets, count, 6, count / 2);
     closed(refined, offsets, corners, twins)
+}
+
+/// The half-edges along half-edge c after the split into quads.
+pub(super) fn halves_in_quads(surface: &Surface, c: u32) -> [u32; 2] {
+    [4 * c, 4 * surface.incidence().next(surface.faces(), c) + 3]
+}
+
+/// The half-edges along half-edge c after the split of triangles in four.
+pub(super) fn halves_in_fours(_: &Surface, c: u32) -> [u32; 2] {
+    [outer(c), outer(next_in_triangle(c) as u32) + 2]
+}
+
+/// After the split of triangles in four, the first corner of the triangle at corner c.
+fn outer(c: u32) -> u32 {
+    3 * (c + c / 3)
+}
+
+/// After the split of triangles in four, the corners at the vertex of the edge of c in the face of c, ascending.
+fn at_side(c: u32) -> [u32; 3] {
+    let (here, after) = (outer(c) + 1, outer(next_in_triangle(c) as u32) + 2);
+    [here.min(after), here.max(after), 12 * (c / 3) + 9 + c % 3]
+}
+
+/// As [`of_quads`], of an open mesh.
+fn of_quads_with_boundary(surface: &Surface, refined: &Mesh) -> Topology {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
+    let (faces, incidence, twin) = (&mesh.faces, &topology.incidence, topology.twins());
+    let count = twin.len();
+    let (next, prev) = (|c| incidence.next(faces, c), |c| incidence.prev(faces, c));
+    let mut twins = large(vec![0; 4 * count]);
+    set_rows(&mut twins, |c| {
+        let before = prev(c);
+        let leaving = there(twin[c as usize], |t| 4 * next(t) + 3);
+        let entering = there(twin[before as usize], |t| 4 * t);
+        [leaving, 4 * next(c) + 2, 4 * before + 1, entering]
+    });
+
+    let mut offsets = large(Vec::with_capacity(refined.len() + 1));
+    parallel::append(&mut offsets, incidence.offsets());
+    push_ends_by_edge(&mut offsets, topology, 2);
+    let mut corners = large(vec![0; 4 * count]);
+    let (at_vertices, rest) = corners.split_at_mut(count);
+    let (at_edges, at_faces) = rest.split_at_mut(2 * count);
+    scale(at_vertices, incidence.corners(), |c| 4 * c);
+    set_sides_by_edge(at_edges, &offsets[incidence.vertices()..], topology, |c, row: &mut [[u32; 2]]| {
+        for (side, c) in row.iter_mut().zip([c, twin[c as usize]]) {
+            *side = [4 * c + 1, 4 * next(c) + 3];
+        }
+        row.as_flattened_mut().sort_unstable();
+    });
+    set_rows(at_faces, |c| [4 * c + 2]);
+    let first = 3 * count as u32;
+    parallel::extend(&mut offsets, faces.len(), |_| |f| first + faces.range(f).end as u32);
+    let boundary = halved(topology, |c| halves_in_quads(surface, c));
+    Topology::open(Incidence::from_parts(offsets, corners, &refined.faces), twins, boundary)
+}
+
+/// As [`of_fours`], of an open mesh.
+fn of_fours_with_boundary(topology: &Topology, refined: &Mesh) -> Topology {
+    let (incidence, twin) = (&topology.incidence, topology.twins());
+    let count = twin.len();
+    let mut twins = large(vec![0; 4 * count]);
+    set_rows(&mut twins, |f| {
+        let mut twins = [0; 12];
+        let middle = 12 * f + 9;
+        for i in 0..3 {
+            let (next, prev) = ((i + 1) % 3, (i + 2) % 3);
+            let at = 3 * i as usize;
+            twins[at] = there(twin[(3 * f + i) as usize], |t| outer(next_in_triangle(t) as u32) + 2);
+            twins[at + 1] = middle + prev;
+            twins[at + 2] = there(twin[(3 * f + prev) as usize], outer);
+            twins[9 + i as usize] = outer(3 * f + next) + 1;
+        }
+        twins
+    });
+
+    let mut offsets = large(Vec::with_capacity(refined.len() + 1));
+    parallel::append(&mut offsets, incidence.offsets());
+    push_ends_by_edge(&mut offsets, topology, 3);
+    let mut corners = large(vec![0; 4 * count]);
+    let (at_vertices, at_edges) = corners.split_at_mut(count);
+    scale(at_vertices, incidence.corners(), outer);
+    set_sides_by_edge(at_edges, &offsets[incidence.vertices()..], topology, |c, row: &mut [[u32; 3]]| {
+        for (side, c) in row.iter_mut().zip([c, twin[c as usize]]) {
+            *side = at_side(c);
+        }
+    });
+    let boundary = halved(topology, |c| [outer(c), outer(next_in_triangle(c) as u32) + 2]);
+    Topology::open(Incidence::from_parts(offsets, corners, &refined.faces), twins, boundary)
+}
+
+/// What becomes of a twin; [`NONE`] of none.
+fn there(twin: u32, map: impl Fn(u32) -> u32) -> u32 {
+    if twin == NONE { NONE } else { map(twin) }
+}
+
+/// The halves of the sides without a twin, ascending.
+fn halved(topology: &Topology, halves: impl Fn(u32) -> [u32; 2]) -> Vec<u32> {
+    let mut halved: Vec<u32> = topology.boundary_half_edges().iter().flat_map(|&c| halves(c)).collect();
+    halved.sort_unstable();
+    halved
+}
+
+/// Appends the ends of a row for every edge, of `size` entries a side, that begin after the last end.
+fn push_ends_by_edge(offsets: &mut Vec<u32>, topology: &Topology, size: u32) {
+    let edges = topology.edge_numbers();
+    let start = offsets[offsets.len() - 1];
+    let rim: Vec<u32> = topology.boundary_half_edges().iter().map(|&c| edges.of(c)).collect();
+    parallel::extend(offsets, topology.edges(), |first| {
+        let rim = &rim;
+        // How many edges up to this one have one side.
+        let mut single = rim.partition_point(|&e| (e as usize) < first);
+        move |e| {
+            single += usize::from(rim.get(single) == Some(&(e as u32)));
+            start + size * (2 * (e + 1) - single) as u32
+        }
+    });
+}
+
+/// Has `set(c, row)` write the row of every edge, c its first half-edge, of N entries a side; rows end as in `offsets`.
+fn set_sides_by_edge<const N: usize>(
+    values: &mut [u32],
+    offsets: &[u32],
+    topology: &Topology,
+    set: impl Fn(u32, &mut [[u32; N]]) + Sync,
+) {
+    let edges = topology.edge_numbers();
+    parallel::parts(split_rows(offsets, CHUNK, values), |rows, mut part| {
+        for (e, c) in rows.clone().zip(edges.firsts_from(rows.start as u32)) {
+            let (row, rest) = part.split_at_mut((offsets[e + 1] - offsets[e]) as usize);
+            set(c, row.as_chunks_mut().0);
+            part = rest;
+        }
+    });
 }
 
 /// After the split of every triangle in three and the flip of every old edge: triangle c is (vertex, face of t, face

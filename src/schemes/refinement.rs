@@ -21,7 +21,7 @@ pub enum Class {
     Interpolatory,
 }
 
-/// How large a mesh is, closed ones alone.
+/// How large a mesh is. Edges are counted as on a closed one: half of those on a boundary are missing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Size {
     pub(super) vertices: u64,
@@ -53,6 +53,9 @@ pub(super) struct RefinementRules {
     pub(super) refine: fn(&Surface) -> Result<Mesh>,
     /// Of a mesh and what `refine` made of it.
     pub(super) refined_topology: fn(&Surface, &Mesh) -> Topology,
+    /// The half-edges of the refined mesh along a half-edge, in this order, where a step splits every edge in two and has
+    /// rules for sharp ones.
+    pub(super) halves: Option<fn(&Surface, u32) -> [u32; 2]>,
     pub(super) size: fn(Size) -> Size,
     pub(super) limit_positions: fn(&Surface) -> Result<Vec<DVec3>>,
     pub(super) limit_normals: fn(&Surface) -> Result<Vec<DVec3>>,
@@ -119,13 +122,17 @@ impl Refinement {
     /// One step: positions and faces. The scheme's own `refine` says how the result is numbered.
     ///
     /// # Errors
-    /// [`Error::Open`]; [`Error::NotTriangles`] where the scheme needs these; [`Error::TooLarge`].
+    /// [`Error::Open`] if the mesh has a boundary that is treated as interior; [`Error::NotOffered`] if it has sharp edges or
+    /// vertices, which Catmull-Clark and Loop alone take; [`Error::NotTriangles`] where the scheme needs these;
+    /// [`Error::TooLarge`].
     pub fn refine(self, surface: &Surface) -> Result<Mesh> {
         (self.rules().refine)(surface)
     }
 
     /// One step, with its topology: equal to [`Topology::new`] of its faces, at a fraction of the cost, as index
     /// arithmetic on the coarse one gives it. The refinement of a valid mesh is valid.
+    ///
+    /// Rules of vertices stay; both halves of a sharp edge are sharp, and the vertex between them is a crease vertex.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).
@@ -142,7 +149,15 @@ impl Refinement {
     pub fn refined(self, surface: &Surface) -> Result<Surface> {
         let refined = self.refine(surface)?;
         let topology = (self.rules().refined_topology)(surface, &refined);
-        Ok(Surface::of_topology(refined, topology))
+        Ok(match (surface.features(), self.rules().halves) {
+            (Some(features), Some(halves)) => {
+                let halves = |c| halves(surface, c);
+                let features = features.refined(&refined.faces, &topology, surface.topology(), halves);
+                Surface::of_parts(refined, topology, surface.boundary(), Some(features))
+            }
+            // Without features, as others are refused above.
+            _ => Surface::of_topology(refined, topology),
+        })
     }
 
     /// Refuses, before the work, `levels` steps whose meshes have more corners than 32-bit indices name, or for which
@@ -205,7 +220,7 @@ impl Refinement {
     }
 
     /// The limit points of all vertices; under dual refinements the centroids of the faces that they become, under the
-    /// interpolatory ones the vertices themselves.
+    /// interpolatory ones the vertices themselves. On curves of sharp edges (a + 4v + b)/6; corners rest.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).
@@ -214,7 +229,9 @@ impl Refinement {
     }
 
     /// The unit normals of the limit surface at the [`limit_positions`](Self::limit_positions); zero where
-    /// [`Tangents::normal`](super::Tangents::normal) is.
+    /// [`Tangents::normal`](super::Tangents::normal) is, and where the surface has several or they are not computed: on
+    /// creases, at darts, at corners but for those with one face, on a boundary beside four faces or more under Catmull-Clark,
+    /// six under Loop.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).

@@ -70,6 +70,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     needs_triangles: true,
     refine,
     refined_topology,
+    halves: None,
     size: Size::in_three,
     limit_positions,
     limit_normals,

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use crate::mesh::features::Rule;
 use crate::mesh::frame::magnitude;
 use crate::mesh::incidence::split_rows;
 use crate::mesh::topology::NONE;
@@ -17,11 +18,27 @@ pub(super) const CHUNK: usize = 1024;
 /// A normal shorter than this, relative to the reach of its star squared, is rounding: some tens of ε.
 const DEGENERATE: f64 = 1e-14;
 
-/// Refuses a boundary, and creases.
-pub(crate) fn require_closed(surface: &Surface) -> Result<()> {
+/// Refuses a boundary that is treated as interior: around its vertices there are no whole faces, and it has no rules of its
+/// own; and what is semi-sharp.
+pub(crate) fn require_rules(surface: &Surface) -> Result<()> {
     match surface.features() {
-        _ if !surface.is_closed() => Err(Error::Open { edges: surface.boundary_edges(), scheme: "subdivision" }),
-        Some(_) => Err(Error::Creased { what: "subdivision" }),
+        Some(features) if features.is_semi_sharp() => {
+            let vertex = features.rules().iter().position(|&rule| rule == Rule::SemiSharp).unwrap_or(0);
+            Err(Error::SemiSharp { vertex, scheme: "subdivision" })
+        }
+        None if !surface.is_closed() => Err(Error::Open { edges: surface.boundary_edges(), scheme: "subdivision" }),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses a boundary, and creases, naming the schemes that have rules for them.
+pub(crate) fn require_closed(surface: &Surface) -> Result<()> {
+    require_rules(surface)?;
+    match surface.features() {
+        Some(_) => Err(Error::NotOffered {
+            what: "only refinements with rules for sharp edges take boundaries, creases and corners".into(),
+            schemes: &["catmull-clark", "loop"],
+        }),
         None => Ok(()),
     }
 }
@@ -29,6 +46,12 @@ pub(crate) fn require_closed(surface: &Surface) -> Result<()> {
 /// Refuses a mesh that is not closed or has a face that is no triangle, naming the first such face.
 pub(crate) fn require_triangles(surface: &Surface, scheme: &'static str) -> Result<()> {
     require_closed(surface)?;
+    require_triangles_alone(surface, scheme)
+}
+
+/// Refuses a mesh with a face that is no triangle, naming the first such face, and a boundary without rules.
+pub(crate) fn require_triangles_alone(surface: &Surface, scheme: &'static str) -> Result<()> {
+    require_rules(surface)?;
     let faces = surface.faces();
     match find_first(faces.len(), |f| faces.range(f).len() != 3) {
         Some(face) => Err(Error::NotTriangles { face, corners: faces.face(face).len(), scheme }),
@@ -53,6 +76,11 @@ pub(crate) fn refuse<T>(what: String) -> Result<T> {
 /// The opposite half-edge in a mesh that [`require_closed`] has let pass.
 pub(crate) fn twin(topology: &Topology, c: u32) -> u32 {
     topology.twin(c).expect("a closed mesh has every twin")
+}
+
+/// The opposite half-edge; on a boundary the same.
+pub(crate) fn across(topology: &Topology, c: u32) -> u32 {
+    topology.twin(c).unwrap_or(c)
 }
 
 /// The sides (v, next v) of a face.

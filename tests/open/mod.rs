@@ -3,6 +3,7 @@
 mod closed_forms;
 mod methods;
 mod naive;
+mod refinement;
 mod rows;
 
 use glam::DVec3;

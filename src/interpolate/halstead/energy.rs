@@ -14,12 +14,12 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::LEVELS;
-use crate::Result;
 use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
 use crate::mesh::Surface;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::schemes::Refinement;
+use crate::{Error, Result};
 
 /// How much of each energy the fairness holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,8 +68,15 @@ impl Fairness {
     /// patch.
     ///
     /// # Errors
-    /// As the refinement: a mesh that is not closed, or too large.
+    /// A mesh that is not closed, has creases or corners, or is too large.
     pub fn new(surface: &Surface) -> Result<Self> {
+        match surface.features() {
+            _ if !surface.is_closed() => {
+                return Err(Error::Open { edges: surface.boundary_edges(), scheme: "fair interpolation" });
+            }
+            Some(_) => return Err(Error::Creased { what: "fair interpolation" }),
+            None => {}
+        }
         let fine = Refinement::CatmullClark.refined_n(surface, LEVELS)?;
         let finer = Refinement::CatmullClark.refined(&fine)?;
         let masks = StepMasks::new(&fine);

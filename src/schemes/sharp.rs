@@ -1,0 +1,131 @@
+//! Sharp edges and vertices under Catmull-Clark and Loop, whose curves are cubic B-splines: what a step, limit points and
+//! tangents are there. A smooth vertex has all of its faces, so that everything is computed as on a closed mesh first, and
+//! then set anew at the few places that are sharp. Values that the first pass gives to the ends of incomplete stars are
+//! finite and mean nothing.
+
+use glam::{DVec2, DVec3};
+
+use super::star::{CHUNK, Tangents};
+use crate::mesh::Surface;
+use crate::mesh::edge_numbers::EdgeNumbers;
+use crate::mesh::features::{Features, Rule};
+use crate::parallel;
+
+/// Sets the points of sharp edges, creases and corners after a step: (v + w)/2 for an edge, (a + 6v + b)/8 for a crease
+/// vertex with the neighbours a and b along its curve; corners rest. `positions` are those of the old vertices, then one for
+/// each edge, then others. O(N), and O(k) by one thread for k vertices on curves.
+pub(super) fn set_refined(positions: &mut [DVec3], surface: &Surface, edges: &EdgeNumbers) {
+    let Some(features) = surface.features() else { return };
+    let (old, faces, topology) = (surface.positions(), surface.faces(), surface.topology());
+    let (vertices, others) = positions.split_at_mut(surface.len());
+    set_vertices(vertices, old, features, 0.125);
+    let (corners, sharp) = (faces.corners(), features.sharp_half_edges());
+    parallel::chunks(&mut others[..topology.edges()], CHUNK, |first, part| {
+        // Sharp edges are listed by first half-edges, which is the order of their numbers.
+        let from = sharp.partition_point(|&c| (edges.of(c) as usize) < first);
+        for &c in &sharp[from..] {
+            let Some(point) = part.get_mut(edges.of(c) as usize - first) else { break };
+            let ends = [c, topology.incidence.next(faces, c)].map(|c| old[corners[c as usize] as usize]);
+            *point = 0.5 * (ends[0] + ends[1]);
+        }
+    });
+}
+
+/// Sets the limit points of creases, (a + 4v + b)/6, and of corners.
+pub(super) fn set_limits(limits: &mut [DVec3], surface: &Surface, weight: f64) {
+    if let Some(features) = surface.features() {
+        set_vertices(limits, surface.positions(), features, weight);
+    }
+}
+
+/// `w a + (1 − 2w) v + w b` on curves, v at corners.
+fn set_vertices(points: &mut [DVec3], old: &[DVec3], features: &Features, w: f64) {
+    let rules = features.rules();
+    parallel::change(points, |v, point| {
+        if rules[v] == Rule::Corner {
+            *point = old[v];
+        }
+    });
+    features.for_each_crease(|v, [a, b]| points[v] = (1.0 - 2.0 * w) * old[v] + w * (old[a] + old[b]));
+}
+
+/// The corners at a dart in counter-clockwise order, from that whose side is the sharp edge.
+pub(super) fn dart_star(surface: &Surface, features: &Features, v: usize, star: &mut Vec<u32>) {
+    let topology = surface.topology();
+    topology.star(surface.faces(), v, star);
+    let is_sharp = |&c: &u32| {
+        let first = topology.twin(c).map_or(c, |t| t.min(c));
+        features.sharp_half_edges().binary_search(&first).is_ok()
+    };
+    let place = star.iter().position(is_sharp).unwrap_or(0);
+    star.rotate_left(place);
+}
+
+/// The limit of a process that is repeated until it has converged to rounding: `mask ← step(mask)`, a step that shrinks
+/// the errors of a mask of sum 1 by the factor 0.66 at most.
+pub(super) fn left_eigenvector(mut mask: Vec<f64>, step: impl Fn(&[f64], &mut [f64])) -> Vec<f64> {
+    /// 0.66^100 = 1e-18.
+    const STEPS: usize = 100;
+    let mut next = vec![0.0; mask.len()];
+    for _ in 0..STEPS {
+        next.fill(0.0);
+        step(&mask, &mut next);
+        std::mem::swap(&mut mask, &mut next);
+    }
+    let sum: f64 = mask.iter().sum();
+    mask.iter_mut().for_each(|weight| *weight /= sum);
+    mask
+}
+
+/// The weights of a tangent across the boundary at a vertex of m faces there: of its m + 1 edge neighbours, and of the
+/// opposite corners of its m faces. That of the vertex itself makes their sum 0.
+pub(super) struct Across {
+    pub(super) edges: Vec<f64>,
+    pub(super) faces: Vec<f64>,
+}
+
+/// Sets the tangents of all vertices that are not smooth: of boundary vertices with one sector of m faces along the boundary,
+/// e_0 − e_m, and across it by `across(m)`; of a corner with one face, along its two sides; none of others. `opposite(c, v)`
+/// is the opposite corner of the face of corner c of v, as seen from v, where it is part of the mask.
+pub(super) fn set_tangents(
+    tangents: &mut [Tangents],
+    surface: &Surface,
+    across: impl Fn(usize) -> Option<Across>,
+    opposite: impl Fn(u32, usize) -> DVec3,
+) {
+    let Some(features) = surface.features() else { return };
+    let (faces, topology, points) = (surface.faces(), surface.topology(), surface.positions());
+    let mut masks: Vec<Option<Option<Across>>> = Vec::new();
+    let mut star = Vec::new();
+    for v in (0..surface.len()).filter(|&v| !features.is_smooth(v)) {
+        let mut pair = Tangents::default();
+        let is_boundary = !topology.star(faces, v, &mut star);
+        let m = star.len();
+        let seen = |c: u32| points[faces.corners()[c as usize] as usize] - points[v];
+        let edge = |j: usize| match star.get(j) {
+            Some(&c) => seen(topology.incidence.next(faces, c)),
+            None => seen(topology.incidence.prev(faces, star[m - 1])),
+        };
+        match features.rules()[v] {
+            Rule::Crease if is_boundary => {
+                if masks.len() <= m {
+                    masks.resize_with(m + 1, || None);
+                }
+                if let Some(mask) = masks[m].get_or_insert_with(|| across(m)) {
+                    pair.add(DVec2::new(1.0, mask.edges[0]), edge(0));
+                    pair.add(DVec2::new(-1.0, mask.edges[m]), edge(m));
+                    (1..m).for_each(|j| pair.add(DVec2::new(0.0, mask.edges[j]), edge(j)));
+                    for (&c, &weight) in star.iter().zip(&mask.faces) {
+                        pair.add(DVec2::new(0.0, weight), opposite(c, v));
+                    }
+                }
+            }
+            Rule::Corner if is_boundary && m == 1 => {
+                pair.add(DVec2::X, edge(0));
+                pair.add(DVec2::Y, edge(1));
+            }
+            Rule::Crease | Rule::Corner | Rule::Dart | Rule::SemiSharp | Rule::Smooth => {}
+        }
+        tangents[v] = pair;
+    }
+}

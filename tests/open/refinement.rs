@@ -1,0 +1,358 @@
+//! Refinement of open and creased meshes, its limit points and normals: against refinement by hand, against tags given anew,
+//! and against themselves after a step.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use limitlab::Error;
+use limitlab::interpolate::surface::{Request, surface};
+use limitlab::interpolate::{Options, interpolate, limit_points};
+use limitlab::mesh::features::{Rule, Tags};
+use limitlab::mesh::validate::Boundary;
+use limitlab::mesh::{Faces, Mesh, Surface, Topology};
+use limitlab::schemes::{Refinement, Scheme, catmull_clark, loop_scheme};
+
+use super::naive::{Creased, edge, faces_by_edge};
+use super::{grid, open, random_creased, random_points};
+
+type Step = fn(&Creased) -> Creased;
+const SCHEMES: [(Scheme, Refinement, Step); 2] = [
+    (Scheme::CatmullClark, Refinement::CatmullClark, Creased::catmull_clark),
+    (Scheme::Loop, Refinement::Loop, Creased::loop_step),
+];
+
+/// As [`random_creased`], every second one with the darts that its corners hide.
+fn random_with_darts(scheme: Scheme, seed: u64) -> Option<(Surface, Tags)> {
+    let (surface, mut tags) = random_creased(scheme, seed)?;
+    if seed % 2 == 1 {
+        return Some((surface, tags));
+    }
+    tags.corners.clear();
+    Some((surface.tagged(&tags).unwrap(), tags))
+}
+
+/// The refined surface with all that is sharp tagged anew; `sharp` by its ends there.
+fn tagged_anew(fine: &Surface, sharp: impl Iterator<Item = [u32; 2]>, corners: impl Iterator<Item = u32>) -> Surface {
+    let tags = Tags {
+        boundary: fine.boundary(),
+        creases: sharp.map(|ends| (ends, 10.0)).collect(),
+        corners: corners.map(|v| (v, 10.0)).collect(),
+    };
+    Surface::examined(fine.mesh().clone(), None, fine.boundary()).unwrap().tagged(&tags).unwrap()
+}
+
+/// Topology and features against those found from the refined faces alone, where the new vertices on edges stand in the
+/// order of their edges' first half-edges.
+fn hold_against_tags(coarse: &Surface, fine: &Surface) {
+    assert!(*fine.topology() == Topology::new(fine.faces(), fine.len()));
+    assert_eq!(fine.boundary_edges(), 2 * coarse.boundary_edges());
+    let Some(features) = coarse.features() else {
+        assert!(fine.features().is_none());
+        return;
+    };
+    assert_eq!(fine.boundary(), coarse.boundary());
+    let topology = coarse.topology();
+    let numbers: BTreeMap<u32, u32> = topology.edge_sides().zip(coarse.len() as u32..).collect();
+    let corners = coarse.faces().corners();
+    let halves = features.sharp_half_edges().iter().flat_map(|&c| {
+        let face = coarse.faces().range(topology.incidence.face_of(c));
+        let next = if c as usize + 1 == face.end { face.start } else { c as usize + 1 };
+        [[corners[c as usize], numbers[&c]], [numbers[&c], corners[next]]]
+    });
+    let resting = (0..coarse.len() as u32).filter(|&v| features.rules()[v as usize] == Rule::Corner);
+    let anew = tagged_anew(fine, halves, resting);
+    assert!(fine.features() == anew.features());
+    let found = fine.features().unwrap();
+    assert_eq!(found.rules()[..coarse.len()], *features.rules());
+    assert_eq!(found.creased_edges(), 2 * features.creased_edges());
+}
+
+#[test]
+fn a_step_is_the_one_by_hand_and_carries_features_over() {
+    for (scheme, refinement, step) in SCHEMES {
+        let (mut open, mut darts) = (0, 0);
+        for seed in 0..200 {
+            let Some((coarse, tags)) = random_with_darts(scheme, seed) else { continue };
+            let by_hand = step(&Creased::of(&coarse, &tags));
+            let fine = refinement.refined(&coarse).unwrap();
+            assert_eq!(fine.mesh().faces, refinement.refine(&coarse).unwrap().faces);
+            // By hand, edges come in the order of their ends.
+            let edges: BTreeMap<[u32; 2], u32> = faces_by_edge(coarse.mesh()).into_keys().zip(0..).collect();
+            let n = coarse.len();
+            let mut place: Vec<u32> = (0..fine.len() as u32).collect();
+            let topology = coarse.topology();
+            for (e, c) in topology.edge_sides().enumerate() {
+                let face = coarse.faces().face(topology.incidence.face_of(c));
+                let k = c as usize - coarse.faces().range(topology.incidence.face_of(c)).start;
+                place[n + e] = n as u32 + edges[&edge(face[k], face[(k + 1) % face.len()])];
+            }
+            for (v, &there) in place.iter().enumerate() {
+                let off = fine.positions()[v].distance(by_hand.mesh.positions[there as usize]);
+                assert!(off <= 1e-14, "{scheme}, seed {seed}, vertex {v}: {off:e}");
+            }
+            for (ours, theirs) in fine.faces().iter().zip(by_hand.mesh.faces.iter()) {
+                assert!(ours.iter().map(|&v| place[v as usize]).eq(theirs.iter().copied()), "{scheme}, seed {seed}");
+            }
+            hold_against_tags(&coarse, &fine);
+            hold_against_tags(&fine, &refinement.refined(&fine).unwrap());
+            open += usize::from(!coarse.is_closed());
+            darts += coarse.features().map_or(0, |f| f.count(Rule::Dart));
+        }
+        assert!(open > 100 && darts > 50, "{scheme}: {open}, {darts}");
+    }
+}
+
+/// Meshes of many tasks, with holes and creases in all of them.
+#[test]
+fn large_meshes_are_refined_as_small_ones() {
+    for (refinement, triangles) in [(Refinement::CatmullClark, false), (Refinement::Loop, true)] {
+        let (p, q) = (110, 120);
+        let mut mesh = grid(p, q, triangles);
+        let is_inside = |&v: &u32| (2..p - 2).contains(&(v as usize / q)) && (2..q - 2).contains(&(v as usize % q));
+        let faces = mesh.faces.iter().enumerate();
+        let kept = faces.filter(|(f, face)| f % 1013 != 500 || !face.iter().all(is_inside));
+        mesh.faces = Faces::from_lists(kept.map(|(_, face)| face));
+        let coarse = open(mesh, Boundary::EdgeAndCorner);
+        let at = |i: usize, j: usize| (i * q + j) as u32;
+        let columns = (1..p - 1).step_by(9).flat_map(|i| (1..q - 20).map(move |j| [at(i, j), at(i, j + 1)]));
+        let creases = columns.filter(|&ends| coarse.incidence().half_edge(coarse.faces(), ends).is_some());
+        let creases = creases.map(|ends| (ends, 10.0)).collect();
+        let tags = Tags { boundary: Boundary::EdgeAndCorner, creases, corners: vec![(at(50, 50), 10.0)] };
+        let coarse = coarse.tagged(&tags).unwrap();
+        let fine = refinement.refined(&coarse).unwrap();
+        hold_against_tags(&coarse, &fine);
+        let (features, topology) = (coarse.features().unwrap(), coarse.topology());
+        assert!(features.creased_edges() > 1000 && features.count(Rule::Dart) > 10);
+        let mut held = 0;
+        for (e, c) in topology.edge_sides().enumerate() {
+            if features.sharp_half_edges().binary_search(&c).is_ok() {
+                let face = coarse.faces().face(topology.incidence.face_of(c));
+                let k = c as usize - coarse.faces().range(topology.incidence.face_of(c)).start;
+                let ends = [face[k], face[(k + 1) % face.len()]].map(|v| coarse.positions()[v as usize]);
+                assert_eq!(fine.positions()[coarse.len() + e], 0.5 * (ends[0] + ends[1]));
+                held += 1;
+            }
+        }
+        assert_eq!(held, features.sharp_half_edges().len());
+    }
+}
+
+#[test]
+fn limit_points_are_those_of_the_rows_and_stay_under_refinement() {
+    for (scheme, refinement, _) in SCHEMES {
+        let mut darts = 0;
+        for seed in 0..200 {
+            let Some((coarse, _)) = random_with_darts(scheme, seed) else { continue };
+            let limits = refinement.limit_positions(&coarse).unwrap();
+            let dart = coarse.features().map_or(0, |f| f.count(Rule::Dart));
+            if dart == 0 {
+                for (a, b) in limits.iter().zip(limit_points(&coarse, scheme).unwrap()) {
+                    assert!(a.distance(b) <= 1e-14, "{scheme}, seed {seed}");
+                }
+            }
+            darts += dart;
+            let finer = refinement.limit_positions(&refinement.refined(&coarse).unwrap()).unwrap();
+            for (v, (a, b)) in limits.iter().zip(finer).enumerate() {
+                let off = a.distance(b);
+                assert!(off <= 1e-14, "{scheme}, seed {seed}, vertex {v}: {off:e}");
+            }
+        }
+        assert!(darts > 50, "{darts}");
+    }
+}
+
+#[test]
+fn masks_of_darts_are_the_exact_ones() {
+    let hold = |found: Vec<f64>, expected: Vec<f64>| {
+        assert!(found.len() == expected.len());
+        assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-15), "{found:?} {expected:?}");
+    };
+    let four = [752., 210., 29., 160., 44., 180., 44., 160., 29.].map(|x| x / 1608.0);
+    hold(catmull_clark::dart_mask(4), four.to_vec());
+    let six = vec![110. / 213., 7. / 71., 29. / 426., 35. / 426., 6. / 71., 35. / 426., 29. / 426.];
+    hold(loop_scheme::dart_mask(6), six);
+}
+
+/// A fan of m faces at vertex 0, on a boundary, its points at random about a bent disc.
+fn fan(m: usize, triangles: bool, seed: u64) -> Mesh {
+    let rays = if triangles { m } else { 2 * m };
+    let noise = random_points(rays + 2, seed);
+    let ray = |j: usize| {
+        let angle = std::f64::consts::PI * j as f64 / rays as f64;
+        DVec3::new(angle.cos(), angle.sin(), 0.0) + 0.2 * noise[j]
+    };
+    let positions = std::iter::once(0.2 * noise[rays + 1]).chain((0..=rays).map(ray)).collect();
+    let face = |j: u32| match triangles {
+        true => vec![0, j + 1, j + 2],
+        false => vec![0, 2 * j + 1, 2 * j + 2, 2 * j + 3],
+    };
+    Mesh::new(positions, Faces::from_lists((0..m as u32).map(face)))
+}
+
+/// The faces at vertex 0 after a step, twice as large: all that the next step there needs.
+fn next_star(refinement: Refinement, star: &Surface) -> Surface {
+    let limit = refinement.limit_positions(star).unwrap()[0];
+    let fine = refinement.refine(star).unwrap();
+    let mut number = vec![u32::MAX; fine.len()];
+    let mut positions = Vec::new();
+    let mut faces = Faces::default();
+    for face in fine.faces.iter().filter(|face| face.contains(&0)) {
+        let mut face = face.to_vec();
+        let place = face.iter().position(|&v| v == 0).unwrap();
+        face.rotate_left(place);
+        for v in &mut face {
+            let old = *v as usize;
+            if number[old] == u32::MAX {
+                number[old] = positions.len() as u32;
+                positions.push(2.0 * (fine.positions[old] - limit));
+            }
+            *v = number[old];
+        }
+        faces.push(&face);
+    }
+    open(Mesh::new(positions, faces), star.boundary())
+}
+
+/// The greatest angle between the normal at vertex 0 and those of the triangles there, two a quad.
+fn spread(star: &Surface, normal: DVec3) -> f64 {
+    let incidence = star.incidence();
+    let angles = incidence.corners_at(0).iter().flat_map(|&c| {
+        let face = star.faces().face(incidence.face_of(c));
+        let place = face.iter().position(|&v| v == 0).unwrap();
+        let at = move |k: usize| star.positions()[face[(place + k) % face.len()] as usize] - star.positions()[0];
+        (1..face.len() - 1).map(move |k| {
+            let facet = at(k).cross(at(k + 1));
+            facet.cross(normal).length().atan2(facet.dot(normal))
+        })
+    });
+    angles.fold(0.0, f64::max)
+}
+
+#[test]
+fn normals_on_a_boundary_are_the_limits_of_those_of_the_faces() {
+    let of = |refinement, triangles, largest: usize| {
+        for m in 1..=largest + 2 {
+            for (seed, boundary) in [(1, Boundary::EdgeOnly), (2, Boundary::EdgeOnly), (3, Boundary::EdgeAndCorner)] {
+                let mut star = open(fan(m, triangles, seed), boundary);
+                let normal = Refinement::limit_normals(refinement, &star).unwrap()[0];
+                if m > largest {
+                    assert_eq!(normal, DVec3::ZERO);
+                    continue;
+                }
+                assert!((normal.length() - 1.0).abs() < 1e-15);
+                let mut off = vec![spread(&star, normal)];
+                for _ in 0..40 {
+                    star = next_star(refinement, &star);
+                    off.push(spread(&star, normal));
+                }
+                let what = format!("{refinement}, {m} faces, {boundary:?}: {off:?}");
+                if triangles && m == 1 {
+                    // The triangle is in its plane from the start, and ever narrower.
+                    assert!(off[10] < 1e-10, "{what}");
+                    continue;
+                }
+                assert!(off[12] < off[3] && off[24] < off[12] && off[30] < off[24], "{what}");
+                // By the third eigenvalue over ½, to the power of the level.
+                let tolerance = match (triangles, m) {
+                    // 1/k with a smooth boundary.
+                    (false, 1) => 0.1,
+                    (false, 3) => 0.82_f64.powi(30),
+                    (true, 4) => 0.75_f64.powi(30),
+                    (true, 5) => 0.905_f64.powi(30),
+                    _ => 0.5_f64.powi(20),
+                };
+                assert!(off[30] < 5.0 * tolerance, "{what}");
+            }
+        }
+    };
+    of(Refinement::CatmullClark, false, 3);
+    of(Refinement::Loop, true, 5);
+}
+
+#[test]
+fn normals_stay_under_refinement_and_are_none_where_there_are_several() {
+    for (scheme, refinement, _) in SCHEMES {
+        let mut held = [0; 4];
+        for seed in 0..200 {
+            let Some((coarse, _)) = random_with_darts(scheme, seed) else { continue };
+            let before = refinement.limit_normals(&coarse).unwrap();
+            let after = refinement.limit_normals(&refinement.refined(&coarse).unwrap()).unwrap();
+            let mut star = Vec::new();
+            for (v, (a, b)) in before.iter().zip(after).enumerate() {
+                let rule = coarse.features().map_or(Rule::Smooth, |f| f.rules()[v]);
+                let is_boundary = !coarse.topology().star(coarse.faces(), v, &mut star);
+                let most = if scheme == Scheme::Loop { 5 } else { 3 };
+                let has_one = match rule {
+                    Rule::Smooth => star.len() > 2,
+                    Rule::Dart | Rule::SemiSharp => false,
+                    Rule::Crease => is_boundary && star.len() <= most,
+                    Rule::Corner => is_boundary && star.len() == 1,
+                };
+                let what = format!("{scheme}, seed {seed}, vertex {v}, {rule:?}, {} faces: {a} {b}", star.len());
+                assert_eq!((*a != DVec3::ZERO, b != DVec3::ZERO), (has_one, has_one), "{what}");
+                assert!(a.distance(b) < 1e-10, "{what}");
+                held[rule as usize] += usize::from(has_one);
+            }
+        }
+        let [smooth, dart, crease, corner] = held;
+        assert!(smooth > 1500 && dart == 0 && crease > 200 && corner > 10, "{scheme}: {held:?}");
+    }
+}
+
+/// The whole way: control mesh, two steps, limit points.
+#[test]
+fn the_surface_of_an_open_mesh_interpolates_it() {
+    for (scheme, _, _) in SCHEMES {
+        let mut held = 0;
+        for seed in 0..40 {
+            let Some((given, _)) = random_creased(scheme, seed) else { continue };
+            let Ok(found) = interpolate(&given, scheme, &Options::default()) else { continue };
+            let control = given.with_positions(found.points);
+            for levels in 0..3 {
+                let request = Request { levels, limit: true, normals: true, ..Request::default() };
+                let made = surface(control.clone(), scheme, given.positions(), &request).unwrap();
+                assert_eq!(made.surface.boundary_edges(), given.boundary_edges() << levels);
+                let size = control.diagonal();
+                for (v, (a, b)) in made.surface.positions().iter().zip(given.positions()).enumerate() {
+                    assert!(a.distance(*b) <= 1e-8 * size, "{scheme}, seed {seed}, vertex {v}, {levels} levels");
+                }
+                held += 1;
+            }
+            // Without limit points nothing needs a topology, and yet the boundary is one.
+            let request = Request { levels: 1, ..Request::default() };
+            let made = surface(control.clone(), scheme, given.positions(), &request).unwrap();
+            assert_eq!(made.surface.boundary_edges(), 2 * given.boundary_edges());
+            assert_eq!(made.surface.features().is_some(), given.features().is_some());
+        }
+        assert!(held > 60, "{scheme}: {held}");
+    }
+}
+
+#[test]
+fn what_has_no_rules_is_refused() {
+    let mesh = grid(4, 4, true);
+    let surface = open(mesh.clone(), Boundary::EdgeOnly);
+    for refinement in Refinement::ALL {
+        if matches!(refinement, Refinement::CatmullClark | Refinement::Loop) {
+            continue;
+        }
+        let message = refinement.refined(&surface).unwrap_err().to_string();
+        assert!(message.ends_with("use catmull-clark or loop"), "{message}");
+    }
+    // A boundary of vertices of valence 3 and more, without rules.
+    let cube = limitlab::mesh::builtin::icosahedron();
+    let mesh = Mesh::new(cube.positions.clone(), Faces::from_lists(cube.faces.iter().skip(1)));
+    let interior = open(mesh, Boundary::AsInterior);
+    for refinement in Refinement::ALL {
+        assert!(matches!(refinement.refined(&interior), Err(Error::Open { edges: 3, .. })), "{refinement}");
+        assert!(matches!(refinement.limit_positions(&interior), Err(Error::Open { .. })), "{refinement}");
+        assert!(matches!(refinement.limit_normals(&interior), Err(Error::Open { .. })), "{refinement}");
+    }
+    // Two triangles back to back, beside a third.
+    let faces = Faces::from_lists([[0, 1, 2], [0, 2, 1], [3, 4, 5]]);
+    let pillow = open(Mesh::new(random_points(6, 1), faces), Boundary::EdgeOnly);
+    let message = Refinement::Loop.refined(&pillow).unwrap_err().to_string();
+    assert!(message.contains("vertex 0 has two triangles with the same corners"), "{message}");
+    let fine = Refinement::CatmullClark.refined(&pillow).unwrap();
+    hold_against_tags(&pillow, &fine);
+}
