@@ -70,11 +70,6 @@ fn addresses(wanted: u64) -> u64 {
     least
 }
 
-/// A number of bytes with its unit.
-pub(crate) fn megabytes(bytes: u64) -> String {
-    if bytes < 10_000_000_000 { format!("{} MB", bytes / 1_000_000) } else { format!("{} GB", bytes / 1_000_000_000) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -16,6 +16,7 @@ pub mod operator;
 mod parts;
 pub mod stages;
 pub mod system;
+pub mod weights;
 
 pub use csr::Csr;
 pub use operator::Operator;

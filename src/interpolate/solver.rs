@@ -12,7 +12,7 @@
 //! 3. Where these make none either, and the points have no part that no control mesh reaches, LDLᵀ: a factorization tells
 //!    a nearly singular matrix from a singular one.
 //!
-//! *Order.* A large mesh whose vertices lie [scattered](crate::mesh::curve::is_scattered) in memory has been renumbered
+//! *Order.* A large mesh whose vertices lie [scattered](crate::mesh::space_filling::is_scattered) in memory has been renumbered
 //! along a space-filling curve by [`Surface`]. From [`ORDERED`] vertices on, the rows of the operator are [breadth
 //! first](in_fronts), which gives it the narrow band that groups of iterations need. Below, all arrays stay in cache in
 //! any order, and rows are [grouped by kind](in_kinds) only; so they are for mixed faces under Nasri and Zheng-Cai, where

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::order::Numbering;
+use super::numbering::Numbering;
 use super::{Faces, Incidence};
 use crate::parallel;
 

@@ -6,8 +6,8 @@ use glam::DVec3;
 use rayon::slice::ParallelSliceMut;
 
 use super::Faces;
+use super::defect::counted;
 use super::frame::magnitude;
-use super::validate::counted;
 use crate::pages::large;
 use crate::parallel;
 use crate::prefetch::prefetch;

@@ -7,8 +7,8 @@
 
 use glam::DVec3;
 
+use super::boundary::Boundary;
 use super::incidence::next_in;
-use super::validate::Boundary;
 use super::{Faces, Surface, Topology};
 use crate::error::{Error, Result, short};
 use crate::parallel;

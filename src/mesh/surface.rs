@@ -4,11 +4,13 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
-use super::curve::{along_curve, is_scattered};
-use super::features::{Features, Tags};
-use super::order::Numbering;
-use super::validate::{Boundary, Validation, remarks, validate};
-use super::{Faces, Incidence, Mesh, Topology};
+use super::boundary::Boundary;
+use super::defect::counted;
+use super::features::{Features, Rule, Tags};
+use super::numbering::Numbering;
+use super::space_filling::{along_curve, is_scattered};
+use super::validate::{Validation, boundary_remark, validate};
+use super::{Faces, Incidence, Mesh, Topology, degenerate};
 use crate::{Error, Result, parallel};
 
 /// From this many vertices on, a scattered mesh is renumbered. Tuned.
@@ -248,7 +250,34 @@ impl Surface {
 
     /// Oddities that no method minds, as in [`Validation::remarks`]: duplicate positions, faces without area, a boundary.
     pub fn remarks(&self) -> Vec<String> {
-        remarks(self)
+        let mut remarks = Vec::new();
+        if !self.is_closed() {
+            let topology = self.topology();
+            let loops = topology.boundary_loops(self.faces()).len();
+            remarks.push(boundary_remark(topology.boundary_edges(), Some(loops), self.boundary()));
+        }
+        if let Some(features) = self.features() {
+            let creased = features.creased_edges();
+            let parts = [
+                (creased, "creased edge"),
+                (features.count(Rule::Corner), "corner"),
+                (features.count(Rule::Dart), "dart"),
+            ];
+            let parts: Vec<String> =
+                parts.iter().filter(|p| p.0 > 0).map(|&(count, one)| counted(count, one)).collect();
+            if !parts.is_empty() {
+                remarks.push(parts.join(", "));
+            }
+        }
+        if let Some(renumbered) = self.renumbered() {
+            // Looking for what is not there is many times faster so. What is there needs the file's own numbers.
+            let positions = renumbered.numbering.there(self.positions());
+            if degenerate::remarks(&positions, &renumbered.faces).is_empty() {
+                return remarks;
+            }
+        }
+        remarks.extend(degenerate::remarks(self.positions(), self.faces()));
+        remarks
     }
 
     pub(crate) fn renumbered(&self) -> Option<&Renumbered> {
@@ -307,8 +336,9 @@ fn are_distinct(face: &[u32]) -> bool {
 mod tests {
     use super::*;
     use crate::mesh::builtin;
-    use crate::mesh::generate::{permute_vertices, random_polygons};
+    use crate::mesh::generate::permute_vertices;
     use crate::mesh::order::Order;
+    use crate::mesh::random::random_polygons;
 
     /// The short way to the verdict, and the report.
     fn agree(mesh: &Mesh) -> bool {

@@ -16,11 +16,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::chebyshev::Recurrence;
-use super::gauss_seidel::sweep;
 use super::system::STRIP;
+use super::system::sweep;
 use crate::assemble::Operator;
 use crate::assemble::face_sums::BLOCK;
-use crate::assemble::kernel::{Point, Weight};
+use crate::assemble::weights::{Point, Weight};
 use crate::pages::filled;
 use crate::parallel;
 use crate::prefetch::{POINTS_AHEAD, prefetch};

@@ -20,6 +20,7 @@ mod canvas;
 pub mod columns;
 pub mod compare;
 pub mod figure;
+mod frame;
 pub mod index;
 mod number;
 pub mod plot;

@@ -21,7 +21,7 @@ pub type Start<'s> =
 /// converged, by a product.
 ///
 /// ```
-/// use limitlab::analysis::own::Own;
+/// use limitlab::analysis::custom_methods::Own;
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Surface, builtin};

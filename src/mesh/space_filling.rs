@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DVec3;
 
-use super::order::Numbering;
+use super::numbering::Numbering;
 use super::{Faces, Mesh, bounding_box};
 use crate::parallel;
 
