@@ -1,4 +1,4 @@
-//! The memory that a computation needs, held against what is available, before the work begins.
+//! Memory requirements of a computation, compared with what is available before the work begins.
 
 use std::hint::black_box;
 

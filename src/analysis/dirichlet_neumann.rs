@@ -1,4 +1,5 @@
-//! The end of a spectrum enclosed from both sides, with its multiplicity, by work around exceptional vertices only.
+//! Dirichlet-Neumann bracketing: two-sided bounds of an end of a spectrum, with its multiplicity, by work around
+//! exceptional vertices only.
 //!
 //! With σ = 1 for the lower end and −1 for the upper, σM is a sum of one element a face and one number a vertex,
 //!

@@ -1,4 +1,4 @@
-//! Line preconditioner on quad meshes: how regular they are, and whether that pays.
+//! Line preconditioner on quad meshes: tridiagonal solves along lines of edges through regular vertices.
 //!
 //! Where all valences are 4 and all faces quads, Catmull-Clark's symmetric matrix is a tensor product along the two
 //! families of edge lines, M = C ⊗ C with C = tridiag(1, 4, 1), and M⁻¹ is a pass of tridiagonal solves along one

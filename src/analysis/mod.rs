@@ -1,4 +1,4 @@
-//! Why a method converges, stalls or fails: spectra, predicted and observed rates, ω sweeps.
+//! Convergence analysis: spectra, predicted and observed rates, singularity, ω sweeps.
 //! This room knows no plotting.
 
 pub mod a_priori;

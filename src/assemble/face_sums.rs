@@ -1,5 +1,5 @@
-//! Rows among faces of several sizes, by sums over faces: what a face adds to M is of rank one, or three, whatever its
-//! size, so a sweep sums each face once and every corner reads the sum. Nothing is stored but who meets whom.
+//! Matrix-free rows on meshes of mixed polygons, by sums over faces: what a face adds to M is of rank one, or three,
+//! whatever its size, so a sweep sums each face once and every corner reads the sum. Only incidence is stored.
 
 use std::f64::consts::TAU;
 use std::ops::Range;

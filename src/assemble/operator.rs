@@ -1,4 +1,4 @@
-//! The matrix-free twin of [`LimitSystem`](super::LimitSystem): A, M and D⁻¹A from connectivity alone.
+//! Matrix-free operator: A, M and D⁻¹A of a [`LimitSystem`](super::LimitSystem) from connectivity alone.
 
 use std::ops::Range;
 use std::sync::OnceLock;

@@ -1,4 +1,4 @@
-//! From a control mesh to the surface that is looked at: refinement by the scheme's own rules, given normals and
+//! Evaluation of the surface of a control mesh: refinement by the scheme's own rules, given normals and
 //! shape handles, limit points, surface normals.
 
 use glam::DVec3;

@@ -1,4 +1,4 @@
-//! Orders for sweeps over many rows: breadth first, and rows of one kind together.
+//! Breadth-first vertex orders for sweeps over many rows, and orders that put rows of one kind together.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Vertices colour by colour, for sweeps that relax all of a colour at once.
+//! Multicolour numbering of the vertices, for sweeps that relax all of a colour at once.
 
 use super::breadth_first::breadth_first;
 use super::numbering::Numbering;

@@ -1,4 +1,4 @@
-//! The kinds of defects of a mesh, their places, and how both are said.
+//! Kinds of mesh defects, their places, and the words for both.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Oddities of position: vertices on the same point, faces on the same points, faces without area.
+//! Degenerate positions: vertices on the same point, faces on the same points, faces without area.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -1,4 +1,4 @@
-//! Renumbering along a space-filling curve: which meshes lie scattered through memory, and the way to bring them together.
+//! Renumbering along a space-filling curve, for meshes whose vertices lie scattered through memory.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -1,4 +1,5 @@
-//! What a method may ask of a system, and the parallel loop over rows that every fused update uses.
+//! Interface between methods and linear systems, the parallel loop over rows that every fused update uses, and the
+//! sweep in place.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Several Chebyshev iterations, or sweeps of Gauss-Seidel, in one pass over memory.
+//! Wavefront (temporal) blocking: several Chebyshev iterations, or sweeps of Gauss-Seidel, in one pass over memory.
 //!
 //! Iterate k + 1 of a row needs iterate k of its neighbours only. Where the vertex order keeps neighbours within a
 //! narrow band, the vertices are cut into bands as long as a row reaches: band j of iterate k + 1 can be made as

@@ -1,4 +1,4 @@
-//! The pattern of a sparse matrix.
+//! Sparsity plot: the pattern of a sparse matrix.
 
 use super::axis::{Axis, Scale};
 use super::canvas::{Canvas, Colour, Rect};

@@ -1,5 +1,5 @@
-//! Iterative methods watched by the fairness: how much the surface ripples while its error falls, and whether stopping
-//! early helps.
+//! Fairness of the iterates of a method: how much the surface ripples while its error falls, and whether stopping early
+//! helps.
 
 use std::ops::ControlFlow;
 

@@ -1,4 +1,4 @@
-//! From given points to control points, by the method that is asked for.
+//! Control points of the given points, by the method asked for.
 
 use std::ops::ControlFlow;
 use std::time::Instant;

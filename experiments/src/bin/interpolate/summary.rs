@@ -1,4 +1,4 @@
-//! What the program says of a run.
+//! Summary of a run: remarks on standard error, and the JSON object.
 
 use glam::DVec3;
 use limitlab::Result;

@@ -1,4 +1,4 @@
-//! From control points, or by schemes that need no system, to what is written.
+//! Surfaces that `interpolate` writes: of the control points, and by schemes that need no system.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! What is wished of single vertices.
+//! Options of single vertices: whether they are interpolated, normals, shape handles, α.
 
 use glam::DVec3;
 use limitlab::Result;

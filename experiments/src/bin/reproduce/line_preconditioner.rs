@@ -1,4 +1,4 @@
-//! Do the tensor products of regular quads make a preconditioner that pays?
+//! Line preconditioner on quad meshes: iterations, estimated time, and whether it pays.
 
 use glam::DVec3;
 

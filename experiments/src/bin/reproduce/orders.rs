@@ -1,4 +1,4 @@
-//! Does the order of Gauss-Seidel matter? Zheng-Cai §5 leave it open.
+//! Vertex orders of Gauss-Seidel compared, which Zheng-Cai §5 leave open.
 
 use limitlab::Result;
 use limitlab::analysis::order_study::{OrderRow, order_study, random_spread};

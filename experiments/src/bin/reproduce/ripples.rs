@@ -1,4 +1,4 @@
-//! How much interpolating surfaces ripple, iteration by iteration, against the fairest one (Halstead, Kass & DeRose).
+//! Ripples of interpolating surfaces: fairness energy by iteration, against the fairest surface (Halstead, Kass & DeRose).
 
 use limitlab::Result;
 use limitlab::interpolate::halstead::{Fairness, FairnessRow, Weights, fit, follow};

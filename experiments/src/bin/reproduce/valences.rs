@@ -1,4 +1,4 @@
-//! What one extraordinary vertex does to the spectrum, and which vertices slow which method.
+//! Spectrum against valence: one extraordinary vertex, and the vertices that slow each method.
 
 use limitlab::Result;
 use limitlab::analysis::valence_study::{ValenceRow, regular_band, valence_study};

@@ -1,4 +1,4 @@
-//! Local edits beside solving anew, and the decay of the inverse that they live on.
+//! Local updates against full solves, and the decay of the inverse that makes them local.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! A picture in its figure: caption, image, colour bar.
+//! Panel of a rendered picture: caption, image, colour bar.
 
 use super::super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Rect, text_width};
 use super::super::frame::{self, FRAME_COLOUR, FRAME_WIDTH, LABEL_SIZE, Slot, TEXT_COLOUR, TICK_SIZE, TITLE_SIZE};

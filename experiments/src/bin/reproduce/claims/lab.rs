@@ -1,4 +1,4 @@
-//! What the claims compute with: meshes at random and by name, and small tools used by several of them.
+//! Meshes at random and by name, and small tools, for the claims.
 
 use std::cell::OnceCell;
 use std::ops::ControlFlow;
