@@ -63,14 +63,14 @@ pub struct Interval {
 /// If the operator holds numbers that are not finite.
 ///
 /// ```
-/// use limitlab::analysis::{interval::interval, symmetric};
+/// use limitlab::analysis::{interval::interval, spectrum, symmetric::SymmetricForm};
 /// use limitlab::assemble::{LimitSystem, Operator};
 /// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Surface, builtin};
 ///
 /// let surface = Surface::new(builtin::builtin("irregular-quad:3000")?)?;
 /// let operator = Operator::new(&surface, Scheme::CatmullClark)?;
-/// let found = interval(&operator, symmetric::SymmetricForm::Jacobi)?;
+/// let found = interval(&operator, SymmetricForm::Jacobi)?;
 /// let exact = spectrum::spectrum(&LimitSystem::new(&surface, Scheme::CatmullClark)?)?.jacobi;
 /// assert!(exact.max <= found.high && found.high < 1.1 * exact.max);
 /// assert!(exact.min <= found.least && found.low > 0.9 * exact.min);

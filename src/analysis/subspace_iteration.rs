@@ -130,7 +130,7 @@ impl Eigenpairs {
 /// block that memory does not hold, or entries that are not finite.
 ///
 /// ```
-/// use limitlab::analysis::subspace_iteration::{End, EigenpairRequest, extreme};
+/// use limitlab::analysis::subspace_iteration::{EigenpairRequest, End, extreme};
 /// use limitlab::analysis::symmetric::{SymmetricForm, symmetric};
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::schemes::Scheme;
@@ -138,7 +138,7 @@ impl Eigenpairs {
 ///
 /// let surface = Surface::new(builtin::torus(30, 30))?;
 /// let system = LimitSystem::new(&surface, Scheme::CatmullClark)?;
-/// let request = Request { end: End::Lowest, count: 5, tolerance: 1e-10, spectrum: (0.0, 1.0) };
+/// let request = EigenpairRequest { end: End::Lowest, count: 5, tolerance: 1e-10, spectrum: (0.0, 1.0) };
 /// let pairs = extreme(&symmetric(&system, SymmetricForm::A), &request)?;
 /// // ((2 + cos θ)/3)((2 + cos φ)/3): 1/9 once, the next value four times.
 /// assert_eq!(pairs.clusters(1e-9).iter().map(|c| c.multiplicity).collect::<Vec<_>>(), [1, 4]);
