@@ -155,10 +155,10 @@ pub(super) fn check(surface: &Surface, scheme: Scheme) -> Result<()> {
     Ok(())
 }
 
-/// The number of edges at every vertex: the valence n of the masks, on a boundary that is treated as interior too.
+/// The number of edges at every smooth vertex: the valence n of the masks, on a boundary that is treated as interior too.
 pub fn valences(surface: &Surface) -> Vec<u32> {
     parallel::collect(surface.len(), |v| {
-        if surface.is_closed() {
+        if surface.is_closed() || surface.features().is_some() {
             surface.incidence().face_count(v) as u32
         } else {
             surface.topology().edge_valence(surface.faces(), v) as u32

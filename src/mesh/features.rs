@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::boundary::Boundary;
 use super::incidence::next_in;
-use super::{Faces, Surface, Topology};
+use super::{Faces, Incidence, Surface};
 use crate::error::{Error, Result, short};
 use crate::parallel;
 
@@ -63,23 +63,25 @@ pub struct Features {
 }
 
 impl Features {
-    /// Those of faces with this topology; `None` if all vertices are smooth, or are treated as such. O(N), and O(k log k)
-    /// for k sharp edges.
+    /// Those of faces whose boundary edges have the half-edges `boundary`; `None` if all vertices are smooth, or are treated as
+    /// such. O(N), and O(k log k) for k sharp edges.
     ///
     /// # Errors
     /// [`Error::Tag`]: a sharpness that is negative, not a number, or below [`SHARP`] but not 0; an edge or a vertex
     /// that does not exist; any tag where the boundary is treated as interior.
-    pub fn new(faces: &Faces, topology: &Topology, tags: &Tags) -> Result<Option<Self>> {
+    pub fn new(faces: &Faces, incidence: &Incidence, boundary: &[u32], tags: &Tags) -> Result<Option<Self>> {
         let mut sharp = Vec::new();
         for &(ends, sharpness) in &tags.creases {
             let edge = || format!("edge {}\u{2013}{}", ends[0], ends[1]);
-            let side = topology.half_edge(faces, ends);
+            let side = incidence.half_edge(faces, ends);
             let side = side.ok_or_else(|| Error::Tag(format!("{} does not exist", edge())))?;
             if is_sharp(sharpness).map_err(|what| Error::Tag(format!("{} {what}", edge())))? {
-                sharp.push(topology.twin(side).map_or(side, |twin| twin.min(side)));
+                // The other side too, where there is one.
+                let other = incidence.half_edge(faces, [ends[1], ends[0]]).unwrap_or(side);
+                sharp.push(side.min(other));
             }
         }
-        let n = topology.incidence.vertices();
+        let n = incidence.vertices();
         let mut resting = Vec::new();
         for &(v, sharpness) in &tags.corners {
             if v as usize >= n {
@@ -98,14 +100,14 @@ impl Features {
             Boundary::AsInterior => return Ok(None),
             Boundary::EdgeAndCorner | Boundary::EdgeOnly | Boundary::Refuse => {}
         }
-        sharp.extend_from_slice(topology.boundary_half_edges());
+        sharp.extend_from_slice(boundary);
         sharp.sort_unstable();
         sharp.dedup();
         if sharp.is_empty() && resting.is_empty() {
             return Ok(None);
         }
         let corners = faces.corners();
-        let end = |c: u32| corners[next_in(&faces.range(topology.incidence.face_of(c)), c) as usize];
+        let end = |c: u32| corners[next_in(&faces.range(incidence.face_of(c)), c) as usize];
         let mut pairs: Vec<[u32; 2]> =
             sharp.iter().flat_map(|&c| [[corners[c as usize], end(c)], [end(c), corners[c as usize]]]).collect();
         pairs.sort_unstable();
@@ -118,9 +120,9 @@ impl Features {
             };
         }
         if tags.boundary == Boundary::EdgeAndCorner {
-            for &c in topology.boundary_half_edges() {
+            for &c in boundary {
                 let v = corners[c as usize] as usize;
-                if topology.incidence.face_count(v) == 1 {
+                if incidence.face_count(v) == 1 {
                     rules[v] = Rule::Corner;
                 }
             }
@@ -129,7 +131,7 @@ impl Features {
             rules[v as usize] = Rule::Corner;
         }
         let curves = curves(&pairs, &rules);
-        let creased = sharp.len() - topology.boundary_edges();
+        let creased = sharp.len() - boundary.len();
         Ok(Some(Features { rules, sharp, creased, curves }))
     }
 

@@ -186,23 +186,68 @@ impl Incidence {
     /// assert!(!closed(&Faces::from_lists(&tetrahedron[1..])));
     /// ```
     pub fn is_closed_manifold(&self, faces: &Faces) -> bool {
+        self.boundary_vertices(faces).is_some_and(|vertices| vertices.is_empty())
+    }
+
+    /// The vertices on the boundary, ascending, of an oriented manifold: every side of a face has one opposite at the most,
+    /// and the faces at every vertex form one umbrella, or one fan. `None` if this is none. In parallel, in the same time.
+    ///
+    /// ```
+    /// use limitlab::mesh::{Faces, Incidence};
+    /// let boundary = |faces: &Faces| Incidence::new(faces, 4).boundary_vertices(faces);
+    /// let tetrahedron = [[0u32, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]];
+    /// assert_eq!(boundary(&Faces::from_lists(&tetrahedron[1..])), Some(vec![0, 1, 2]));
+    /// // A face turned round.
+    /// assert_eq!(boundary(&Faces::from_lists([[0u32, 1, 2], [0, 1, 3]])), None);
+    /// ```
+    pub fn boundary_vertices(&self, faces: &Faces) -> Option<Vec<u32>> {
+        let parts = parallel::map(self.vertices(), CHUNK, |range| {
+            let mut found = Vec::new();
+            for v in range {
+                if !self.is_umbrella(faces, v) {
+                    fan(v, self.sides_at(faces, v))?;
+                    found.push(v as u32);
+                }
+            }
+            Some(found)
+        });
+        let parts: Option<Vec<Vec<u32>>> = parts.into_iter().collect();
+        Some(parts?.concat())
+    }
+
+    /// The half-edge that leaves a boundary vertex of a manifold along the boundary.
+    pub fn boundary_side(&self, faces: &Faces, v: usize) -> Option<u32> {
+        fan(v, self.sides_at(faces, v)).map(|first| self.corners_at(v)[first])
+    }
+
+    /// The half-edge from one vertex to the other, or back where there is only that. O(valence).
+    pub fn half_edge(&self, faces: &Faces, [from, to]: [u32; 2]) -> Option<u32> {
+        let leaving = |[from, to]: [u32; 2]| {
+            let at = if (from as usize) < self.vertices() { from as usize } else { return None };
+            let leads = |&&c: &&u32| faces.corners()[self.next(faces, c) as usize] == to;
+            self.corners_at(at).iter().find(leads).copied()
+        };
+        leaving([from, to]).or_else(|| leaving([to, from]))
+    }
+
+    /// Of each face at `v`: the vertex that a side leaves for, and the one that a side enters from.
+    fn sides_at<'a>(&'a self, faces: &'a Faces, v: usize) -> impl Iterator<Item = (u32, u32)> + 'a {
         let corners = faces.corners();
-        parallel::all(self.vertices(), |v| {
-            let at = self.corners_at(v);
-            let sides = |c: u32| {
-                let (after, before) = (self.next(faces, c), self.prev(faces, c));
-                (corners[after as usize], corners[before as usize])
-            };
-            if at.len() > FEW {
-                return one_umbrella(v, at.iter().map(|&c| sides(c)));
-            }
-            // Eight at a time, by one comparison of all: a vertex of more faces is rare.
-            if at.len() <= FEW / 2 {
-                each_once::<{ FEW / 2 }>(v, at.iter().map(|&c| sides(c)))
-            } else {
-                each_once::<FEW>(v, at.iter().map(|&c| sides(c)))
-            }
+        self.corners_at(v).iter().map(move |&c| {
+            let (after, before) = (self.next(faces, c), self.prev(faces, c));
+            (corners[after as usize], corners[before as usize])
         })
+    }
+
+    #[inline(always)]
+    fn is_umbrella(&self, faces: &Faces, v: usize) -> bool {
+        let sides = self.sides_at(faces, v);
+        // Eight at a time, by one comparison of all: a vertex of more faces is rare.
+        match self.face_count(v) {
+            n if n > FEW => one_umbrella(v, sides),
+            n if n <= FEW / 2 => each_once::<{ FEW / 2 }>(v, sides),
+            _ => each_once::<FEW>(v, sides),
+        }
     }
 }
 
@@ -255,6 +300,33 @@ fn one_umbrella(v: usize, sides: impl Iterator<Item = (u32, u32)>) -> bool {
         }
     }
     false
+}
+
+/// The first face, counter-clockwise, of the faces at `v` if they form one fan: their sides meet one by one, but for the first
+/// that leaves and the last that enters.
+fn fan(v: usize, sides: impl Iterator<Item = (u32, u32)>) -> Option<usize> {
+    let (mut out, into): (Vec<(u32, usize)>, Vec<u32>) =
+        (0..).zip(sides).map(|(k, (to, from))| ((to, k), from)).unzip();
+    out.sort_unstable();
+    let mut entered = into.clone();
+    entered.sort_unstable();
+    let sound = out.windows(2).all(|w| w[0].0 != w[1].0)
+        && entered.windows(2).all(|w| w[0] != w[1])
+        && out.iter().all(|&(w, _)| w as usize != v)
+        && into.iter().all(|&w| w as usize != v);
+    if !sound {
+        return None;
+    }
+    let mut starts = out.iter().filter(|&(w, _)| entered.binary_search(w).is_err());
+    let (Some(&(_, first)), None) = (starts.next(), starts.next()) else { return None };
+    let mut place = first;
+    for turns in 1..=into.len() {
+        match out.binary_search_by_key(&into[place], |&(to, _)| to) {
+            Ok(at) => place = out[at].1,
+            Err(_) => return (turns == into.len()).then_some(first),
+        }
+    }
+    None
 }
 
 /// Cuts `values`, of which row i is `offsets[i]..offsets[i + 1]`, after every `chunk` rows.

@@ -47,6 +47,8 @@ struct Connectivity {
     is_closed: bool,
     /// What boundary edges are, where there may be some.
     boundary: Boundary,
+    /// The half-edges of boundary edges, ascending.
+    sides: Vec<u32>,
     /// Where not all vertices are smooth.
     features: Option<Features>,
     incidence: OnceLock<Arc<Incidence>>,
@@ -82,7 +84,7 @@ impl Surface {
         lines: Option<(&[u32], &[u32])>,
         boundary: Boundary,
     ) -> std::result::Result<Self, Box<Validation>> {
-        if let Some(connectivity) = Connectivity::closed(&mesh) {
+        if let Some(connectivity) = Connectivity::manifold(&mesh, boundary) {
             return Ok(Surface { mesh, connectivity: Arc::new(connectivity) });
         }
         let mut report = validate(&mesh, lines, boundary);
@@ -90,7 +92,8 @@ impl Surface {
             Some(topology) if report.is_valid() => {
                 let tags = Tags { boundary, ..Tags::default() };
                 // Without tags there is nothing that could be wrong.
-                let features = Features::new(&mesh.faces, &topology, &tags).unwrap_or_default();
+                let sides = topology.boundary_half_edges();
+                let features = Features::new(&mesh.faces, &topology.incidence, sides, &tags).unwrap_or_default();
                 Ok(Self::of_parts(mesh, topology, boundary, features))
             }
             topology => {
@@ -110,6 +113,7 @@ impl Surface {
         debug_assert!(topology.incidence.vertices() == mesh.len() && topology.irregular_edges().is_empty());
         let connectivity = Connectivity {
             boundary,
+            sides: topology.boundary_half_edges().to_vec(),
             features,
             incidence: OnceLock::from(Arc::clone(&topology.incidence)),
             ..Connectivity::new(topology.is_closed())
@@ -133,7 +137,7 @@ impl Surface {
     /// use limitlab::mesh::features::{Rule, Tags};
     /// use limitlab::mesh::{Surface, builtin};
     /// let cube = Surface::new(builtin::builtin("cube")?)?;
-    /// let top = [[4, 5], [5, 6], [6, 7], [7, 4]];
+    /// let top = [[4, 5], [5, 7], [7, 6], [6, 4]];
     /// let tags = Tags { creases: top.map(|edge| (edge, 10.0)).to_vec(), ..Tags::default() };
     /// let creased = cube.tagged(&tags)?;
     /// let features = creased.features().unwrap();
@@ -144,10 +148,11 @@ impl Surface {
         if !self.is_closed() && tags.boundary == Boundary::Refuse {
             return Self::examined(self.mesh.clone(), None, Boundary::Refuse).map_err(Error::Defects);
         }
-        let topology = self.topology();
-        let features = Features::new(self.faces(), topology, tags)?;
+        let sides = &self.connectivity.sides;
+        let features = Features::new(self.faces(), self.incidence(), sides, tags)?;
         let connectivity = Connectivity {
             boundary: tags.boundary,
+            sides: sides.clone(),
             features,
             incidence: self.connectivity.incidence.clone(),
             topology: self.connectivity.topology.clone(),
@@ -240,7 +245,34 @@ impl Surface {
 
     /// The number of edges with one face.
     pub fn boundary_edges(&self) -> usize {
-        if self.is_closed() { 0 } else { self.topology().boundary_edges() }
+        self.connectivity.sides.len()
+    }
+
+    /// The half-edges of edges with one face, ascending.
+    pub fn boundary_half_edges(&self) -> &[u32] {
+        &self.connectivity.sides
+    }
+
+    /// The number of closed walks along edges with one face. O(b log b) for b of them.
+    pub fn boundary_loops(&self) -> usize {
+        let (faces, incidence) = (self.faces(), self.incidence());
+        let corners = faces.corners();
+        let ends = |&c: &u32| (corners[c as usize], corners[incidence.next(faces, c) as usize]);
+        // At every vertex one arrives and one leaves.
+        let mut walks: Vec<(u32, u32)> = self.boundary_half_edges().iter().map(ends).collect();
+        walks.sort_unstable();
+        let mut seen = vec![false; walks.len()];
+        let mut loops = 0;
+        for start in 0..walks.len() {
+            let mut at = start;
+            if !seen[at] {
+                loops += 1;
+            }
+            while !std::mem::replace(&mut seen[at], true) {
+                at = walks.partition_point(|walk| walk.0 < walks[at].1);
+            }
+        }
+        loops
     }
 
     /// The [`diagonal`](super::diagonal) of the points.
@@ -252,9 +284,8 @@ impl Surface {
     pub fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         if !self.is_closed() {
-            let topology = self.topology();
-            let loops = topology.boundary_loops(self.faces()).len();
-            remarks.push(boundary_remark(topology.boundary_edges(), Some(loops), self.boundary()));
+            let (edges, loops) = (self.boundary_edges(), self.boundary_loops());
+            remarks.push(boundary_remark(edges, Some(loops), self.boundary()));
         }
         if let Some(features) = self.features() {
             let creased = features.creased_edges();
@@ -289,11 +320,13 @@ impl Connectivity {
     /// With all vertices smooth.
     fn new(is_closed: bool) -> Self {
         let (incidence, topology) = (OnceLock::new(), OnceLock::new());
-        Connectivity { is_closed, boundary: Boundary::Refuse, features: None, incidence, topology, renumbered: None }
+        let (boundary, sides) = (Boundary::Refuse, Vec::new());
+        Connectivity { is_closed, boundary, sides, features: None, incidence, topology, renumbered: None }
     }
 
-    /// That of a closed mesh without defects; `None` if there is any.
-    fn closed(mesh: &Mesh) -> Option<Self> {
+    /// That of a mesh without defects, closed, or open with a boundary that is sharp; `None` if there are any, or it is
+    /// another boundary.
+    fn manifold(mesh: &Mesh, boundary: Boundary) -> Option<Self> {
         let renumbered = if mesh.len() >= SCATTERED && is_scattered(&mesh.faces) { along_curve(mesh) } else { None };
         let (faces, points) = match &renumbered {
             Some((moved, _)) => (&moved.faces, &moved.positions),
@@ -305,11 +338,19 @@ impl Connectivity {
             return None;
         }
         let incidence = Incidence::new(faces, points.len());
-        let sound = parallel::all(points.len(), |v| points[v].is_finite() && incidence.face_count(v) >= 3)
-            && parallel::all(faces.len(), |f| are_distinct(faces.face(f)))
-            && incidence.is_closed_manifold(faces);
-        if !sound {
+        let is_sharp = matches!(boundary, Boundary::EdgeAndCorner | Boundary::EdgeOnly);
+        let least = if is_sharp { 1 } else { 3 };
+        let sound = parallel::all(points.len(), |v| points[v].is_finite() && incidence.face_count(v) >= least)
+            && parallel::all(faces.len(), |f| are_distinct(faces.face(f)));
+        let on_boundary = if sound { incidence.boundary_vertices(faces)? } else { return None };
+        if on_boundary.is_empty() {
+            if !parallel::all(points.len(), |v| incidence.face_count(v) >= 3) {
+                return None;
+            }
+        } else if !is_sharp {
             return None;
+        } else {
+            return Self::open(mesh, boundary, (incidence, on_boundary), renumbered);
         }
         let (incidence, renumbered) = match renumbered {
             Some((Mesh { faces, .. }, numbering)) => {
@@ -318,6 +359,32 @@ impl Connectivity {
             None => (OnceLock::from(Arc::new(incidence)), None),
         };
         Some(Connectivity { incidence, renumbered, ..Connectivity::new(true) })
+    }
+}
+
+impl Connectivity {
+    /// That of an open manifold, from its incidence and the vertices on its boundary, of the faces as renumbered if they are.
+    fn open(
+        mesh: &Mesh,
+        boundary: Boundary,
+        (incidence, on_boundary): (Incidence, Vec<u32>),
+        renumbered: Option<(Mesh, Numbering)>,
+    ) -> Option<Self> {
+        let (incidence, vertices, renumbered) = match renumbered {
+            Some((Mesh { faces, .. }, numbering)) => {
+                let vertices = on_boundary.iter().map(|&v| numbering.order()[v as usize]).collect();
+                let renumbered = Renumbered { faces, incidence, numbering };
+                (Incidence::new(&mesh.faces, mesh.len()), vertices, Some(renumbered))
+            }
+            None => (incidence, on_boundary, None),
+        };
+        let side = |&v: &u32| incidence.boundary_side(&mesh.faces, v as usize);
+        let mut sides: Vec<u32> = vertices.iter().map(side).collect::<Option<_>>()?;
+        sides.sort_unstable();
+        let tags = Tags { boundary, ..Tags::default() };
+        let features = Features::new(&mesh.faces, &incidence, &sides, &tags).ok()?;
+        let incidence = OnceLock::from(Arc::new(incidence));
+        Some(Connectivity { boundary, sides, features, incidence, renumbered, ..Connectivity::new(false) })
     }
 }
 
@@ -343,7 +410,25 @@ mod tests {
     /// The short way to the verdict, and the report.
     fn agree(mesh: &Mesh) -> bool {
         let valid = validate(mesh, None, Boundary::Refuse).is_valid();
-        assert_eq!(Connectivity::closed(mesh).is_some(), valid, "{:?}", mesh.faces);
+        assert_eq!(Connectivity::manifold(mesh, Boundary::Refuse).is_some(), valid, "{:?}", mesh.faces);
+        // With a boundary too, its edges and loops.
+        let report = validate(mesh, None, Boundary::EdgeOnly);
+        let open = Connectivity::manifold(mesh, Boundary::EdgeOnly);
+        assert_eq!(open.is_some(), report.is_valid(), "{:?}", mesh.faces);
+        if let Some(open) = open {
+            let surface = Surface { mesh: mesh.clone(), connectivity: Arc::new(open) };
+            let topology = surface.topology();
+            assert_eq!(surface.boundary_half_edges(), topology.boundary_half_edges());
+            assert_eq!(surface.boundary_loops(), topology.boundary_loops(surface.faces()).len());
+            assert_eq!(surface.is_closed(), topology.is_closed());
+            let slow = Features::new(
+                surface.faces(),
+                &topology.incidence,
+                topology.boundary_half_edges(),
+                &Tags { boundary: Boundary::EdgeOnly, ..Tags::default() },
+            );
+            assert_eq!(surface.features(), slow.unwrap().as_ref());
+        }
         valid
     }
 

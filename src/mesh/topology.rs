@@ -256,16 +256,6 @@ impl Topology {
         Some(self.incidence.next(faces, t))
     }
 
-    /// The half-edge from one vertex to the other, or back where there is only that. O(valence).
-    pub fn half_edge(&self, faces: &Faces, [from, to]: [u32; 2]) -> Option<u32> {
-        let leaving = |[from, to]: [u32; 2]| {
-            let at = if (from as usize) < self.incidence.vertices() { from as usize } else { return None };
-            let leads = |&&c: &&u32| faces.corners()[self.incidence.next(faces, c) as usize] == to;
-            self.incidence.corners_at(at).iter().find(leads).copied()
-        };
-        leaving([from, to]).or_else(|| leaving([to, from]))
-    }
-
     /// A component number for every vertex, numbered from 0 by their first vertex, and how many there are.
     /// Two vertices of one face are in one component; an isolated vertex is a component of its own.
     pub fn components(&self, faces: &Faces) -> (Vec<u32>, usize) {

@@ -103,7 +103,7 @@ pub fn creases(path: &Path, surface: &Surface) -> Result<Vec<([u32; 2], f64)>> {
     lines(path, surface.len(), "a b sharpness", |line, ends: [usize; 2], [sharpness]: [f64; 1]| {
         let ends = ends.map(|v| v as u32);
         let refuse = |what: String| Error::parse(path, Some(line), format!("edge {}–{} {what}", ends[0], ends[1]));
-        if surface.topology().half_edge(surface.faces(), ends).is_none() {
+        if surface.incidence().half_edge(surface.faces(), ends).is_none() {
             return Err(refuse("is not in the mesh: its vertices, numbered from 0, share no edge".into()));
         }
         is_sharp(sharpness).map_err(refuse)?;

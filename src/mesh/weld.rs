@@ -67,15 +67,15 @@ pub fn seams(surface: &Surface) -> Option<(usize, [u32; 2])> {
     if surface.is_closed() {
         return None;
     }
-    let (topology, faces, points) = (surface.topology(), surface.faces(), surface.positions());
+    let (incidence, faces, points) = (surface.incidence(), surface.faces(), surface.positions());
     // Zeros of either sign are one.
     let key = |v: u32| points[v as usize].to_array().map(|x| (x + 0.0).to_bits());
     let side = |&c: &u32| {
-        let ends = [c, topology.incidence.next(faces, c)].map(|c| faces.corners()[c as usize]);
+        let ends = [c, incidence.next(faces, c)].map(|c| faces.corners()[c as usize]);
         let [a, b] = ends.map(key);
         (a.min(b), a.max(b), c, ends)
     };
-    let mut sides: Vec<_> = topology.boundary_half_edges().iter().map(side).collect();
+    let mut sides: Vec<_> = surface.boundary_half_edges().iter().map(side).collect();
     sides.sort_unstable();
     let groups = sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)).filter(|group| group.len() > 1);
     let (mut count, mut first) = (0, None);
