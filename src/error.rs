@@ -3,7 +3,6 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use crate::memory::megabytes;
 use crate::mesh::validate::Validation;
 
 /// What data or the machine can do to a computation. Broken contracts of the library panic instead.
@@ -186,6 +185,11 @@ pub fn one_of(names: &[&str]) -> String {
         Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
         _ => names.concat(),
     }
+}
+
+/// A number of bytes with its unit.
+fn megabytes(bytes: u64) -> String {
+    if bytes < 10_000_000_000 { format!("{} MB", bytes / 1_000_000) } else { format!("{} GB", bytes / 1_000_000_000) }
 }
 
 fn at_line(line: Option<usize>) -> String {

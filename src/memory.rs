@@ -1,4 +1,4 @@
-//! The memory that a computation needs, held against what is available, before the work begins.
+//! Memory requirements of a computation, compared with what is available before the work begins.
 
 use std::hint::black_box;
 
@@ -68,11 +68,6 @@ fn addresses(wanted: u64) -> u64 {
         }
     }
     least
-}
-
-/// A number of bytes with its unit.
-pub(crate) fn megabytes(bytes: u64) -> String {
-    if bytes < 10_000_000_000 { format!("{} MB", bytes / 1_000_000) } else { format!("{} GB", bytes / 1_000_000_000) }
 }
 
 #[cfg(test)]

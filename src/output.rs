@@ -1,4 +1,4 @@
-//! Writing files so that nothing half-written is ever seen under the name that was asked for.
+//! Atomic writing of files: nothing half-written is ever seen under the name that was asked for.
 //!
 //! A file is first written under another name beside its target, then renamed. A symbolic link at the target is
 //! followed; a file that is read-only is refused, any other gets the mode that the umask gives. What is not a regular

@@ -1,4 +1,4 @@
-//! Loops over arrays that all threads share, cut into chunks of a fixed length, so that what is summed up by chunks does
+//! Parallel loops over arrays, cut into chunks of a fixed length, so that what is summed up by chunks does
 //! not depend on the number of threads.
 //!
 //! What divides, steals and joins work is compiled once for a type of element, and the work of a chunk called through a

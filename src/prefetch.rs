@@ -1,7 +1,7 @@
-//! A hint to the processor: memory that will be read soon.
+//! Prefetching: a hint to the processor that memory will be read soon.
 //!
-//! Sweeps over rows, and walks over a mesh, know long before what they are going to read. Told of it, the processor
-//! fetches it while it works on something else; left alone, it stands still for each line of memory.
+//! Sweeps over rows, and walks over a mesh, know long before what they are going to read. With the hint, the processor
+//! fetches it while other work goes on; without, it waits for each cache line.
 
 /// Points between the one that a sweep works on and the one that it fetches. Tuned.
 pub const POINTS_AHEAD: usize = 32;

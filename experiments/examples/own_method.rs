@@ -4,8 +4,8 @@ use std::path::Path;
 
 use faer::sparse::SparseColMat;
 use glam::DVec3;
-use limitlab::analysis::comparison::{Row, compare, entries};
-use limitlab::analysis::{own::Own, spectrum::spectrum, sweep::rounding_floor, sweep::sweep};
+use limitlab::analysis::comparison::{MethodRow, compare, entries};
+use limitlab::analysis::{custom_methods::Own, spectrum::spectrum, sweep::rounding_floor, sweep::sweep};
 use limitlab::assemble::LimitSystem;
 use limitlab::mesh::{Surface, builtin, noise::move_vertices};
 use limitlab::schemes::Scheme;
@@ -36,7 +36,7 @@ fn main() -> limitlab::Result<()> {
     run("out".as_ref()).map(drop)
 }
 
-pub fn run(out: &Path) -> limitlab::Result<Vec<Row<'static>>> {
+pub fn run(out: &Path) -> limitlab::Result<Vec<MethodRow<'static>>> {
     let mut surface = Surface::new(builtin::builtin("torus:16x12")?)?; // or mesh::io::read(path)?.mesh
     move_vertices(&mut surface, 0.1, 1);
     let (system, points) = (LimitSystem::new(&surface, Scheme::CatmullClark)?, surface.positions());

@@ -1,4 +1,4 @@
-//! What the programs share: flags and MESH names, tables and figures, studies that several of them print.
+//! Library of the programs: flags and MESH names, tables and figures, studies that several of them print.
 //!
 //! | room | holds | must not know |
 //! |---|---|---|

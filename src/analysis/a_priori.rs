@@ -25,7 +25,7 @@ pub struct Promise {
 
 /// Iterations after which max_i ‖e_i‖₂ is at most the tolerance, by proof; infinite where the bound for λ_min is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Counts {
+pub struct IterationCounts {
     /// PIA, which is ω = 1.
     pub pia: f64,
     /// W-PIA at [`Promise::omega_w_pia`].
@@ -58,7 +58,12 @@ impl Promise {
     ///
     /// # Panics
     /// If there is not one point a vertex.
-    pub fn counts(&self, system: &impl System, (points, start): (&[DVec3], &[DVec3]), tolerance: f64) -> Counts {
+    pub fn counts(
+        &self,
+        system: &impl System,
+        (points, start): (&[DVec3], &[DVec3]),
+        tolerance: f64,
+    ) -> IterationCounts {
         assert_eq!(points.len(), system.len(), "one point a vertex");
         let (mut in_h, mut in_d) = (0.0, 0.0);
         let (mut h_max, mut d_max) = (0.0f64, 0.0f64);
@@ -85,7 +90,7 @@ impl Promise {
             () if self.a.min > 0.0 => promised_iterations((self.a.min, self.a.max), reduction_h),
             () => f64::INFINITY,
         };
-        Counts {
+        IterationCounts {
             pia: powers(reduction_h, self.a.radius(1.0)),
             w_pia: powers(reduction_h, self.a.radius(self.omega_w_pia)),
             thall: powers(reduction_d, self.jacobi.radius(0.5)),

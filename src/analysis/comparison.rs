@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 
-use super::own::{Named, Own};
+use super::custom_methods::{Named, Own};
 use super::predict::predicted_rate;
 use super::rate::observed_rate;
 use super::spectrum::Spectrum;
@@ -30,7 +30,7 @@ pub struct Entry<'a> {
 
 /// What came of it.
 #[derive(Clone, Debug)]
-pub struct Row<'a> {
+pub struct MethodRow<'a> {
     /// One of the methods here, or of the caller's own.
     pub method: Named<'a>,
     /// Empty for methods of the caller's own.
@@ -215,7 +215,7 @@ fn four_digits(x: f64) -> String {
 /// Runs the lines from V = `start` (P, unless there is reason for another), then the methods of the caller's [own], which
 /// start from the points, one after the other, so that their times are comparable. `done` is called after each.
 ///
-/// [own]: super::own
+/// [own]: super::custom_methods
 ///
 /// # Errors
 /// If an eigenvalue computation for a prediction does not converge.
@@ -230,7 +230,7 @@ pub fn compare<'a>(
     own: &[Own],
     stop: &Stop,
     done: &mut dyn FnMut(),
-) -> Result<Vec<Row<'a>>> {
+) -> Result<Vec<MethodRow<'a>>> {
     let floor = rounding_floor(diagonal(points));
     let observed_rate = |solution: &Solution| {
         let maxima: Vec<f64> = solution.report.history.iter().map(|e| e.max).collect();
@@ -244,7 +244,7 @@ pub fn compare<'a>(
             let observed_rate = (!entry.method.is_direct()).then(|| observed_rate(&solution)).flatten();
             let predicted_rate = predicted_rate(system, spectrum, entry.method)?;
             done();
-            Ok(Row {
+            Ok(MethodRow {
                 method: Named::Ours(entry.method),
                 variant: entry.variant,
                 parameter: entry.parameter.clone(),
@@ -253,11 +253,11 @@ pub fn compare<'a>(
                 predicted_rate,
             })
         })
-        .collect::<Result<Vec<Row<'a>>>>()?;
+        .collect::<Result<Vec<MethodRow<'a>>>>()?;
     let theirs = own.iter().map(|own| {
         let solution = own.run(system, points, stop);
         done();
-        Row {
+        MethodRow {
             method: Named::Own(own.name.clone()),
             variant: "",
             parameter: own.parameter.clone(),

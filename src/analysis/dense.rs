@@ -4,7 +4,7 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use glam::DVec3;
 
-use super::spectrum::{Operator, symmetric};
+use super::symmetric::{SymmetricForm, symmetric};
 use crate::assemble::{Csr, LimitSystem};
 use crate::error::{Error, Result};
 
@@ -44,8 +44,8 @@ pub fn full_eigenvalues(system: &LimitSystem) -> Result<Eigenvalues> {
 
 fn both(system: &LimitSystem) -> Result<Eigenvalues> {
     Ok(Eigenvalues {
-        a: values(&symmetric(system, Operator::A))?,
-        jacobi: values(&symmetric(system, Operator::Jacobi))?,
+        a: values(&symmetric(system, SymmetricForm::A))?,
+        jacobi: values(&symmetric(system, SymmetricForm::Jacobi))?,
     })
 }
 

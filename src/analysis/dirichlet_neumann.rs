@@ -1,4 +1,5 @@
-//! The end of a spectrum enclosed from both sides, with its multiplicity, by work around exceptional vertices only.
+//! Dirichlet-Neumann bracketing: two-sided bounds of an end of a spectrum, with its multiplicity, by work around
+//! exceptional vertices only.
 //!
 //! With σ = 1 for the lower end and −1 for the upper, σM is a sum of one element a face and one number a vertex,
 //!
@@ -27,10 +28,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::certificate::inertia;
-use super::eigen::End;
+use super::inertia::inertia;
 use super::lanczos;
-use super::spectrum::Operator;
+use super::subspace_iteration::End;
+use super::symmetric::SymmetricForm;
 use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
 use crate::assemble::system::valences;
@@ -105,7 +106,7 @@ struct Form<'a> {
 
 impl<'a> Form<'a> {
     /// `None` if the mesh has a boundary or a face that is too large.
-    fn new(surface: &'a Surface, scheme: Scheme, operator: Operator, end: End) -> Option<Self> {
+    fn new(surface: &'a Surface, scheme: Scheme, which: SymmetricForm, end: End) -> Option<Self> {
         let faces = surface.faces();
         let mut occurs = [false; LARGEST_FACE + 1];
         for face in faces.iter() {
@@ -140,9 +141,9 @@ impl<'a> Form<'a> {
                     diagonal += scheme.face_weight(size, 0);
                     shift += shifts[size];
                 }
-                let g = match operator {
-                    Operator::A => 1.0 / scheme.h(n as usize),
-                    Operator::Jacobi => diagonal,
+                let g = match which {
+                    SymmetricForm::A => 1.0 / scheme.h(n as usize),
+                    SymmetricForm::Jacobi => diagonal,
                 };
                 ((sign * diagonal - shift) / g, g)
             })
@@ -210,8 +211,8 @@ pub fn alternation_is_all(faces: &Faces, scheme: Scheme) -> bool {
 /// The lower bounds min c_i (upper: max) that elements and potentials alone prove: at least as good as those of
 /// [`SpectralBounds`](crate::assemble::bounds::SpectralBounds), as they know the sizes of the faces at each vertex.
 /// `None` on meshes with a boundary or a face of more than 64 corners. O(corners).
-pub fn element_bound(surface: &Surface, scheme: Scheme, operator: Operator, end: End) -> Option<f64> {
-    let form = Form::new(surface, scheme, operator, end)?;
+pub fn element_bound(surface: &Surface, scheme: Scheme, which: SymmetricForm, end: End) -> Option<f64> {
+    let form = Form::new(surface, scheme, which, end)?;
     let least = form.potential.iter().copied().fold(f64::INFINITY, f64::min);
     Some(match end {
         End::Lowest => least,
@@ -231,12 +232,12 @@ pub fn element_bound(surface: &Surface, scheme: Scheme, operator: Operator, end:
 ///
 /// ```
 /// use limitlab::analysis::dirichlet_neumann::bracket;
-/// use limitlab::analysis::{eigen::End, spectrum::Operator};
+/// use limitlab::analysis::{subspace_iteration::End, symmetric::SymmetricForm};
 /// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Surface, builtin};
 ///
 /// let surface = Surface::new(builtin::builtin("quad-sphere:7")?)?;
-/// let found = bracket(&surface, Scheme::CatmullClark, Operator::A, End::Lowest, 1e-8)?;
+/// let found = bracket(&surface, Scheme::CatmullClark, SymmetricForm::A, End::Lowest, 1e-8)?;
 /// // One mode around each of the eight vertices of valence 3, below the edge 1/9 of the continuum.
 /// let found = found.expect("eight exceptional vertices");
 /// assert_eq!((found.multiplicity, found.kinds), (8, 1));
@@ -246,11 +247,11 @@ pub fn element_bound(surface: &Surface, scheme: Scheme, operator: Operator, end:
 pub fn bracket(
     surface: &Surface,
     scheme: Scheme,
-    operator: Operator,
+    which: SymmetricForm,
     end: End,
     tolerance: f64,
 ) -> Result<Option<Bracket>> {
-    let Some(form) = Form::new(surface, scheme, operator, end) else {
+    let Some(form) = Form::new(surface, scheme, which, end) else {
         return Ok(None);
     };
     let (level, seeds) = form.exceptional();
@@ -394,7 +395,7 @@ fn lowest(s: &Csr) -> Result<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(0x50_6174_6368);
     let start = (0..s.len()).map(|_| rng.random_range(-1.0..1.0)).collect();
     let limits =
-        lanczos::Limits { tolerance: 1e-12, max_steps: STEPS, least_weight: 0.0, ends: lanczos::Wanted::Lowest };
+        lanczos::LanczosLimits { tolerance: 1e-12, max_steps: STEPS, least_weight: 0.0, ends: lanczos::Wanted::Lowest };
     Ok(lanczos::extremes(s, start, limits)?.low.value)
 }
 

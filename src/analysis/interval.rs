@@ -18,7 +18,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::lanczos::{self, Matrix, SelfAdjoint};
-use super::spectrum::Operator as Which;
+use super::symmetric::SymmetricForm;
 use crate::assemble::csr::Pattern;
 use crate::assemble::{Csr, Operator};
 use crate::error::Result;
@@ -63,33 +63,33 @@ pub struct Interval {
 /// If the operator holds numbers that are not finite.
 ///
 /// ```
-/// use limitlab::analysis::{interval::interval, spectrum};
+/// use limitlab::analysis::{interval::interval, spectrum, symmetric::SymmetricForm};
 /// use limitlab::assemble::{LimitSystem, Operator};
 /// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Surface, builtin};
 ///
 /// let surface = Surface::new(builtin::builtin("irregular-quad:3000")?)?;
 /// let operator = Operator::new(&surface, Scheme::CatmullClark)?;
-/// let found = interval(&operator, spectrum::Operator::Jacobi)?;
+/// let found = interval(&operator, SymmetricForm::Jacobi)?;
 /// let exact = spectrum::spectrum(&LimitSystem::new(&surface, Scheme::CatmullClark)?)?.jacobi;
 /// assert!(exact.max <= found.high && found.high < 1.1 * exact.max);
 /// assert!(exact.min <= found.least && found.low > 0.9 * exact.min);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn interval(operator: &Operator, which: Which) -> Result<Interval> {
+pub fn interval(operator: &Operator, which: SymmetricForm) -> Result<Interval> {
     let bounds = operator.bounds();
     let (proven, mut high) = match which {
-        Which::A => (bounds.lambda_min, bounds.lambda_max),
-        Which::Jacobi => (bounds.jacobi_lambda_min, bounds.jacobi_lambda_max),
+        SymmetricForm::A => (bounds.lambda_min, bounds.lambda_max),
+        SymmetricForm::Jacobi => (bounds.jacobi_lambda_min, bounds.jacobi_lambda_max),
     };
     if operator.is_empty() {
         return Ok(Interval { low: proven, high, least: high });
     }
-    if which == Which::Jacobi {
+    if which == SymmetricForm::Jacobi {
         high = high.min(collatz_wielandt(operator));
     }
     let mut average = operator.diagonal().to_vec();
-    let a = Matrix { system: operator, which: Which::A };
+    let a = Matrix { system: operator, which: SymmetricForm::A };
     let mut other = vec![0.0; average.len()];
     for _ in 0..AVERAGES {
         multiply(&a, &average, &mut other);
@@ -102,14 +102,14 @@ pub fn interval(operator: &Operator, which: Which) -> Result<Interval> {
     let mut rng = ChaCha8Rng::seed_from_u64(0x73_616d_706c);
     let start = (0..s.len()).map(|_| rng.random_range(-1.0..1.0)).collect();
     let limits =
-        lanczos::Limits { tolerance: 1e-4, max_steps: STEPS, least_weight: 0.0, ends: lanczos::Wanted::Lowest };
+        lanczos::LanczosLimits { tolerance: 1e-4, max_steps: STEPS, least_weight: 0.0, ends: lanczos::Wanted::Lowest };
     let least = lanczos::extremes(&s, start, limits)?.low.value;
     Ok(Interval { low: ((1.0 - MARGIN) * least).max(proven).min(high), high, least })
 }
 
 /// An upper bound of the spectrum of D⁻¹A.
 fn collatz_wielandt(operator: &Operator) -> f64 {
-    let b = Matrix { system: operator, which: Which::Jacobi };
+    let b = Matrix { system: operator, which: SymmetricForm::Jacobi };
     let mut v = vec![1.0; operator.len()];
     let mut image = v.clone();
     let mut bound = f64::INFINITY;
@@ -156,7 +156,7 @@ fn candidates(operator: &Operator, average: &[f64]) -> Vec<u32> {
 }
 
 /// The [`WORST`] of these places: those with the least eigenvalues of the submatrices of a few vertices around each.
-fn worst(operator: &Operator, which: Which, high: f64, places: &[u32]) -> Vec<u32> {
+fn worst(operator: &Operator, which: SymmetricForm, high: f64, places: &[u32]) -> Vec<u32> {
     let mut owner = vec![NONE; operator.len()];
     for (k, &v) in (0..).zip(places) {
         owner[v as usize] = k;
@@ -222,7 +222,12 @@ fn grown(operator: &Operator, places: &[u32]) -> Vec<u32> {
 }
 
 /// The principal submatrix of the symmetric matrix similar to A or D⁻¹A, but for entries that are not `coupled`.
-fn submatrix(operator: &Operator, which: Which, vertices: &[u32], coupled: impl Fn(usize, usize) -> bool) -> Csr {
+fn submatrix(
+    operator: &Operator,
+    which: SymmetricForm,
+    vertices: &[u32],
+    coupled: impl Fn(usize, usize) -> bool,
+) -> Csr {
     let weight = Matrix { system: operator, which };
     let mut number = vec![NONE; operator.len()];
     for (k, &v) in (0..).zip(vertices) {
@@ -235,8 +240,8 @@ fn submatrix(operator: &Operator, which: Which, vertices: &[u32], coupled: impl 
         let i = v as usize;
         let a_ii = operator.diagonal()[i];
         let scale = match which {
-            Which::A => 1.0,
-            Which::Jacobi => a_ii,
+            SymmetricForm::A => 1.0,
+            SymmetricForm::Jacobi => a_ii,
         };
         row.clear();
         row.push((k, a_ii / scale));

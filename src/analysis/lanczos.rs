@@ -2,11 +2,11 @@
 //! the Lanczos process, in three vectors.
 //!
 //! One vector's Krylov space needs far fewer products for an extreme value than a block, but shows a multiple
-//! eigenvalue once: [`eigen`](super::eigen) has the multiplicities and the vectors.
+//! eigenvalue once: [`subspace_iteration`](super::subspace_iteration) has the multiplicities and the vectors.
 
 use std::ops::Range;
 
-use super::spectrum::Operator as Which;
+use super::symmetric::SymmetricForm;
 use super::tridiagonal::Tridiagonal;
 use crate::assemble::Csr;
 use crate::error::{Error, Result};
@@ -30,7 +30,7 @@ pub struct Ritz {
 
 /// When the Lanczos process ends, and what counts.
 #[derive(Clone, Copy, Debug)]
-pub struct Limits {
+pub struct LanczosLimits {
     /// Relative accuracy T of the values looked at: error ≤ T|θ|, residual ≤ 10 T|θ|, and θ moved by no more than
     /// T|θ| while the steps grew by an eighth, and at least eight. (The residual keeps a group of nearly equal
     /// values, which the error estimate takes for one, from passing as its mean.)
@@ -56,7 +56,7 @@ pub enum Wanted {
 
 /// The result of a Lanczos process.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Run {
+pub struct LanczosRun {
     /// The least Ritz value of sufficient weight.
     pub low: Ritz,
     /// The greatest Ritz value of sufficient weight.
@@ -115,7 +115,7 @@ pub struct Matrix<'a, T> {
     /// Gives the products with A, the diagonal of A and the weights h_i.
     pub system: &'a T,
     /// Whether the matrix is A or D⁻¹A.
-    pub which: Which,
+    pub which: SymmetricForm,
 }
 
 impl<T: System> SelfAdjoint for Matrix<'_, T> {
@@ -127,8 +127,8 @@ impl<T: System> SelfAdjoint for Matrix<'_, T> {
     fn weight(&self, i: usize) -> f64 {
         let h = self.system.weights()[i];
         match self.which {
-            Which::A => 1.0 / h,
-            Which::Jacobi => self.system.diagonal()[i] / h,
+            SymmetricForm::A => 1.0 / h,
+            SymmetricForm::Jacobi => self.system.diagonal()[i] / h,
         }
     }
 
@@ -138,7 +138,7 @@ impl<T: System> SelfAdjoint for Matrix<'_, T> {
 
     fn product(&self, rows: Range<usize>, x: &[f64], shared: &[f64], out: &mut [f64]) {
         self.system.product(rows.clone(), x, shared, out);
-        if self.which == Which::Jacobi {
+        if self.which == SymmetricForm::Jacobi {
             for (out, a) in out.iter_mut().zip(&self.system.diagonal()[rows]) {
                 *out /= a;
             }
@@ -181,7 +181,7 @@ pub fn rayleigh(s: &impl SelfAdjoint, x: &[f64]) -> (f64, f64) {
 ///
 /// # Errors
 /// A start that is zero or not finite.
-pub fn extremes(s: &impl SelfAdjoint, start: Vec<f64>, limits: Limits) -> Result<Run> {
+pub fn extremes(s: &impl SelfAdjoint, start: Vec<f64>, limits: LanczosLimits) -> Result<LanczosRun> {
     let n = start.len();
     let mut v = start;
     // The vectors are kept as they come, each with its norm.
@@ -221,7 +221,7 @@ pub fn extremes(s: &impl SelfAdjoint, start: Vec<f64>, limits: Limits) -> Result
             let settled = before.is_some_and(|(l, h)| {
                 (limits.ends == Wanted::Highest || good(low, l)) && (limits.ends == Wanted::Lowest || good(high, h))
             });
-            let run = Run { low, high, steps, converged: settled || closed };
+            let run = LanczosRun { low, high, steps, converged: settled || closed };
             if run.converged || steps >= limits.max_steps {
                 return Ok(run);
             }
@@ -316,7 +316,8 @@ mod tests {
         Csr::new(Arc::new(pattern), values.to_vec())
     }
 
-    const LIMITS: Limits = Limits { tolerance: 1e-12, max_steps: 300, least_weight: 0.0, ends: Wanted::Both };
+    const LIMITS: LanczosLimits =
+        LanczosLimits { tolerance: 1e-12, max_steps: 300, least_weight: 0.0, ends: Wanted::Both };
 
     #[test]
     fn finds_both_ends_of_a_known_spectrum() {
@@ -333,7 +334,7 @@ mod tests {
         let values: Vec<f64> = (0..4000).map(|i| (i as f64 / 4000.0).powi(2)).collect();
         let start: Vec<f64> = (0..4000).map(|i| 1.0 + (i % 7) as f64).collect();
         for max_steps in [40, 80, 160, 320, 640] {
-            let limits = Limits { max_steps, tolerance: 1e-15, ..LIMITS };
+            let limits = LanczosLimits { max_steps, tolerance: 1e-15, ..LIMITS };
             let run = extremes(&diagonal(&values), start.clone(), limits).expect("a good start");
             assert!(run.low.residual >= run.low.error);
             // The lowest eigenvalue is 0: the value is its error.
@@ -385,7 +386,7 @@ mod tests {
     #[test]
     fn sees_only_what_the_start_excites() {
         let start = vec![0.0, 1.0, 1.0, 1.0, 0.0];
-        let limits = Limits { least_weight: 1e-20, ..LIMITS };
+        let limits = LanczosLimits { least_weight: 1e-20, ..LIMITS };
         let run = extremes(&diagonal(&[0.1, 0.2, 0.5, 0.7, 3.0]), start, limits).expect("a start");
         assert!((run.low.value - 0.2).abs() < 1e-12 && (run.high.value - 0.7).abs() < 1e-12);
     }

@@ -1,25 +1,26 @@
-//! Why a method converges, stalls or fails: spectra, predicted and observed rates, ω sweeps.
+//! Convergence analysis: spectra, predicted and observed rates, singularity, ω sweeps.
 //! This room knows no plotting.
 
 pub mod a_priori;
-pub mod certificate;
 pub mod comparison;
+pub mod custom_methods;
 pub mod dense;
 pub mod dirichlet_neumann;
-pub mod eigen;
 pub mod failed;
+pub mod inertia;
 pub mod interval;
 pub mod lanczos;
-pub mod lines;
+pub mod line_preconditioner;
 pub mod order_study;
-pub mod own;
 pub mod predict;
 pub mod rate;
 pub mod singularity;
 pub mod spectral_radius;
 pub mod spectrum;
 pub mod splitting;
+pub mod subspace_iteration;
 pub mod sweep;
+pub mod symmetric;
 pub mod tridiagonal;
 pub mod valence_study;
 

@@ -31,12 +31,13 @@ use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::Surface;
 use crate::mesh::order::Order;
-use crate::solvers::gauss_seidel::{Sor, sweep};
+use crate::solvers::gauss_seidel::Sor;
+use crate::solvers::system::sweep;
 use crate::solvers::{Outcome, Stop, System, solve};
 
 /// One order, or the summary of the random ones, at one ω.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct OrderRow {
     /// The order as on the command line, such as `random:3`; `greedy` for Gauss-Southwell.
     pub order: String,
     /// The relaxation factor; 1 is Gauss-Seidel.
@@ -67,13 +68,13 @@ pub fn order_study(
     omegas: &[f64],
     random: u64,
     stop: &Stop,
-) -> Result<Vec<Row>> {
+) -> Result<Vec<OrderRow>> {
     let mesh = surface.mesh();
     let orders: Vec<Order> = ORDERS.into_iter().chain((1..=random).map(Order::Random)).collect();
     let jobs: Vec<(f64, Order)> =
         omegas.iter().flat_map(|&omega| orders.iter().map(move |&order| (omega, order))).collect();
     let points = &mesh.positions;
-    let rows: Result<Vec<Row>> = jobs
+    let rows: Result<Vec<OrderRow>> = jobs
         .into_par_iter()
         .map(|(omega, order)| {
             let vertices = order.order(mesh, surface.incidence());
@@ -83,7 +84,7 @@ pub fn order_study(
             })?;
             let mut method = Sor::new(system, points, omega, Some(&vertices));
             let report = solve(&mut method, stop, &mut |_| ControlFlow::Continue(()));
-            Ok(Row {
+            Ok(OrderRow {
                 order: order.to_string(),
                 omega,
                 rho: Some(rho),
@@ -95,7 +96,7 @@ pub fn order_study(
         .collect();
     let mut rows = rows?;
     let greedy = gauss_southwell(system, points, stop);
-    rows.push(Row {
+    rows.push(OrderRow {
         order: "greedy".into(),
         omega: 1.0,
         rho: None,
@@ -120,13 +121,13 @@ pub struct Spread {
 }
 
 /// The spread of the random orders among `rows` at one ω; `None` if there are none.
-pub fn random_spread(rows: &[Row], omega: f64) -> Option<Spread> {
+pub fn random_spread(rows: &[OrderRow], omega: f64) -> Option<Spread> {
     let random = || rows.iter().filter(move |r| r.order.starts_with("random:") && r.omega == omega);
     let runs = random().count();
     if runs == 0 {
         return None;
     }
-    let of = |value: &dyn Fn(&Row) -> f64| {
+    let of = |value: &dyn Fn(&OrderRow) -> f64| {
         let (mut least, mut sum, mut greatest) = (f64::INFINITY, 0.0, f64::NEG_INFINITY);
         for x in random().map(value) {
             least = least.min(x);

@@ -7,9 +7,9 @@ use super::spectrum::{Extremes, Spectrum};
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::solvers::Method;
-use crate::solvers::gauss_seidel::sweep;
 use crate::solvers::jacobi::THALL_OMEGA;
 use crate::solvers::ssor::symmetric_sweep;
+use crate::solvers::system::sweep;
 
 /// The predicted factor per iteration of a method on a system with the given spectra, whose best parameters stand for those
 /// that are open. For relaxation it is the

@@ -9,10 +9,10 @@
 
 use glam::DVec3;
 
-use super::certificate::eigenvalues_below;
-use super::eigen::{self, End, Request};
-use super::spectrum::{Operator, scales, symmetric};
-use super::{dense, eigen::Eigenvalue};
+use super::inertia::eigenvalues_below;
+use super::subspace_iteration::{self, EigenpairRequest, End};
+use super::symmetric::{SymmetricForm, scales, symmetric};
+use super::{dense, subspace_iteration::Eigenvalue};
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::Surface;
@@ -216,12 +216,12 @@ pub fn numerical_kernel_dimension(system: &LimitSystem) -> Result<usize> {
         let all = dense::eigenvalues(system)?.a;
         return Ok(all.iter().filter(|l| l.abs() <= ZERO).count());
     }
-    Ok(eigenvalues_below(system, Operator::A, ZERO)?.below)
+    Ok(eigenvalues_below(system, SymmetricForm::A, ZERO)?.below)
 }
 
 /// A slow mode: an eigenvector of A or D⁻¹A at an end of the spectrum.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mode {
+pub struct SlowMode {
     /// The eigenvalue of A or D⁻¹A, with its error.
     pub eigenvalue: Eigenvalue,
     /// The eigenvector at the vertices, of largest entry 1: what a control net's error looks like.
@@ -234,9 +234,9 @@ pub struct Mode {
 /// eigenvalue's space the vectors are an arbitrary orthonormal basis. Dense up to 600 vertices.
 ///
 /// # Errors
-/// As [`eigen::extreme`] and [`dense::eigenpairs`].
-pub fn modes(system: &LimitSystem, operator: Operator, end: End, count: usize) -> Result<Vec<Mode>> {
-    let s = symmetric(system, operator);
+/// As [`subspace_iteration::extreme`] and [`dense::eigenpairs`].
+pub fn modes(system: &LimitSystem, form: SymmetricForm, end: End, count: usize) -> Result<Vec<SlowMode>> {
+    let s = symmetric(system, form);
     let pairs: Vec<(Eigenvalue, Vec<f64>)> = if system.len() <= dense::LARGEST {
         let (values, vectors) = dense::eigenpairs(&s)?;
         let mut pairs: Vec<_> = values.into_iter().zip(vectors).collect();
@@ -254,15 +254,15 @@ pub fn modes(system: &LimitSystem, operator: Operator, end: End, count: usize) -
             .collect()
     } else {
         let b = &system.bounds;
-        let spectrum = match operator {
-            Operator::A => (b.lambda_min, b.lambda_max),
-            Operator::Jacobi => (b.jacobi_lambda_min, b.jacobi_lambda_max),
+        let spectrum = match form {
+            SymmetricForm::A => (b.lambda_min, b.lambda_max),
+            SymmetricForm::Jacobi => (b.jacobi_lambda_min, b.jacobi_lambda_max),
         };
-        let request = Request { end, count, tolerance: 1e-9, spectrum };
-        let found = eigen::extreme(&s, &request)?;
+        let request = EigenpairRequest { end, count, tolerance: 1e-9, spectrum };
+        let found = subspace_iteration::extreme(&s, &request)?;
         found.values.into_iter().zip(found.vectors).collect()
     };
-    let scale = scales(system, operator);
+    let scale = scales(system, form);
     Ok(pairs
         .into_iter()
         .map(|(eigenvalue, x)| {
@@ -271,7 +271,7 @@ pub fn modes(system: &LimitSystem, operator: Operator, end: End, count: usize) -
             let mut values: Vec<f64> = x.iter().zip(&scale).map(|(x, s)| x * s).collect();
             let largest = values.iter().fold(0.0f64, |m, &v| if v.abs() > m.abs() { v } else { m });
             values.iter_mut().for_each(|v| *v /= largest);
-            Mode { eigenvalue, values, participation: squares * squares / (x.len() as f64 * fourth) }
+            SlowMode { eigenvalue, values, participation: squares * squares / (x.len() as f64 * fourth) }
         })
         .collect())
 }

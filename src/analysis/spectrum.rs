@@ -5,11 +5,12 @@ use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::certificate::inertia;
 use super::dirichlet_neumann::{alternation_is_all, bracket};
-use super::eigen::End;
+use super::inertia::inertia;
 use super::lanczos::{Matrix, SelfAdjoint, rayleigh};
 use super::singularity::{ZERO, colour};
+use super::subspace_iteration::End;
+use super::symmetric::{SymmetricForm, symmetric};
 use super::{dense, lanczos};
 use crate::assemble::bounds::SpectralBounds;
 use crate::assemble::{Csr, LimitSystem};
@@ -68,15 +69,6 @@ pub struct Spectrum {
     pub a: Extremes,
     /// Of D⁻¹A, D = diag A, which decides Jacobi relaxation and preconditioning by the diagonal.
     pub jacobi: Extremes,
-}
-
-/// Which of two similar matrices a symmetric operator diag(s) M diag(s) stands for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Operator {
-    /// A: s = √h.
-    A,
-    /// D⁻¹A: s = 1/√m_ii.
-    Jacobi,
 }
 
 /// Relative accuracy of λ_min and λ_max.
@@ -145,7 +137,7 @@ impl Source {
 
 /// The four ends of the spectra of A and D⁻¹A.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ends {
+pub struct SpectrumEnds {
     /// The least eigenvalue of A.
     pub lambda_min: Estimate,
     /// The greatest eigenvalue of A.
@@ -158,7 +150,7 @@ pub struct Ends {
     pub applications: usize,
 }
 
-impl Ends {
+impl SpectrumEnds {
     /// The values alone.
     pub fn spectrum(&self) -> Spectrum {
         let pair = |min: Estimate, max: Estimate| Extremes { min: min.value, max: max.value };
@@ -168,12 +160,12 @@ impl Ends {
         }
     }
 
-    fn each(&mut self) -> [(Operator, End, &mut Estimate); 4] {
+    fn each(&mut self) -> [(SymmetricForm, End, &mut Estimate); 4] {
         [
-            (Operator::A, End::Lowest, &mut self.lambda_min),
-            (Operator::A, End::Highest, &mut self.lambda_max),
-            (Operator::Jacobi, End::Lowest, &mut self.jacobi_lambda_min),
-            (Operator::Jacobi, End::Highest, &mut self.jacobi_lambda_max),
+            (SymmetricForm::A, End::Lowest, &mut self.lambda_min),
+            (SymmetricForm::A, End::Highest, &mut self.lambda_max),
+            (SymmetricForm::Jacobi, End::Lowest, &mut self.jacobi_lambda_min),
+            (SymmetricForm::Jacobi, End::Highest, &mut self.jacobi_lambda_max),
         ]
     }
 
@@ -204,11 +196,11 @@ pub fn spectrum(system: &LimitSystem) -> Result<Spectrum> {
 ///
 /// # Errors
 /// If a dense computation does not converge.
-pub fn ends(system: &LimitSystem) -> Result<Ends> {
+pub fn ends(system: &LimitSystem) -> Result<SpectrumEnds> {
     if system.len() <= dense::LARGEST {
         let all = dense::eigenvalues(system)?;
         let (a, jacobi) = (dense_ends(&all.a), dense_ends(&all.jacobi));
-        return Ok(Ends {
+        return Ok(SpectrumEnds {
             lambda_min: a.0,
             lambda_max: a.1,
             jacobi_lambda_min: jacobi.0,
@@ -248,7 +240,7 @@ pub fn ends(system: &LimitSystem) -> Result<Ends> {
 /// assert_eq!(ends.lambda_max.multiplicity.map(|m| m.count), Some(1));
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn mesh_ends(surface: &Surface, scheme: Scheme) -> Result<Ends> {
+pub fn mesh_ends(surface: &Surface, scheme: Scheme) -> Result<SpectrumEnds> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
     if mesh.len() <= dense::LARGEST {
         return ends(&LimitSystem::new(surface, scheme)?);
@@ -339,25 +331,29 @@ struct Known {
 
 impl Known {
     /// The ends of both operators; `enclose` may know an end that attains no bound.
-    fn ends<T: System>(&self, system: &T, enclose: impl Fn(Operator, End) -> Result<Option<Estimate>>) -> Result<Ends> {
+    fn ends<T: System>(
+        &self,
+        system: &T,
+        enclose: impl Fn(SymmetricForm, End) -> Result<Option<Estimate>>,
+    ) -> Result<SpectrumEnds> {
         let b = &self.bounds;
         let mut applications = 0;
         let a = self.operator_ends(
-            &Matrix { system, which: Operator::A },
+            &Matrix { system, which: SymmetricForm::A },
             (b.lambda_min, b.lambda_max),
             b.lambda_max,
             &enclose,
             &mut applications,
         )?;
         let jacobi = self.operator_ends(
-            &Matrix { system, which: Operator::Jacobi },
+            &Matrix { system, which: SymmetricForm::Jacobi },
             (b.jacobi_lambda_min, b.jacobi_lambda_max),
             // D⁻¹A has a diagonal of ones, whatever the scale of A.
             1.0,
             &enclose,
             &mut applications,
         )?;
-        Ok(Ends {
+        Ok(SpectrumEnds {
             lambda_min: a.0,
             lambda_max: a.1,
             jacobi_lambda_min: jacobi.0,
@@ -373,7 +369,7 @@ impl Known {
         matrix: &Matrix<'_, T>,
         (least, greatest): (f64, f64),
         scale: f64,
-        enclose: &impl Fn(Operator, End) -> Result<Option<Estimate>>,
+        enclose: &impl Fn(SymmetricForm, End) -> Result<Option<Estimate>>,
         applications: &mut usize,
     ) -> Result<(Estimate, Estimate)> {
         let exactly = |count| Multiplicity { count, within: 0.0 };
@@ -412,7 +408,7 @@ impl Known {
                 let mut rng = ChaCha8Rng::seed_from_u64(0x5370_6563);
                 std::iter::repeat_with(|| rng.random_range(-1.0..1.0)).take(matrix.len()).collect()
             };
-            let limits = lanczos::Limits { tolerance: ACCURACY, max_steps: STEPS, least_weight: 0.0, ends };
+            let limits = lanczos::LanczosLimits { tolerance: ACCURACY, max_steps: STEPS, least_weight: 0.0, ends };
             let run = lanczos::extremes(matrix, start, limits)?;
             *applications += run.steps;
             let found = match end {
@@ -493,24 +489,24 @@ fn components(m: &Csr) -> usize {
 pub fn excited(
     system: &impl System,
     (points, start): (&[DVec3], &[DVec3]),
-    operator: Operator,
+    form: SymmetricForm,
 ) -> Result<Option<Extremes>> {
     let n = points.len();
     let mut e = vec![DVec3::ZERO; n];
     let errors = Rows::new(n).residual(system, points, start, &mut e, |_, e, out, _| *out = e);
     let largest = errors.errors.max;
-    let matrix = Matrix { system, which: operator };
+    let matrix = Matrix { system, which: form };
     let mut found: Option<Extremes> = None;
     for axis in 0..3 {
         if e.iter().all(|e| e[axis].abs() <= 1e-12 * largest) {
             continue;
         }
         // The residual of A V = P, or of D⁻¹A V = D⁻¹P.
-        let start: Vec<f64> = match operator {
-            Operator::A => e.iter().map(|e| e[axis]).collect(),
-            Operator::Jacobi => e.iter().zip(system.diagonal()).map(|(e, a)| e[axis] / a).collect(),
+        let start: Vec<f64> = match form {
+            SymmetricForm::A => e.iter().map(|e| e[axis]).collect(),
+            SymmetricForm::Jacobi => e.iter().zip(system.diagonal()).map(|(e, a)| e[axis] / a).collect(),
         };
-        let limits = lanczos::Limits {
+        let limits = lanczos::LanczosLimits {
             tolerance: ACCURACY,
             max_steps: STEPS_DATA,
             least_weight: EXCITED,
@@ -524,19 +520,4 @@ pub fn excited(
         });
     }
     Ok(found)
-}
-
-/// The symmetric matrix diag(s) M diag(s) that is similar to A or D⁻¹A. An eigenvector x of it makes the eigenvector
-/// diag(s) x of the other.
-pub fn symmetric(system: &LimitSystem, operator: Operator) -> Csr {
-    system.m.scale_symmetrically(&scales(system, operator))
-}
-
-/// diag s of the [`symmetric`] matrix.
-pub fn scales(system: &LimitSystem, operator: Operator) -> Vec<f64> {
-    match operator {
-        Operator::A => system.h.iter().map(|h| h.sqrt()).collect(),
-        // m_ii = a_ii/h_i
-        Operator::Jacobi => system.diagonal.iter().zip(&system.h).map(|(a, h)| (h / a).sqrt()).collect(),
-    }
 }

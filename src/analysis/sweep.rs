@@ -8,14 +8,15 @@ use rayon::prelude::*;
 
 use super::predict::predicted_rate;
 use super::rate::observed_rate;
-use super::spectrum::{Extremes, Operator, Spectrum, excited, spectrum};
+use super::spectrum::{Extremes, Spectrum, excited, spectrum};
+use super::symmetric::SymmetricForm;
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::solvers::{Errors, Method, Outcome, Step, Stop, run_from};
 
 /// A method at one ω.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct SweepRow {
     /// As given with the grid; what ran is this method at `omega`.
     pub method: Method<'static>,
     /// The relaxation factor.
@@ -47,18 +48,18 @@ pub struct Thresholds {
 
 /// A sweep's result on one system.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sweep {
+pub struct OmegaSweep {
     /// The ends of the spectra of A and D⁻¹A.
     pub spectrum: Spectrum,
     /// In the order of the grids; SOR has none.
     pub thresholds: Vec<Thresholds>,
     /// In the order of the grids; fewer than asked for while the sweep runs.
-    pub rows: Vec<Row>,
+    pub rows: Vec<SweepRow>,
 }
 
-impl Sweep {
+impl OmegaSweep {
     /// The ω with the fewest iterations among the converged rows of `method`, ties by smaller final error.
-    pub fn best(&self, method: Method) -> Option<&Row> {
+    pub fn best(&self, method: Method) -> Option<&SweepRow> {
         self.rows.iter().filter(|r| r.method == method && r.outcome == Outcome::Converged).min_by(|a, b| {
             (a.iterations, a.errors.max).partial_cmp(&(b.iterations, b.errors.max)).unwrap_or(std::cmp::Ordering::Equal)
         })
@@ -89,14 +90,14 @@ pub fn sweep(
     order: Option<&[u32]>,
     stop: &Stop,
     floor: f64,
-    done: &(dyn Fn(&Sweep) + Sync),
-) -> Result<Sweep> {
+    done: &(dyn Fn(&OmegaSweep) + Sync),
+) -> Result<OmegaSweep> {
     let spectrum = spectrum(system)?;
     let mut thresholds = Vec::new();
     for (method, _) in grids {
-        let (operator, matrix) = match method {
-            Method::Jacobi { .. } | Method::Thall => (Operator::Jacobi, spectrum.jacobi),
-            Method::Pia | Method::WPia { .. } => (Operator::A, spectrum.a),
+        let (form, matrix) = match method {
+            Method::Jacobi { .. } | Method::Thall => (SymmetricForm::Jacobi, spectrum.jacobi),
+            Method::Pia | Method::WPia { .. } => (SymmetricForm::A, spectrum.a),
             Method::Lu
             | Method::Cholesky
             | Method::SecondCholesky
@@ -113,12 +114,12 @@ pub fn sweep(
             | Method::Anderson { .. }
             | Method::HeavyBall { .. } => continue,
         };
-        thresholds.push(Thresholds { method: *method, matrix, data: excited(system, (points, start), operator)? });
+        thresholds.push(Thresholds { method: *method, matrix, data: excited(system, (points, start), form)? });
     }
     let jobs: Vec<(Method<'static>, f64)> =
         grids.iter().flat_map(|(method, omegas)| omegas.iter().map(|&omega| (*method, omega))).collect();
     // Beside the rows, the number of each.
-    let found = Mutex::new((Sweep { spectrum, thresholds: thresholds.clone(), rows: Vec::new() }, Vec::new()));
+    let found = Mutex::new((OmegaSweep { spectrum, thresholds: thresholds.clone(), rows: Vec::new() }, Vec::new()));
     jobs.par_iter().enumerate().try_for_each(|(number, &(method, omega))| -> Result<()> {
         let Some(swept) = method.in_order(order).at_omega(omega) else {
             panic!("{method} is not swept over ω");
@@ -128,7 +129,7 @@ pub fn sweep(
         let predicted = predicted_rate(system, &spectrum, swept)?;
         let maxima: Vec<f64> = report.history.iter().map(|e| e.max).collect();
         let data = thresholds.iter().find(|t| t.method == method).and_then(|t| t.data);
-        let row = Row {
+        let row = SweepRow {
             method,
             omega,
             outcome: report.outcome,

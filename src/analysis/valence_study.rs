@@ -7,9 +7,9 @@
 //! high valence adds nothing at the slow end of these meshes.
 
 use super::dense;
-use super::eigen::End;
-use super::singularity::{Mode, modes};
-use super::spectrum::Operator;
+use super::singularity::{SlowMode, modes};
+use super::subspace_iteration::End;
+use super::symmetric::SymmetricForm;
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::generate::quad_split;
@@ -33,7 +33,7 @@ pub fn regular_band(scheme: Scheme) -> Band {
 
 /// What one valence does.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct ValenceRow {
     /// The valence of the two extraordinary vertices of the [`star_mesh`].
     pub valence: usize,
     /// The number of vertices N of that mesh.
@@ -58,7 +58,7 @@ pub struct Row {
 #[derive(Clone, Debug)]
 pub struct Located {
     /// Its eigenvalue and eigenvector.
-    pub mode: Mode,
+    pub mode: SlowMode,
     /// The part of Σx² (of the error itself) at the two extraordinary vertices and the vertices of their faces.
     pub near_star: f64,
     /// The vertex of the largest entry and its valence.
@@ -80,11 +80,11 @@ pub fn star_mesh(scheme: Scheme, k: usize) -> (Mesh, [usize; 2]) {
 ///
 /// # Errors
 /// A valence so large that the mesh exceeds [`dense::LARGEST_FULL`].
-pub fn valence_study(scheme: Scheme, valences: impl Iterator<Item = usize>) -> Result<Vec<Row>> {
+pub fn valence_study(scheme: Scheme, valences: impl Iterator<Item = usize>) -> Result<Vec<ValenceRow>> {
     valences.map(|k| row(scheme, k)).collect()
 }
 
-fn row(scheme: Scheme, valence: usize) -> Result<Row> {
+fn row(scheme: Scheme, valence: usize) -> Result<ValenceRow> {
     let (mesh, poles) = star_mesh(scheme, valence);
     let surface = Surface::new(mesh)?;
     let system = LimitSystem::new(&surface, scheme)?;
@@ -102,22 +102,22 @@ fn row(scheme: Scheme, valence: usize) -> Result<Row> {
             }
         }
     }
-    let locate = |operator, end| -> Result<Located> {
-        let mode = modes(&system, operator, end, 1)?.remove(0);
+    let locate = |form, end| -> Result<Located> {
+        let mode = modes(&system, form, end, 1)?.remove(0);
         let total: f64 = mode.values.iter().map(|x| x * x).sum();
         let inside: f64 = mode.values.iter().zip(&near).filter(|(_, near)| **near).map(|(x, _)| x * x).sum();
         let peak =
             (0..surface.len()).fold(0, |best, i| if mode.values[i].abs() > mode.values[best].abs() { i } else { best });
         Ok(Located { near_star: inside / total, peak, peak_valence: surface.incidence().face_count(peak), mode })
     };
-    Ok(Row {
+    Ok(ValenceRow {
         valence,
         vertices: surface.len(),
         separated_a: outside(&all.a, band.a),
         separated_jacobi: outside(&all.jacobi, band.jacobi),
-        slow_pia: locate(Operator::A, End::Lowest)?,
-        limiting_jacobi: locate(Operator::Jacobi, End::Highest)?,
-        slow_jacobi: locate(Operator::Jacobi, End::Lowest)?,
+        slow_pia: locate(SymmetricForm::A, End::Lowest)?,
+        limiting_jacobi: locate(SymmetricForm::Jacobi, End::Highest)?,
+        slow_jacobi: locate(SymmetricForm::Jacobi, End::Lowest)?,
         a: all.a,
         jacobi: all.jacobi,
     })

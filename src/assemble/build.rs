@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::face_sums::Polygons;
-use super::kernel::{Kind, Ring, Rings};
 use super::neighbours::Codes;
+use super::weights::{RowKind, RowWeights, WeightsByValence};
 use crate::error::{Error, Result};
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::order::Numbering;
@@ -14,7 +14,7 @@ use crate::parallel;
 use crate::schemes::{Masks, Scheme};
 
 /// What the rows are built from.
-pub(super) struct Source<'a> {
+pub(super) struct RowSource<'a> {
     faces: &'a Faces,
     incidence: &'a Incidence,
     /// The sides without an opposite, where there are such.
@@ -28,7 +28,7 @@ pub(super) struct Source<'a> {
     pub(super) valences: Vec<u32>,
 }
 
-impl<'a> Source<'a> {
+impl<'a> RowSource<'a> {
     /// # Panics
     /// If the numbering is not of these vertices.
     pub(super) fn new(
@@ -47,7 +47,7 @@ impl<'a> Source<'a> {
             None => incidence.face_count(vertex(k)) as u32,
             Some(topology) => topology.edge_valence(faces, vertex(k)) as u32,
         });
-        Source { faces, incidence, open, free, numbering, scheme, valences }
+        RowSource { faces, incidence, open, free, numbering, scheme, valences }
     }
 
     /// The vertex of a row.
@@ -69,14 +69,14 @@ impl<'a> Source<'a> {
     }
 
     /// The kind of every row; a fixed one is a vertex without edges.
-    pub(super) fn kinds(&self) -> Vec<Kind> {
+    pub(super) fn kinds(&self) -> Vec<RowKind> {
         let n = self.valences.len();
         let edges_only = self.scheme.edges_only();
         let of_size = |size: usize| match size {
-            _ if edges_only => Kind::Edges,
-            3 => Kind::Edges,
-            4 => Kind::Quads,
-            _ => Kind::Polygons,
+            _ if edges_only => RowKind::Edges,
+            3 => RowKind::Edges,
+            4 => RowKind::Quads,
+            _ => RowKind::Polygons,
         };
         if let (Some(size), None) = (self.faces.uniform_size(), self.free) {
             return vec![of_size(size); n];
@@ -84,7 +84,7 @@ impl<'a> Source<'a> {
         let incidence = self.incidence;
         parallel::collect(n, |k| {
             if self.valences[k] == 0 {
-                return Kind::Edges;
+                return RowKind::Edges;
             }
             self.fetch_ahead(k);
             // One bit for each kind that occurs: no branch on what there is no pattern in.
@@ -93,19 +93,19 @@ impl<'a> Source<'a> {
                 let kind = of_size(self.faces.range(incidence.face_of(c)).len());
                 met | 1u8 << kind as u8
             });
-            let only = |kind: Kind| met == 1 << kind as u8;
-            if only(Kind::Quads) {
-                Kind::Quads
-            } else if only(Kind::Edges) {
-                Kind::Edges
+            let only = |kind: RowKind| met == 1 << kind as u8;
+            if only(RowKind::Quads) {
+                RowKind::Quads
+            } else if only(RowKind::Edges) {
+                RowKind::Edges
             } else {
-                Kind::Polygons
+                RowKind::Polygons
             }
         })
     }
 
     /// The faces that are summed, and the rows that read them.
-    pub(super) fn polygons(&self, kinds: &[Kind]) -> Polygons {
+    pub(super) fn polygons(&self, kinds: &[RowKind]) -> Polygons {
         let rows = (kinds, self.valences.as_slice());
         Polygons::new(self.faces, self.incidence, self.scheme, self.numbering, rows)
     }
@@ -114,16 +114,16 @@ impl<'a> Source<'a> {
     ///
     /// # Errors
     /// More than 2³² − 1 neighbours.
-    pub(super) fn offsets(&self, kinds: &[Kind]) -> Result<Vec<u32>> {
+    pub(super) fn offsets(&self, kinds: &[RowKind]) -> Result<Vec<u32>> {
         let among_polygons = u32::from(self.scheme.edge_weight() != 0.0);
         let mut offsets = large(Vec::with_capacity(kinds.len() + 1));
         offsets.push(0);
         let mut end = 0u32;
         for (kind, n) in kinds.iter().zip(&self.valences) {
             let length = match kind {
-                Kind::Quads => 2 * n,
-                Kind::Edges => *n,
-                Kind::Polygons => among_polygons * n,
+                RowKind::Quads => 2 * n,
+                RowKind::Edges => *n,
+                RowKind::Polygons => among_polygons * n,
             };
             end = end.checked_add(length).ok_or_else(|| Error::TooLarge {
                 what: "the operator would have more than 2³² − 1 neighbours".into(),
@@ -135,7 +135,7 @@ impl<'a> Source<'a> {
     }
 
     /// The neighbours of all rows; `runs` are the first rows of those of equal kind and valence.
-    pub(super) fn codes(&self, kinds: &[Kind], offsets: Vec<u32>, runs: Vec<u32>) -> Codes {
+    pub(super) fn codes(&self, kinds: &[RowKind], offsets: Vec<u32>, runs: Vec<u32>) -> Codes {
         // Where all faces are of one size, the corners of a face take no look-up.
         match self.faces.uniform_size() {
             Some(3) => self.codes_by(kinds, (offsets, runs), |c| c / 3 * 3..c / 3 * 3 + 3),
@@ -147,7 +147,7 @@ impl<'a> Source<'a> {
     /// `corners_by` tells the corners of the face of a corner.
     fn codes_by(
         &self,
-        kinds: &[Kind],
+        kinds: &[RowKind],
         (offsets, runs): (Vec<u32>, Vec<u32>),
         corners_by: impl Fn(usize) -> Range<usize> + Sync,
     ) -> Codes {
@@ -160,7 +160,7 @@ impl<'a> Source<'a> {
             self.fetch_ahead(k);
             let v = self.vertex(k);
             match kinds[k] {
-                Kind::Quads => {
+                RowKind::Quads => {
                     let (edge, opposite) = row.split_at_mut(row.len() / 2);
                     let at = incidence.corners_at(v).iter();
                     for ((edge, opposite), &c) in edge.iter_mut().zip(opposite).zip(at) {
@@ -171,7 +171,7 @@ impl<'a> Source<'a> {
                         *opposite = self.row(face[(place + 2) % 4]);
                     }
                 }
-                Kind::Edges | Kind::Polygons => {
+                RowKind::Edges | RowKind::Polygons => {
                     // Every edge leaves v in one of its faces; on a boundary it may only enter.
                     let mut slots = row.iter_mut();
                     for &c in incidence.corners_at(v) {
@@ -193,7 +193,7 @@ impl<'a> Source<'a> {
     }
 
     /// The weights of rows by valence, times h.
-    pub(super) fn rings(&self) -> Rings<f64> {
+    pub(super) fn rings(&self) -> WeightsByValence<f64> {
         let greatest = self.valences.iter().copied().max().unwrap_or(0) as usize;
         let s = self.scheme;
         let weights = |n: usize| (s.h(n.max(1)), s.vertex_weight(n.max(1)), n as f64);
@@ -206,17 +206,18 @@ impl<'a> Source<'a> {
                 let at = |steps| s.face_weight(size, steps);
                 ([at(0), at(1), at(size - 1)], at(2))
             };
-            Ring::new(h * (own + x * face[0]), h * (s.edge_weight() + face[1] + face[2]), h * across)
+            RowWeights::new(h * (own + x * face[0]), h * (s.edge_weight() + face[1] + face[2]), h * across)
         };
         let rings = |size| (0..=greatest).map(|n| ring(n, size)).collect();
         // Of any size: the part of the faces that is no part of their sums does not depend on it.
         let polygons = |n: usize| {
             let (h, own, x) = weights(n);
-            Ring::new(h * (own + x * s.circulant(4).identity), h * s.edge_weight(), h)
+            RowWeights::new(h * (own + x * s.circulant(4).identity), h * s.edge_weight(), h)
         };
-        let mut all = Rings { quads: rings(4), edges: rings(3), polygons: (0..=greatest).map(polygons).collect() };
+        let mut all =
+            WeightsByValence { quads: rings(4), edges: rings(3), polygons: (0..=greatest).map(polygons).collect() };
         // Fixed rows.
-        all.edges[0] = Ring::new(0.0, 0.0, 0.0);
+        all.edges[0] = RowWeights::new(0.0, 0.0, 0.0);
         all
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::kernel::{Point, Weight};
+use super::weights::{Point, Weight};
 use crate::error::{Error, Result};
 use crate::mesh::incidence::split_rows;
 use crate::parallel;

@@ -1,12 +1,12 @@
-//! Rows among faces of several sizes, by sums over faces: what a face adds to M is of rank one, or three, whatever its
-//! size, so a sweep sums each face once and every corner reads the sum. Nothing is stored but who meets whom.
+//! Matrix-free rows on meshes of mixed polygons, by sums over faces: what a face adds to M is of rank one, or three,
+//! whatever its size, so a sweep sums each face once and every corner reads the sum. Only incidence is stored.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
 
 use glam::Vec3A;
 
-use super::kernel::{Kind, Point, Weight};
+use super::weights::{Point, RowKind, Weight};
 use crate::mesh::incidence::split_rows;
 use crate::mesh::order::Numbering;
 use crate::mesh::topology::NONE;
@@ -59,17 +59,17 @@ pub struct Polygons {
 }
 
 impl Polygons {
-    /// For the rows of the kind [`Kind::Polygons`]; valences are by row. O(corners), in parallel but for a counting sort
+    /// For the rows of the kind [`RowKind::Polygons`]; valences are by row. O(corners), in parallel but for a counting sort
     /// of the faces.
     pub(super) fn new(
         faces: &Faces,
         incidence: &Incidence,
         scheme: Scheme,
         numbering: Option<&Numbering>,
-        (kinds, valences): (&[Kind], &[u32]),
+        (kinds, valences): (&[RowKind], &[u32]),
     ) -> Self {
         let mut all = Polygons::default();
-        if !kinds.contains(&Kind::Polygons) {
+        if !kinds.contains(&RowKind::Polygons) {
             return all;
         }
         let row = |v: u32| numbering.map_or(v, |numbering| numbering.place()[v as usize]);
@@ -90,7 +90,7 @@ impl Polygons {
     }
 
     /// By face: the key to sort it by; [`NONE`] if no row needs its sum.
-    fn keys(&mut self, faces: &Faces, kinds: &[Kind], row: impl Fn(u32) -> u32 + Sync) -> Vec<u32> {
+    fn keys(&mut self, faces: &Faces, kinds: &[RowKind], row: impl Fn(u32) -> u32 + Sync) -> Vec<u32> {
         let mut keys = large(vec![NONE; faces.len()]);
         let mut reach = vec![0; keys.len().div_ceil(CHUNK)];
         parallel::chunks_with(&mut keys, CHUNK, &mut reach, |start, keys, reach| {
@@ -100,7 +100,7 @@ impl Polygons {
                 for &v in face {
                     let i = row(v);
                     (first, last) = (first.min(i), last.max(i));
-                    summed |= kinds[i as usize] == Kind::Polygons;
+                    summed |= kinds[i as usize] == RowKind::Polygons;
                 }
                 if summed {
                     *key = (first as usize / BLOCK * (LARGE + 1) + face.len().min(LARGE)) as u32;
@@ -172,14 +172,14 @@ impl Polygons {
         faces: &Faces,
         incidence: &Incidence,
         numbering: Option<&Numbering>,
-        (kinds, valences): (&[Kind], &[u32]),
+        (kinds, valences): (&[RowKind], &[u32]),
         numbers: &[u32],
     ) {
         self.starts = large(Vec::with_capacity(kinds.len() + 1));
         self.starts.push(0);
         let mut end = 0;
         self.starts.extend(kinds.iter().zip(valences).map(|(&kind, n)| {
-            end += if kind == Kind::Polygons { *n } else { 0 };
+            end += if kind == RowKind::Polygons { *n } else { 0 };
             end
         }));
         let listed = self.table(faces, incidence, numbering, |c| numbers[incidence.face_of(c)]);
@@ -351,7 +351,7 @@ impl Polygons {
             }
             return;
         }
-        let turns = &P::Weight::turns(self)[self.first_turn[size] as usize..][..size];
+        let turns = &P::Weight::pairs(&self.double, &self.single)[self.first_turn[size] as usize..][..size];
         for (corners, sums) in corners.chunks_exact(size).zip(sums.as_chunks_mut::<3>().0) {
             if far {
                 fetch();
@@ -383,7 +383,7 @@ impl Polygons {
     #[inline(always)]
     fn gather_run<P: Point>(&self, rows: Range<usize>, n: usize, (sums, first): (&[P], usize), out: &mut [P]) {
         let far = is_far(sums);
-        let turns = P::Weight::turns(self);
+        let turns = P::Weight::pairs(&self.double, &self.single);
         let start = self.at(rows.start).start;
         for (k, out) in out.iter_mut().enumerate() {
             let e = start + k * n..start + (k + 1) * n;
@@ -425,14 +425,6 @@ impl Polygons {
             total += part;
         }
         total
-    }
-
-    pub(super) fn double(&self) -> &[Turn<f64>] {
-        &self.double
-    }
-
-    pub(super) fn single(&self) -> &[Turn<Vec3A>] {
-        &self.single
     }
 }
 

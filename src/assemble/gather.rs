@@ -4,19 +4,54 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::system::FaceBlocks;
 use crate::error::{Error, Result};
 use crate::memory::require;
 use crate::mesh::incidence::{next_in, prev_in, split_rows};
 use crate::mesh::{Faces, Surface, Topology};
 use crate::pages::large;
 use crate::parallel;
+use crate::schemes::Masks;
 
 /// Rows handed to one task: large enough to pay for it, small enough to share out evenly.
 const CHUNK: usize = 8192;
 
+/// For every face size that occurs, what a face adds between a corner and the one k steps further: its
+/// circulant, and half of the edge weight at its sides (the other half comes from the face across). Adding
+/// the halves face by face, in ascending order of faces, makes M symmetric to the last bit.
+pub(super) struct FaceBlocks {
+    by_size: Vec<Vec<f64>>,
+    half_edge: f64,
+    /// Only the corner itself and its two neighbours matter.
+    sides_only: bool,
+}
+
+impl FaceBlocks {
+    pub(super) fn new(faces: &Faces, masks: &impl Masks) -> Self {
+        let half_edge = 0.5 * masks.edge_weight();
+        let mut by_size: Vec<Vec<f64>> = Vec::new();
+        let mut add = |size: usize| {
+            if by_size.len() <= size {
+                by_size.resize(size + 1, Vec::new());
+            }
+            if by_size[size].is_empty() {
+                by_size[size] = (0..size)
+                    .map(|k| {
+                        let side = k == 1 || k + 1 == size;
+                        masks.face_weight(size, k) + if side { half_edge } else { 0.0 }
+                    })
+                    .collect();
+            }
+        };
+        match faces.uniform_size() {
+            Some(size) => add(size),
+            None => faces.iter().for_each(|face| add(face.len())),
+        }
+        FaceBlocks { by_size, half_edge, sides_only: masks.edges_only() }
+    }
+}
+
 /// What the rows are made from.
-pub(super) struct Rows<'a> {
+pub(super) struct Gather<'a> {
     faces: &'a Faces,
     topology: &'a Topology,
     blocks: &'a FaceBlocks,
@@ -167,14 +202,14 @@ fn close_gaps(offsets: &mut [u32], lengths: &[u32], mut shift: impl FnMut(Range<
     end
 }
 
-impl<'a> Rows<'a> {
+impl<'a> Gather<'a> {
     pub(super) fn new(
         surface: &'a Surface,
         blocks: &'a FaceBlocks,
         by_valence: &'a [[f64; 2]],
         valence: &'a [u32],
     ) -> Self {
-        Rows {
+        Gather {
             faces: surface.faces(),
             topology: surface.topology(),
             blocks,
@@ -356,7 +391,7 @@ mod tests {
     use crate::assemble::system::valences;
     use crate::mesh::Mesh;
     use crate::mesh::builtin::builtin;
-    use crate::mesh::generate::{random_polygons, random_triangulation};
+    use crate::mesh::random::{random_polygons, random_triangulation};
     use crate::schemes::{Masks, Scheme};
 
     /// How many rows of M are made the usual way, after comparing them with those made the general way.
@@ -367,7 +402,7 @@ mod tests {
         let most = valence.iter().max().map_or(0, |&n| n as usize);
         let by_valence: Vec<[f64; 2]> = (0..=most).map(|n| [scheme.h(n), scheme.vertex_weight(n)]).collect();
         let blocks = FaceBlocks::new(&mesh.faces, &scheme);
-        let mut rows = Rows::new(&surface, &blocks, &by_valence, &valence);
+        let mut rows = Gather::new(&surface, &blocks, &by_valence, &valence);
         rows.closed = false;
         let (mut usual, mut general) = (Row::default(), Row::default());
         let same = |v: &usize| {

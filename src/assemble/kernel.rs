@@ -1,193 +1,39 @@
 //! Kernel of the matrix-free [`Operator`](super::Operator), for double and for single precision: rows of A from
 //! connectivity alone, with weights that follow from valence and face size.
 
-use std::ops::{Add, AddAssign, Range, Sub};
+use std::ops::Range;
 
-use glam::{DVec3, Vec3A};
+use glam::Vec3A;
 
 use super::face_sums::Polygons;
-use super::neighbours::{Code, Codes, Row, Window, Windows};
-
-/// What an operator acts on: three right-hand sides of one vertex, interleaved, in doubles (24 bytes) or singles
-/// (16 bytes, one vector register); or a single one, for eigenvectors.
-pub trait Point: Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + AddAssign {
-    /// The neutral element of the sum.
-    const ZERO: Self;
-    /// A weight as the kernel multiplies by it.
-    type Weight: Weight;
-
-    /// The point, or number, times a weight.
-    fn times(self, w: Self::Weight) -> Self;
-}
-
-/// A weight in one of the two precisions, and where the weights of that precision are kept.
-pub trait Weight: Copy + Send + Sync {
-    /// Rounded to this precision.
-    fn of(w: f64) -> Self;
-    /// The weights by valence.
-    fn rings(stencil: &Stencil) -> &Rings<Self>;
-    /// The turns of the corners of faces.
-    fn turns(polygons: &Polygons) -> &[[Self; 2]];
-}
-
-impl Weight for f64 {
-    #[inline(always)]
-    fn of(w: f64) -> f64 {
-        w
-    }
-    #[inline(always)]
-    fn rings(stencil: &Stencil) -> &Rings<f64> {
-        &stencil.double
-    }
-    #[inline(always)]
-    fn turns(polygons: &Polygons) -> &[[f64; 2]] {
-        polygons.double()
-    }
-}
-
-/// Single precision, the weight in every lane, so that a loop need not spread it.
-impl Weight for Vec3A {
-    #[inline(always)]
-    fn of(w: f64) -> Vec3A {
-        Vec3A::splat(w as f32)
-    }
-    #[inline(always)]
-    fn rings(stencil: &Stencil) -> &Rings<Vec3A> {
-        &stencil.single
-    }
-    #[inline(always)]
-    fn turns(polygons: &Polygons) -> &[[Vec3A; 2]] {
-        polygons.single()
-    }
-}
-
-impl Point for DVec3 {
-    const ZERO: Self = DVec3::ZERO;
-    type Weight = f64;
-
-    #[inline(always)]
-    fn times(self, w: f64) -> Self {
-        w * self
-    }
-}
-
-impl Point for f64 {
-    const ZERO: Self = 0.0;
-    type Weight = f64;
-
-    #[inline(always)]
-    fn times(self, w: f64) -> Self {
-        w * self
-    }
-}
-
-impl Point for Vec3A {
-    const ZERO: Self = Vec3A::ZERO;
-    type Weight = Vec3A;
-
-    #[inline(always)]
-    fn times(self, w: Vec3A) -> Self {
-        w * self
-    }
-}
-
-/// The weights of a row around a vertex of valence n whose faces are all of one kind, times h(n).
-#[derive(Clone, Copy, Debug)]
-pub struct Ring<W> {
-    /// At the vertex itself.
-    own: W,
-    /// At each edge neighbour.
-    edge: W,
-    /// At the opposite corner of each quad; at what the faces add to the row of M, where these are summed.
-    across: W,
-}
-
-/// [`Ring`]s by valence, for the three [`Kind`]s of rows.
-#[derive(Clone, Debug, Default)]
-pub struct Rings<W> {
-    pub(super) quads: Vec<Ring<W>>,
-    pub(super) edges: Vec<Ring<W>>,
-    pub(super) polygons: Vec<Ring<W>>,
-}
-
-impl<W> Ring<W> {
-    pub(super) fn new(own: W, edge: W, across: W) -> Self {
-        Ring { own, edge, across }
-    }
-}
-
-impl<W: Copy> Ring<W> {
-    #[inline(always)]
-    pub(super) fn value<P: Point<Weight = W>>(&self, own: P, edge: P, across: P) -> P {
-        own.times(self.own) + edge.times(self.edge) + across.times(self.across)
-    }
-
-    #[inline(always)]
-    pub(super) fn value_alone<P: Point<Weight = W>>(&self, own: P, across: P) -> P {
-        own.times(self.own) + across.times(self.across)
-    }
-
-    #[inline(always)]
-    pub(super) fn value_of_edges<P: Point<Weight = W>>(&self, own: P, edge: P) -> P {
-        own.times(self.own) + edge.times(self.edge)
-    }
-}
-
-impl Rings<f64> {
-    pub(super) fn single(&self) -> Rings<Vec3A> {
-        let single = |rings: &[Ring<f64>]| {
-            rings
-                .iter()
-                .map(|r| {
-                    Ring::new(
-                        <Vec3A as Weight>::of(r.own),
-                        <Vec3A as Weight>::of(r.edge),
-                        <Vec3A as Weight>::of(r.across),
-                    )
-                })
-                .collect()
-        };
-        Rings { quads: single(&self.quads), edges: single(&self.edges), polygons: single(&self.polygons) }
-    }
-}
-
-/// What a row is made of; its weights follow from the valence n.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Kind {
-    /// Quads only: n edge neighbours, then n opposite corners.
-    Quads,
-    /// Triangles only, or a scheme that knows edges only: n edge neighbours.
-    Edges,
-    /// Anything else: n edge neighbours, if edges have a weight, and the sums over n faces.
-    Polygons,
-}
+use super::neighbours::{Code, Codes, RowNeighbours, Window, Windows};
+use super::weights::{Point, RowKind, RowWeights, Weight, WeightsByValence};
 
 /// The rows of A.
 #[derive(Clone, Debug)]
 pub struct Stencil {
     pub(super) codes: Codes,
     /// By row; equal within a run of the codes, as is the valence.
-    pub(super) kinds: Vec<Kind>,
-    pub(super) double: Rings<f64>,
-    pub(super) single: Rings<Vec3A>,
+    pub(super) kinds: Vec<RowKind>,
+    pub(super) double: WeightsByValence<f64>,
+    pub(super) single: WeightsByValence<Vec3A>,
     pub(super) polygons: Polygons,
 }
 
 /// The first rows of the runs of rows of equal kind and valence.
-pub(super) fn runs(kinds: &[Kind], valences: &[u32]) -> Vec<u32> {
+pub(super) fn runs(kinds: &[RowKind], valences: &[u32]) -> Vec<u32> {
     let key = |i: usize| (kinds[i], valences[i]);
     (0..kinds.len()).filter(|&i| i == 0 || key(i) != key(i - 1)).map(|i| i as u32).collect()
 }
 
 impl Stencil {
     /// The weights of row `i`.
-    fn ring(&self, i: usize) -> &Ring<f64> {
+    fn ring(&self, i: usize) -> &RowWeights<f64> {
         let n = self.valence(i);
         match self.kinds[i] {
-            Kind::Quads => &self.double.quads[n],
-            Kind::Edges => &self.double.edges[n],
-            Kind::Polygons => &self.double.polygons[n],
+            RowKind::Quads => &self.double.quads[n],
+            RowKind::Edges => &self.double.edges[n],
+            RowKind::Polygons => &self.double.polygons[n],
         }
     }
 
@@ -197,9 +43,9 @@ impl Stencil {
         let offsets = self.codes.offsets();
         let length = (offsets[i + 1] - offsets[i]) as usize;
         match self.kinds[i] {
-            Kind::Quads => length / 2,
-            Kind::Edges => length,
-            Kind::Polygons => self.polygons.valence(i),
+            RowKind::Quads => length / 2,
+            RowKind::Edges => length,
+            RowKind::Polygons => self.polygons.valence(i),
         }
     }
 
@@ -207,7 +53,7 @@ impl Stencil {
     pub(super) fn diagonal(&self, i: usize) -> f64 {
         let ring = self.ring(i);
         match self.kinds[i] {
-            Kind::Polygons => ring.own + ring.across * self.polygons.diagonal(i),
+            RowKind::Polygons => ring.own + ring.across * self.polygons.diagonal(i),
             _ => ring.own,
         }
     }
@@ -215,7 +61,7 @@ impl Stencil {
     /// The least and the greatest a_ii of some rows of one run.
     pub(super) fn extremes(&self, rows: Range<usize>) -> [f64; 2] {
         let rows = match self.kinds[rows.start] {
-            Kind::Polygons => rows,
+            RowKind::Polygons => rows,
             _ => rows.start..rows.start + 1,
         };
         rows.fold([f64::INFINITY, 0.0], |[least, greatest], i| {
@@ -250,8 +96,8 @@ impl Stencil {
         sums: (&[P], usize),
         mut out: &mut [P],
     ) {
-        use Kind::{Edges, Polygons, Quads};
-        let rings = P::Weight::rings(self);
+        use RowKind::{Edges, Polygons, Quads};
+        let rings = P::Weight::by_valence(&self.double, &self.single);
         for run in window.runs() {
             let Range { start: from, end: to } = run.rows();
             let out = out.split_off_mut(..to - from).expect("one place a row");
@@ -289,8 +135,8 @@ impl Stencil {
     pub(super) fn row<P: Point>(&self, i: usize, (points, start): (&[P], usize)) -> P {
         let faces = |i| self.polygons.row(i, (points, start));
         match self.codes.of_row(i) {
-            Row::Near(near) => self.coded_row(near, i, points, start, faces),
-            Row::Far(far) => self.coded_row(far, i, points, start, faces),
+            RowNeighbours::Near(near) => self.coded_row(near, i, points, start, faces),
+            RowNeighbours::Far(far) => self.coded_row(far, i, points, start, faces),
         }
     }
 
@@ -304,19 +150,19 @@ impl Stencil {
         start: usize,
         faces: impl Fn(usize) -> P,
     ) -> P {
-        let rings = P::Weight::rings(self);
+        let rings = P::Weight::by_valence(&self.double, &self.single);
         let row = i - start;
         match self.kinds[i] {
-            Kind::Quads => {
+            RowKind::Quads => {
                 let n = codes.len() / 2;
                 let (near, across) = codes.split_at(n);
                 rings.quads[n].value(window[row], sum(near, window, row, start), sum(across, window, row, start))
             }
-            Kind::Edges => {
+            RowKind::Edges => {
                 let edge = sum(codes, window, row, start);
                 rings.edges[codes.len()].value_of_edges(window[row], edge)
             }
-            Kind::Polygons => {
+            RowKind::Polygons => {
                 let ring = &rings.polygons[self.polygons.valence(i)];
                 if codes.is_empty() {
                     return ring.value_alone(window[row], faces(i));
@@ -329,22 +175,22 @@ impl Stencil {
     /// Calls `visit(j, part of a_ij)` for every neighbour.
     pub(super) fn entries(&self, i: usize, visit: impl FnMut(usize, f64)) {
         match self.codes.of_row(i) {
-            Row::Near(near) => self.coded_entries(near, i, visit),
-            Row::Far(far) => self.coded_entries(far, i, visit),
+            RowNeighbours::Near(near) => self.coded_entries(near, i, visit),
+            RowNeighbours::Far(far) => self.coded_entries(far, i, visit),
         }
     }
 
     fn coded_entries<C: Code>(&self, codes: &[C], i: usize, mut visit: impl FnMut(usize, f64)) {
         let ring = self.ring(i);
         let edges = match self.kinds[i] {
-            Kind::Quads => codes.len() / 2,
-            Kind::Edges | Kind::Polygons => codes.len(),
+            RowKind::Quads => codes.len() / 2,
+            RowKind::Edges | RowKind::Polygons => codes.len(),
         };
         for (k, c) in codes.iter().enumerate() {
             let a = if k < edges { ring.edge } else { ring.across };
             visit(c.place(i, 0), a);
         }
-        if self.kinds[i] == Kind::Polygons {
+        if self.kinds[i] == RowKind::Polygons {
             let part = |j, m| visit(j, ring.across * m);
             self.polygons.entries(i, part);
         }

@@ -1,5 +1,6 @@
-//! From a mesh to its limit system `A V = P`: the schemes as four small functions, one generic assembler into
-//! own compressed sparse rows, the same as a sequence of stages where there are boundaries and creases, proven bounds from valences and face sizes, Matrix Market files; systems of other origin.
+//! Assembly of the limit system `A V = P` of a mesh: the schemes as four small functions, one generic assembler into
+//! own compressed sparse rows, the same as a sequence of stages where there are boundaries and creases, proven bounds
+//! from valences and face sizes, Matrix Market files; systems of other origin.
 //! This room knows no solvers.
 
 pub mod bounds;
@@ -17,6 +18,7 @@ mod parts;
 pub mod stages;
 pub mod stars;
 pub mod system;
+pub mod weights;
 
 pub use csr::Csr;
 pub use operator::Operator;

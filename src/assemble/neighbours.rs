@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::kernel::{Kind, Point, Ring};
+use super::weights::{Point, RowKind, RowWeights};
 use crate::mesh::incidence::split_rows;
 use crate::pages::large;
 use crate::parallel;
@@ -130,11 +130,11 @@ impl Codes {
 
     /// The neighbours of row `i`.
     #[inline(always)]
-    pub(super) fn of_row(&self, i: usize) -> Row<'_> {
+    pub(super) fn of_row(&self, i: usize) -> RowNeighbours<'_> {
         let range = self.offsets[i] as usize..self.offsets[i + 1] as usize;
         match &self.neighbours {
-            Neighbours::Near(near) => Row::Near(&near[range]),
-            Neighbours::Far(far) => Row::Far(&far[range]),
+            Neighbours::Near(near) => RowNeighbours::Near(&near[range]),
+            Neighbours::Far(far) => RowNeighbours::Far(&far[range]),
         }
     }
 
@@ -197,7 +197,7 @@ fn encode<C: Code>(offsets: &[u32], fill: &(impl Fn(usize, &mut [u32]) + Sync)) 
 }
 
 /// The neighbours of one row.
-pub(super) enum Row<'a> {
+pub(super) enum RowNeighbours<'a> {
     Near(&'a [i16]),
     Far(&'a [u32]),
 }
@@ -279,23 +279,23 @@ impl<P: Point, C: Code> Run<'_, '_, P, C> {
         self.rows.clone()
     }
 
-    /// Rows of valence N: `out[k]` becomes the k-th row's (A x)_i. Under [`Kind::Polygons`] it holds before what the
+    /// Rows of valence N: `out[k]` becomes the k-th row's (A x)_i. Under [`RowKind::Polygons`] it holds before what the
     /// faces add, and rows may have no neighbour beside.
     ///
     /// # Panics
     /// If the rows have another number of neighbours than `kind` means.
     #[inline(always)]
-    pub(super) fn weigh<const N: usize>(&self, kind: Kind, ring: Ring<P::Weight>, out: &mut [P]) {
+    pub(super) fn weigh<const N: usize>(&self, kind: RowKind, ring: RowWeights<P::Weight>, out: &mut [P]) {
         let Window { all, codes, points, start, .. } = self.window;
         let first = self.rows.start - start;
         let own = &points[first..][..self.rows.len()];
-        if kind == Kind::Polygons && self.length == 0 {
+        if kind == RowKind::Polygons && self.length == 0 {
             for (out, &own) in out.iter_mut().zip(own) {
                 *out = ring.value_alone(own, *out);
             }
             return;
         }
-        let length = if kind == Kind::Quads { 2 * N } else { N };
+        let length = if kind == RowKind::Quads { 2 * N } else { N };
         assert_eq!(self.length, length, "neighbours of a row");
         let codes = &codes[all.offsets[self.rows.start] as usize..all.offsets[self.rows.end] as usize];
         // The rows move on at one pace; what they read for the first time is as far ahead as they reach.
@@ -308,13 +308,13 @@ impl<P: Point, C: Code> Run<'_, '_, P, C> {
             // run have the number of neighbours that is asserted above.
             let edge = unsafe { self.window.sum::<N>(first + k, near) };
             *out = match kind {
-                Kind::Quads => {
+                RowKind::Quads => {
                     // SAFETY: likewise.
                     let across = unsafe { self.window.sum::<N>(first + k, across) };
                     ring.value(own, edge, across)
                 }
-                Kind::Edges => ring.value_of_edges(own, edge),
-                Kind::Polygons => ring.value(own, edge, *out),
+                RowKind::Edges => ring.value_of_edges(own, edge),
+                RowKind::Polygons => ring.value(own, edge, *out),
             };
         }
     }
@@ -344,8 +344,8 @@ mod tests {
             assert_eq!(matches!(codes.neighbours(), Neighbours::Near(_)), near);
             for i in [0, 1, n as usize - 1] {
                 let places: Vec<usize> = match codes.of_row(i) {
-                    Row::Near(row) => row.iter().map(|c| c.place(i, 0)).collect(),
-                    Row::Far(row) => row.iter().map(|c| c.place(i, 0)).collect(),
+                    RowNeighbours::Near(row) => row.iter().map(|c| c.place(i, 0)).collect(),
+                    RowNeighbours::Far(row) => row.iter().map(|c| c.place(i, 0)).collect(),
                 };
                 let n = n as usize;
                 assert_eq!(places, [(i + 1) % n, (i + n - 1) % n]);
@@ -399,7 +399,9 @@ mod tests {
     fn rows_of_another_length_are_refused() {
         let (codes, points) = (cycle(), [0.0f64; 10]);
         if let Windows::Near(window) = codes.window(0..10, &points, 0) {
-            window.runs().for_each(|run| run.weigh::<1>(Kind::Edges, Ring::new(0.0, 1.0, 0.0), &mut [0.0; 10]));
+            window
+                .runs()
+                .for_each(|run| run.weigh::<1>(RowKind::Edges, RowWeights::new(0.0, 1.0, 0.0), &mut [0.0; 10]));
         }
     }
 
@@ -409,7 +411,7 @@ mod tests {
         let points: Vec<f64> = (0..10).map(|i| f64::from(1 << i)).collect();
         let mut sums = [0.0; 10];
         if let Windows::Near(window) = codes.window(0..10, &points, 0) {
-            window.runs().for_each(|run| run.weigh::<2>(Kind::Edges, Ring::new(0.0, 1.0, 0.0), &mut sums));
+            window.runs().for_each(|run| run.weigh::<2>(RowKind::Edges, RowWeights::new(0.0, 1.0, 0.0), &mut sums));
         }
         for (i, &sum) in sums.iter().enumerate() {
             assert_eq!(sum, points[(i + 1) % 10] + points[(i + 9) % 10]);

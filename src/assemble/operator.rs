@@ -1,4 +1,4 @@
-//! The matrix-free twin of [`LimitSystem`](super::LimitSystem): A, M and D⁻¹A from connectivity alone.
+//! Matrix-free operator: A, M and D⁻¹A of a [`LimitSystem`](super::LimitSystem) from connectivity alone.
 
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -6,10 +6,11 @@ use std::sync::OnceLock;
 use glam::DVec3;
 
 use super::bounds::SpectralBounds;
-use super::build::Source;
-use super::kernel::{Point, Stencil, runs};
+use super::build::RowSource;
+use super::kernel::{Stencil, runs};
 use super::neighbours::Neighbours;
 use super::system::{check, require_one_block};
+use super::weights::Point;
 use crate::error::Result;
 use crate::mesh::order::Numbering;
 use crate::mesh::{Faces, Incidence, Surface, Topology};
@@ -94,7 +95,7 @@ impl Operator {
         rows: (Option<&Numbering>, Option<&[bool]>),
     ) -> Result<Self> {
         let closed = sides.1.is_none();
-        let source = Source::new(faces, sides, scheme, rows);
+        let source = RowSource::new(faces, sides, scheme, rows);
         let kinds = source.kinds();
         let greatest = source.valences.iter().copied().max().unwrap_or(0);
         let h: Vec<f64> = (0..=greatest).map(|n| scheme.h(n.max(1) as usize)).collect();

@@ -1,4 +1,4 @@
-//! Limit systems from given parts: somebody else's H and M.
+//! Limit systems from given factors H and M, of any origin.
 
 use super::bounds::SpectralBounds;
 use super::csr::Csr;

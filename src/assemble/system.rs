@@ -6,9 +6,9 @@ use glam::DVec3;
 
 use super::bounds::SpectralBounds;
 use super::csr::{Csr, Pattern};
-use super::gather::Rows;
+use super::gather::{FaceBlocks, Gather};
 use crate::error::{Error, Result};
-use crate::mesh::{Faces, Surface};
+use crate::mesh::Surface;
 use crate::parallel;
 use crate::schemes::{Masks, Scheme};
 
@@ -112,7 +112,7 @@ pub(super) fn rows_of(surface: &Surface, masks: &impl Masks, free: Option<&[bool
     let weights = |n: usize| if n == 0 { [1.0, 1.0] } else { [masks.h(n), masks.vertex_weight(n)] };
     let by_valence: Vec<[f64; 2]> = (0..=largest).map(weights).collect();
     let blocks = FaceBlocks::new(surface.faces(), masks);
-    let rows = Rows::new(surface, &blocks, &by_valence, &valence);
+    let rows = Gather::new(surface, &blocks, &by_valence, &valence);
     let arrays = rows.arrays()?;
     let h = parallel::collect(valence.len(), |v| by_valence[valence[v] as usize][0]);
     let pattern = Arc::new(Pattern::new(arrays.offsets, arrays.columns));
@@ -153,39 +153,4 @@ pub fn valences(surface: &Surface) -> Vec<u32> {
             surface.topology().edge_valence(surface.faces(), v) as u32
         }
     })
-}
-
-/// For every face size that occurs, what a face adds between a corner and the one k steps further: its
-/// circulant, and half of the edge weight at its sides (the other half comes from the face across). Adding
-/// the halves face by face, in ascending order of faces, makes M symmetric to the last bit.
-pub(super) struct FaceBlocks {
-    pub(super) by_size: Vec<Vec<f64>>,
-    pub(super) half_edge: f64,
-    /// Only the corner itself and its two neighbours matter.
-    pub(super) sides_only: bool,
-}
-
-impl FaceBlocks {
-    pub(super) fn new(faces: &Faces, masks: &impl Masks) -> Self {
-        let half_edge = 0.5 * masks.edge_weight();
-        let mut by_size: Vec<Vec<f64>> = Vec::new();
-        let mut add = |size: usize| {
-            if by_size.len() <= size {
-                by_size.resize(size + 1, Vec::new());
-            }
-            if by_size[size].is_empty() {
-                by_size[size] = (0..size)
-                    .map(|k| {
-                        let side = k == 1 || k + 1 == size;
-                        masks.face_weight(size, k) + if side { half_edge } else { 0.0 }
-                    })
-                    .collect();
-            }
-        };
-        match faces.uniform_size() {
-            Some(size) => add(size),
-            None => faces.iter().for_each(|face| add(face.len())),
-        }
-        FaceBlocks { by_size, half_edge, sides_only: masks.edges_only() }
-    }
 }

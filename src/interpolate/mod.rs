@@ -1,4 +1,4 @@
-//! The papers' whole methods: from given points, normals and handles to a surface.
+//! Interpolation methods of the papers: surfaces from given points, normals and shape handles.
 //!
 //! | file | method |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! The front door: from a surface and a scheme to the control mesh whose limit surface passes through its vertices.
+//! Interpolation by limit surfaces: the control mesh whose limit surface passes through the vertices of a given one.
 //!
 //! [`interpolate`] does it once, [`Interpolator`] again and again for points that move. Unless a method is asked for,
 //! both follow one chain, `auto`:
@@ -12,8 +12,8 @@
 //! 3. Where these make none either, and the points have no part that no control mesh reaches, LDLᵀ: a factorization tells
 //!    a nearly singular matrix from a singular one.
 //!
-//! *Order.* A large mesh whose vertices lie [scattered](crate::mesh::curve::is_scattered) in memory has been renumbered
-//! along a space-filling curve by [`Surface`]. From [`ORDERED`] vertices on, the rows of the operator are [breadth
+//! *Order.* A large mesh whose vertices lie [scattered](crate::mesh::space_filling::is_scattered) in memory has been
+//! renumbered along a space-filling curve by [`Surface`]. From [`ORDERED`] vertices on, the rows of the operator are [breadth
 //! first](in_fronts), which gives it the narrow band that groups of iterations need. Below, all arrays stay in cache in
 //! any order, and rows are [grouped by kind](in_kinds) only; so they are for mixed faces under Nasri and Zheng-Cai, where
 //! iterations are too few to pay for the search. Results come back in the order of the surface.

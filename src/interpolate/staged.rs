@@ -21,7 +21,7 @@ use crate::solvers::{Method, Solution, Step, Stop, run_from};
 /// use limitlab::solvers::{Method, Stop};
 ///
 /// let cube = Surface::new(builtin::builtin("cube")?)?;
-/// let top = [[4, 5], [5, 6], [6, 7], [7, 4]].map(|edge| (edge, 10.0));
+/// let top = [[4, 5], [5, 7], [7, 6], [6, 4]].map(|edge| (edge, 10.0));
 /// let creased = cube.tagged(&Tags { creases: top.to_vec(), ..Tags::default() })?;
 /// let stages = Stages::new(&creased, Scheme::CatmullClark, None)?;
 /// let stop = Stop { tolerance: 1e-12, max_iterations: 1000 };

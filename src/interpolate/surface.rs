@@ -1,4 +1,4 @@
-//! From a control mesh to the surface that is looked at: refinement by the scheme's own rules, given normals and
+//! Evaluation of the surface of a control mesh: refinement by the scheme's own rules, given normals and
 //! shape handles, limit points, surface normals.
 
 use glam::DVec3;
@@ -13,7 +13,7 @@ use crate::{Error, Result};
 
 /// What is wanted of the surface.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Request<'a> {
+pub struct SurfaceOptions<'a> {
     /// Refinements of the control mesh.
     pub levels: usize,
     /// Push the vertices of the last level to their limit points.
@@ -52,7 +52,7 @@ pub struct SurfaceMesh {
 ///
 /// # Panics
 /// If a list has not one entry a vertex.
-pub fn surface(control: Surface, scheme: Scheme, points: &[DVec3], request: &Request) -> Result<SurfaceMesh> {
+pub fn surface(control: Surface, scheme: Scheme, points: &[DVec3], request: &SurfaceOptions) -> Result<SurfaceMesh> {
     let given = &request.constraints;
     let wants_limits = request.limit || request.normals;
     let rule = scheme.first_rule();
@@ -123,7 +123,7 @@ fn refine(scheme: Refinement, control: Surface, levels: usize, topology: bool) -
     }
 }
 
-fn primal(control: Surface, scheme: Refinement, request: &Request) -> Result<SurfaceMesh> {
+fn primal(control: Surface, scheme: Refinement, request: &SurfaceOptions) -> Result<SurfaceMesh> {
     let given = &request.constraints;
     let wants_limits = request.limit || request.normals;
     if given.handles.is_some() {

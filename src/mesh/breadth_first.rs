@@ -1,8 +1,8 @@
-//! Orders for sweeps over many rows: breadth first, and rows of one kind together.
+//! Breadth-first vertex orders for sweeps over many rows, and orders that put rows of one kind together.
 
 use std::ops::Range;
 
-use super::order::Numbering;
+use super::numbering::Numbering;
 use super::{Faces, Incidence};
 use crate::parallel;
 

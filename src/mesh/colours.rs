@@ -1,7 +1,8 @@
-//! Vertices colour by colour, for sweeps that relax all of a colour at once.
+//! Multicolour numbering of the vertices, for sweeps that relax all of a colour at once.
 
 use super::breadth_first::breadth_first;
-use super::order::{Numbering, colouring};
+use super::numbering::Numbering;
+use super::order::colouring;
 use super::{Faces, Incidence};
 
 /// The colours of [`Order::Multicolour`](super::order::Order::Multicolour), one after the other, each [breadth

@@ -1,4 +1,4 @@
-//! The kinds of defects of a mesh, their places, and how both are said.
+//! Kinds of mesh defects, their places, and the words for both.
 
 use std::fmt;
 
@@ -149,4 +149,9 @@ impl fmt::Display for Defect {
         }
         f.write_str(&parts.join(", "))
     }
+}
+
+/// `1 face`, `2 faces`.
+pub(super) fn counted(count: usize, one: &str) -> String {
+    format!("{count} {one}{}", if count == 1 { "" } else { "s" })
 }

@@ -1,4 +1,4 @@
-//! Oddities of position: vertices on the same point, faces on the same points, faces without area.
+//! Degenerate positions: vertices on the same point, faces on the same points, faces without area.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -6,8 +6,8 @@ use glam::DVec3;
 use rayon::slice::ParallelSliceMut;
 
 use super::Faces;
+use super::defect::counted;
 use super::frame::magnitude;
-use super::validate::counted;
 use crate::pages::large;
 use crate::parallel;
 use crate::prefetch::prefetch;

@@ -9,8 +9,8 @@
 use glam::DVec3;
 use rayon::slice::ParallelSliceMut;
 
+use super::boundary::Boundary;
 use super::incidence::next_in;
-use super::validate::Boundary;
 use super::{Faces, Incidence, Surface, Topology};
 use crate::error::{Error, Result, short};
 use crate::parallel;

@@ -3,11 +3,12 @@
 use std::ops::Range;
 
 use super::Faces;
-use super::topology::NONE;
 use crate::pages::large;
 use crate::parallel;
 use crate::prefetch::prefetch;
 
+/// Marks an absent index in the arrays of this room.
+pub const NONE: u32 = u32::MAX;
 /// Vertices of one task.
 const CHUNK: usize = 4096;
 /// Up to this many faces at a vertex, its sides are compared each with each; beyond, sorted.

@@ -1,10 +1,10 @@
 //! Polygon meshes: positions and faces, topology, validation, files, built-in meshes, vertex orders.
 //! This room knows no matrices.
 
+mod boundary;
 pub mod breadth_first;
 pub mod builtin;
 pub mod colours;
-pub mod curve;
 mod cuthill_mckee;
 mod defect;
 mod degenerate;
@@ -16,11 +16,14 @@ pub mod incidence;
 pub mod io;
 pub(crate) mod magic;
 pub mod noise;
+mod numbering;
 pub mod obj;
 mod obj_normals;
 pub mod off;
 pub mod order;
 pub mod ply;
+pub mod random;
+pub mod space_filling;
 pub mod surface;
 pub mod topology;
 pub mod validate;

@@ -4,11 +4,13 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
-use super::curve::{along_curve, is_scattered};
-use super::features::{Features, Tags};
-use super::order::Numbering;
-use super::validate::{Boundary, Validation, remarks, validate};
-use super::{Faces, Incidence, Mesh, Topology};
+use super::boundary::Boundary;
+use super::defect::counted;
+use super::features::{Features, Rule, Tags};
+use super::numbering::Numbering;
+use super::space_filling::{along_curve, is_scattered};
+use super::validate::{Validation, boundary_remark, validate};
+use super::{Faces, Incidence, Mesh, Topology, degenerate};
 use crate::{Error, Result, parallel};
 
 /// From this many vertices on, a scattered mesh is renumbered. Tuned.
@@ -136,7 +138,7 @@ impl Surface {
     /// use limitlab::mesh::features::{Rule, Tags};
     /// use limitlab::mesh::{Surface, builtin};
     /// let cube = Surface::new(builtin::builtin("cube")?)?;
-    /// let top = [[4, 5], [5, 6], [6, 7], [7, 4]];
+    /// let top = [[4, 5], [5, 7], [7, 6], [6, 4]];
     /// let tags = Tags { creases: top.map(|edge| (edge, 10.0)).to_vec(), ..Tags::default() };
     /// let creased = cube.tagged(&tags)?;
     /// let features = creased.features().unwrap();
@@ -281,7 +283,34 @@ impl Surface {
 
     /// Oddities that no method minds, as in [`Validation::remarks`]: duplicate positions, faces without area, a boundary.
     pub fn remarks(&self) -> Vec<String> {
-        remarks(self)
+        let mut remarks = Vec::new();
+        if !self.is_closed() {
+            let (edges, loops) = (self.boundary_edges(), self.boundary_loops());
+            remarks.push(boundary_remark(edges, Some(loops), self.boundary()));
+        }
+        if let Some(features) = self.features() {
+            let creased = features.creased_edges();
+            let parts = [
+                (creased, "creased edge"),
+                (features.count(Rule::Corner), "corner"),
+                (features.count(Rule::Dart), "dart"),
+                (features.semi_sharp_edges().len(), "semi-sharp edge"),
+            ];
+            let parts: Vec<String> =
+                parts.iter().filter(|p| p.0 > 0).map(|&(count, one)| counted(count, one)).collect();
+            if !parts.is_empty() {
+                remarks.push(parts.join(", "));
+            }
+        }
+        if let Some(renumbered) = self.renumbered() {
+            // Looking for what is not there is many times faster so. What is there needs the file's own numbers.
+            let positions = renumbered.numbering.there(self.positions());
+            if degenerate::remarks(&positions, &renumbered.faces).is_empty() {
+                return remarks;
+            }
+        }
+        remarks.extend(degenerate::remarks(self.positions(), self.faces()));
+        remarks
     }
 
     pub(crate) fn renumbered(&self) -> Option<&Renumbered> {
@@ -376,8 +405,9 @@ fn are_distinct(face: &[u32]) -> bool {
 mod tests {
     use super::*;
     use crate::mesh::builtin;
-    use crate::mesh::generate::{permute_vertices, random_polygons};
+    use crate::mesh::generate::permute_vertices;
     use crate::mesh::order::Order;
+    use crate::mesh::random::random_polygons;
 
     /// The short way to the verdict, and the report.
     fn agree(mesh: &Mesh) -> bool {

@@ -8,12 +8,11 @@ use rayon::slice::ParallelSliceMut;
 
 use super::Faces;
 use super::edge_numbers::EdgeNumbers;
+pub use super::incidence::NONE;
 use super::incidence::{FEW, Incidence};
 use crate::pages::large;
 use crate::parallel;
 
-/// Marks an absent index in the arrays of this room.
-pub const NONE: u32 = u32::MAX;
 /// Vertices of one task.
 const CHUNK: usize = 4096;
 

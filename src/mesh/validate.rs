@@ -1,76 +1,19 @@
 //! Mesh validation: all defects at once, each with its place, and remarks on what is merely odd.
 
 use std::collections::BTreeMap;
-use std::fmt;
-use std::str::FromStr;
 
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
+pub use super::boundary::Boundary;
+use super::defect::counted;
 pub use super::defect::{Defect, DefectKind};
-use super::features::Rule;
 use super::incidence::{Incidence, next_in, prev_in};
 use super::topology::{NONE, Topology, join};
-use super::{Faces, Mesh, Surface, degenerate};
-use crate::error::one_of;
+use super::{Faces, Mesh, degenerate};
 use crate::parallel;
-use crate::{Error, Result};
 
 /// Vertices or corners of one task.
 const CHUNK: usize = 4096;
-
-/// What to make of boundary edges.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Boundary {
-    /// An open mesh is invalid.
-    #[default]
-    Refuse,
-    /// Boundary edges are sharp, and so are boundary vertices with one face: OpenSubdiv's and USD's edge-and-corner.
-    EdgeAndCorner,
-    /// Boundary edges are sharp, and boundary vertices with one face lie on the curve: edge-only.
-    EdgeOnly,
-    /// Boundary vertices get the masks of interior ones with as many edges, as in the paper that has the Boy
-    /// model. Only schemes whose masks need edges alone (Loop, √3) can do this.
-    AsInterior,
-}
-
-impl Boundary {
-    const ALL: [Boundary; 4] = [Boundary::EdgeAndCorner, Boundary::EdgeOnly, Boundary::AsInterior, Boundary::Refuse];
-
-    /// As `parse` reads it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Boundary::EdgeAndCorner => "edge-and-corner",
-            Boundary::EdgeOnly => "edge-only",
-            Boundary::AsInterior => "as-interior",
-            Boundary::Refuse => "refuse",
-        }
-    }
-
-    /// The least valence that a vertex may have on an open mesh.
-    fn least_valence(self) -> usize {
-        match self {
-            Boundary::EdgeAndCorner | Boundary::EdgeOnly => 2,
-            Boundary::AsInterior | Boundary::Refuse => 3,
-        }
-    }
-}
-
-impl FromStr for Boundary {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        Boundary::ALL.into_iter().find(|boundary| boundary.name() == text).ok_or_else(|| {
-            let names = Boundary::ALL.map(Boundary::name);
-            Error::Unknown(format!("unknown treatment of the boundary `{text}`: use {}", one_of(&names)))
-        })
-    }
-}
-
-impl fmt::Display for Boundary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
 
 /// The size and shape of a mesh whose indices are good.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -214,11 +157,6 @@ impl Validation {
             DefectKind::BoundaryEdge => "close the holes or stitch the faces".into(),
         }
     }
-}
-
-/// `1 face`, `2 faces`.
-pub(super) fn counted(count: usize, one: &str) -> String {
-    format!("{count} {one}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Looks for every defect of `mesh`. `lines` are the 1-based lines of the vertices and of the faces in the file.
@@ -381,7 +319,7 @@ fn examine_topology(mesh: &Mesh, boundary: Boundary, report: &mut Validation) {
 }
 
 /// What to know of a boundary that is allowed.
-fn boundary_remark(edges: usize, loops: Option<usize>, boundary: Boundary) -> String {
+pub(super) fn boundary_remark(edges: usize, loops: Option<usize>, boundary: Boundary) -> String {
     let edges = counted(edges, "boundary edge");
     let loops = loops.map_or_else(String::new, |l| format!(" in {}", counted(l, "loop")));
     let treatment = match boundary {
@@ -391,73 +329,6 @@ fn boundary_remark(edges: usize, loops: Option<usize>, boundary: Boundary) -> St
         Boundary::Refuse => "they are not allowed",
     };
     format!("{edges}{loops}: {treatment}")
-}
-
-/// The remarks of [`validate`] on a mesh that has no defects.
-pub(super) fn remarks(surface: &Surface) -> Vec<String> {
-    let mut remarks = Vec::new();
-    if !surface.is_closed() {
-        let (edges, loops) = (surface.boundary_edges(), surface.boundary_loops());
-        remarks.push(boundary_remark(edges, Some(loops), surface.boundary()));
-    }
-    if let Some(features) = surface.features() {
-        let creased = features.creased_edges();
-        let parts = [
-            (creased, "creased edge"),
-            (features.count(Rule::Corner), "corner"),
-            (features.count(Rule::Dart), "dart"),
-            (features.semi_sharp_edges().len(), "semi-sharp edge"),
-        ];
-        let parts: Vec<String> = parts.iter().filter(|p| p.0 > 0).map(|&(count, one)| counted(count, one)).collect();
-        if !parts.is_empty() {
-            remarks.push(parts.join(", "));
-        }
-    }
-    if let Some(renumbered) = surface.renumbered() {
-        // Looking for what is not there is many times faster so. What is there needs the file's own numbers.
-        let positions = renumbered.numbering.there(surface.positions());
-        if degenerate::remarks(&positions, &renumbered.faces).is_empty() {
-            return remarks;
-        }
-    }
-    remarks.extend(degenerate::remarks(surface.positions(), surface.faces()));
-    remarks
-}
-
-/// How many boundary edges lie on another one, end on end by the last bit, and the first of them by its ends: seams, where
-/// an exporter has split vertices. O(b log b) for b boundary edges.
-///
-/// ```
-/// use limitlab::mesh::{Faces, Mesh, Surface, validate::{Boundary, seams}};
-/// use glam::DVec3;
-/// // Two triangles side by side, with vertices of their own.
-/// let points = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X, DVec3::ONE, DVec3::Y];
-/// let mesh = Mesh::new(points, Faces::from_lists([[0, 1, 2], [3, 4, 5]]));
-/// let surface = Surface::examined(mesh, None, Boundary::EdgeAndCorner).unwrap();
-/// assert_eq!(seams(&surface), Some((2, [1, 2])));
-/// ```
-pub fn seams(surface: &Surface) -> Option<(usize, [u32; 2])> {
-    if surface.is_closed() {
-        return None;
-    }
-    let (incidence, faces, points) = (surface.incidence(), surface.faces(), surface.positions());
-    // Zeros of either sign are one.
-    let key = |v: u32| points[v as usize].to_array().map(|x| (x + 0.0).to_bits());
-    let side = |&c: &u32| {
-        let ends = [c, incidence.next(faces, c)].map(|c| faces.corners()[c as usize]);
-        let [a, b] = ends.map(key);
-        (a.min(b), a.max(b), c, ends)
-    };
-    let mut sides: Vec<_> = surface.boundary_half_edges().iter().map(side).collect();
-    sides.sort_unstable();
-    let groups = sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)).filter(|group| group.len() > 1);
-    let (mut count, mut first) = (0, None);
-    for group in groups {
-        count += group.len();
-        let here = (group[0].2, group[0].3);
-        first = first.map_or(Some(here), |first: (u32, [u32; 2])| Some(first.min(here)));
-    }
-    first.map(|(_, ends)| (count, ends))
 }
 
 /// Umbrellas and valences of all vertices, in parallel. Returns the least and the greatest valence.

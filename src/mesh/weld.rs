@@ -1,8 +1,8 @@
-//! Welding: vertices at the same position become one, as seams ask for that an exporter has left.
+//! Welding of vertices at the same position, and the seams that ask for it.
 
 use rayon::slice::ParallelSliceMut;
 
-use super::{Faces, Mesh};
+use super::{Faces, Mesh, Surface};
 
 /// A mesh without vertices at the same position, and where those of the original went.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,4 +49,40 @@ pub fn weld(mesh: &Mesh) -> Welded {
     let mut faces: Faces = mesh.faces.clone();
     faces.corners_mut().iter_mut().for_each(|v| *v = place[*v as usize]);
     Welded { mesh: Mesh::new(positions, faces), place }
+}
+
+/// How many boundary edges lie on another one, end on end by the last bit, and the first of them by its ends: seams, where
+/// an exporter has split vertices. O(b log b) for b boundary edges.
+///
+/// ```
+/// use limitlab::mesh::{Faces, Mesh, Surface, validate::Boundary, weld::seams};
+/// use glam::DVec3;
+/// // Two triangles side by side, with vertices of their own.
+/// let points = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X, DVec3::ONE, DVec3::Y];
+/// let mesh = Mesh::new(points, Faces::from_lists([[0, 1, 2], [3, 4, 5]]));
+/// let surface = Surface::examined(mesh, None, Boundary::EdgeAndCorner).unwrap();
+/// assert_eq!(seams(&surface), Some((2, [1, 2])));
+/// ```
+pub fn seams(surface: &Surface) -> Option<(usize, [u32; 2])> {
+    if surface.is_closed() {
+        return None;
+    }
+    let (incidence, faces, points) = (surface.incidence(), surface.faces(), surface.positions());
+    // Zeros of either sign are one.
+    let key = |v: u32| points[v as usize].to_array().map(|x| (x + 0.0).to_bits());
+    let side = |&c: &u32| {
+        let ends = [c, incidence.next(faces, c)].map(|c| faces.corners()[c as usize]);
+        let [a, b] = ends.map(key);
+        (a.min(b), a.max(b), c, ends)
+    };
+    let mut sides: Vec<_> = surface.boundary_half_edges().iter().map(side).collect();
+    sides.sort_unstable();
+    let groups = sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)).filter(|group| group.len() > 1);
+    let (mut count, mut first) = (0, None);
+    for group in groups {
+        count += group.len();
+        let here = (group[0].2, group[0].3);
+        first = first.map_or(Some(here), |first: (u32, [u32; 2])| Some(first.min(here)));
+    }
+    first.map(|(_, ends)| (count, ends))
 }

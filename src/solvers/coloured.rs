@@ -1,4 +1,4 @@
-//! Sweeps of Gauss-Seidel and SOR colour by colour, all rows of a colour at once.
+//! Multicolour sweeps of Gauss-Seidel and SOR: all rows of a colour at once.
 //!
 //! Where consecutive rows do not couple, a sweep in place may relax them in any order, or together, and gives the same
 //! numbers: none of them reads what another writes. Rows [colour by colour](crate::mesh::colours::in_colours) make such

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::coloured::Coloured;
 use super::iteration::{Errors, Failure, Iterate, Outcome, PATIENCE, PROGRESS, Report, Stop, WarmStart};
-use super::system::{Rows, System};
+use super::system::{Rows, System, sweep};
 use super::wavefront::Wavefront;
 use crate::assemble::Operator;
 
@@ -56,15 +56,6 @@ impl<S: System> Iterate for Sor<'_, S> {
 impl<S: System> WarmStart for Sor<'_, S> {
     fn start_at(&mut self, at: &[DVec3]) {
         self.current.copy_from_slice(at);
-    }
-}
-
-/// One in-place sweep over the vertices in the order given.
-pub fn sweep<S: System>(system: &S, points: &[DVec3], omega: f64, order: impl Iterator<Item = usize>, x: &mut [DVec3]) {
-    let diagonal = system.diagonal();
-    for i in order {
-        let e = points[i] - system.row(i, x);
-        x[i] += (omega / diagonal[i]) * e;
     }
 }
 

@@ -1,4 +1,4 @@
-//! The loop that all methods share: error, stopping rules, update, history.
+//! Iteration loop of all methods: error, stopping rules, update, history.
 
 use std::fmt;
 use std::ops::ControlFlow;

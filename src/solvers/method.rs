@@ -10,7 +10,7 @@ use glam::DVec3;
 use super::anderson::{Anderson, WINDOW};
 use super::chebyshev::Chebyshev;
 use super::conjugate_gradient::{ConjugateGradient, Preconditioner};
-use super::direct::{Cholesky, Direct, Factorization, Kind, SecondOpinion, SparseLu};
+use super::direct::{Cholesky, CholeskyForm, Direct, Factorization, SecondOpinion, SparseLu};
 use super::gauss_seidel::Sor;
 use super::heavy_ball::HeavyBall;
 use super::incomplete_cholesky::IncompleteCholesky;
@@ -414,8 +414,8 @@ fn prepare<'a, S: System>(system: &'a S, points: &'a [DVec3], method: Method<'a>
     };
     let iterate: Box<dyn WarmStart + 'a> = match method {
         Method::Lu => return direct(system, points, SparseLu::new(stored()?)?),
-        Method::Cholesky => return direct(system, points, Cholesky::new(&stored()?.m, Kind::Llt)?),
-        Method::Ldlt => return direct(system, points, Cholesky::new(&stored()?.m, Kind::Ldlt)?),
+        Method::Cholesky => return direct(system, points, Cholesky::new(&stored()?.m, CholeskyForm::Llt)?),
+        Method::Ldlt => return direct(system, points, Cholesky::new(&stored()?.m, CholeskyForm::Ldlt)?),
         Method::SecondCholesky => return direct(system, points, SecondOpinion::new(&stored()?.m)?),
         Method::Jacobi { omega } => Box::new(Jacobi::new(system, points, jacobi_omega(omega))),
         Method::Thall => Box::new(Jacobi::new(system, points, THALL_OMEGA)),

@@ -5,9 +5,8 @@
 
 use glam::DVec3;
 
-use super::gauss_seidel::sweep;
 use super::iteration::{Errors, Failure, Iterate, WarmStart};
-use super::system::{Rows, System};
+use super::system::{Rows, System, sweep};
 
 /// Symmetric SOR at work.
 pub struct Ssor<'a, S> {

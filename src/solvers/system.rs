@@ -1,4 +1,5 @@
-//! What a method may ask of a system, and the parallel loop over rows that every fused update uses.
+//! Interface between methods and linear systems, the parallel loop over rows that every fused update uses, and the
+//! sweep in place.
 
 use std::ops::Range;
 
@@ -6,7 +7,7 @@ use glam::DVec3;
 
 use super::iteration::Errors;
 use crate::assemble::bounds::SpectralBounds;
-use crate::assemble::kernel::Point;
+use crate::assemble::weights::Point;
 use crate::assemble::{LimitSystem, Operator};
 use crate::parallel;
 
@@ -166,6 +167,15 @@ pub struct Totals {
     pub errors: Errors,
     /// The sum of the terms given to [`Tally::dot`].
     pub dot: f64,
+}
+
+/// One in-place sweep over the vertices in the order given.
+pub fn sweep<S: System>(system: &S, points: &[DVec3], omega: f64, order: impl Iterator<Item = usize>, x: &mut [DVec3]) {
+    let diagonal = system.diagonal();
+    for i in order {
+        let e = points[i] - system.row(i, x);
+        x[i] += (omega / diagonal[i]) * e;
+    }
 }
 
 /// Passes over all rows, in parallel, with sums that are the same for any number of threads: each chunk of 4096

@@ -1,4 +1,4 @@
-//! Several Chebyshev iterations, or sweeps of Gauss-Seidel, in one pass over memory.
+//! Wavefront (temporal) blocking: several Chebyshev iterations, or sweeps of Gauss-Seidel, in one pass over memory.
 //!
 //! Iterate k + 1 of a row needs iterate k of its neighbours only. Where the vertex order keeps neighbours within a
 //! narrow band, the vertices are cut into bands as long as a row reaches: band j of iterate k + 1 can be made as
@@ -16,11 +16,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::chebyshev::Recurrence;
-use super::gauss_seidel::sweep;
 use super::system::STRIP;
+use super::system::sweep;
 use crate::assemble::Operator;
 use crate::assemble::face_sums::BLOCK;
-use crate::assemble::kernel::{Point, Weight};
+use crate::assemble::weights::{Point, Weight};
 use crate::pages::filled;
 use crate::parallel;
 use crate::prefetch::{POINTS_AHEAD, prefetch};

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 use limitlab::assemble::LimitSystem;
-use limitlab::mesh::generate::{random_polygons, random_triangulation};
+use limitlab::mesh::random::{random_polygons, random_triangulation};
 use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::doo_sabin::{self, Rule};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark, loop_scheme, mid_edge, sqrt3};

@@ -3,8 +3,9 @@
 
 use glam::DVec3;
 use limitlab::assemble::{Csr, LimitSystem};
-use limitlab::mesh::generate::{permute_vertices, random_polygons, random_triangulation};
+use limitlab::mesh::generate::permute_vertices;
 use limitlab::mesh::order::Order;
+use limitlab::mesh::random::{random_polygons, random_triangulation};
 use limitlab::mesh::{Mesh, builtin};
 use limitlab::schemes::Scheme;
 use nalgebra_sparse::CsrMatrix;

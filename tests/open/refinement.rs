@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 use limitlab::Error;
-use limitlab::interpolate::surface::{Request, surface};
+use limitlab::interpolate::surface::{SurfaceOptions, surface};
 use limitlab::interpolate::{Options, interpolate, limit_points};
 use limitlab::mesh::features::{Rule, Tags};
 use limitlab::mesh::validate::Boundary;
@@ -309,7 +309,7 @@ fn the_surface_of_an_open_mesh_interpolates_it() {
             let Ok(found) = interpolate(&given, scheme, &Options::default()) else { continue };
             let control = given.with_positions(found.points);
             for levels in 0..3 {
-                let request = Request { levels, limit: true, normals: true, ..Request::default() };
+                let request = SurfaceOptions { levels, limit: true, normals: true, ..SurfaceOptions::default() };
                 let made = surface(control.clone(), scheme, given.positions(), &request).unwrap();
                 assert_eq!(made.surface.boundary_edges(), given.boundary_edges() << levels);
                 let size = control.diagonal();
@@ -319,7 +319,7 @@ fn the_surface_of_an_open_mesh_interpolates_it() {
                 held += 1;
             }
             // Without limit points nothing needs a topology, and yet the boundary is one.
-            let request = Request { levels: 1, ..Request::default() };
+            let request = SurfaceOptions { levels: 1, ..SurfaceOptions::default() };
             let made = surface(control.clone(), scheme, given.positions(), &request).unwrap();
             assert_eq!(made.surface.boundary_edges(), 2 * given.boundary_edges());
             assert_eq!(made.surface.features().is_some(), given.features().is_some());

@@ -42,7 +42,7 @@ fn local_masks_are_jacobi_with_one_half_iterate_by_iterate() {
     }
 }
 
-/// T2: v + δ has the given limit when the other vertices stay, beside faces of any size; with R held fixed it has
+/// v + δ has the given limit when the other vertices stay, beside faces of any size; with R held fixed it has
 /// not, except on quads.
 #[test]
 fn the_inverse_mask_gives_the_wanted_limit_of_one_vertex() {
@@ -143,7 +143,7 @@ fn leaning(surface: &Surface) -> Vec<Option<DVec3>> {
     (0..surface.len()).map(|v| (v % 3 != 2).then(|| 1.5 * outward[v] + lean(v))).collect()
 }
 
-/// T16: exactly the wanted normals, and all limit points where they were; spread over levels too.
+/// Exactly the wanted normals, and all limit points where they were; spread over levels too.
 #[test]
 fn turned_rings_have_the_given_normals_and_keep_the_limits() {
     for name in MESHES {
@@ -201,29 +201,6 @@ fn rings_turn_only_beyond_the_threshold_and_stop_at_the_tolerance() {
     assert!(tolerant.iter().all(|t| t.1 > 0.0));
 }
 
-/// T15, by looking: after two refinements no vertex is in the faces of two original vertices; after one some are.
-#[test]
-fn rings_are_disjoint_after_two_refinements_and_not_after_one() {
-    for name in MESHES {
-        let (surface, schemes) = primal(name);
-        for scheme in schemes {
-            for (levels, disjoint) in [(1, false), (2, true)] {
-                let fine = scheme.refine_n(&surface, levels).unwrap();
-                let mut owner = vec![None; fine.len()];
-                let mut shared = false;
-                for face in fine.faces.iter() {
-                    for &v in face.iter().filter(|&&v| (v as usize) < surface.len()) {
-                        for &w in face {
-                            shared |= owner[w as usize].replace(v).is_some_and(|u| u != v);
-                        }
-                    }
-                }
-                assert_eq!(shared, !disjoint, "{name} {scheme} {levels}");
-            }
-        }
-    }
-}
-
 #[test]
 fn normals_without_sense_are_errors_that_name_the_vertex() {
     let surface = Surface::new(builtin::icosahedron()).unwrap();
@@ -243,7 +220,7 @@ fn normals_without_sense_are_errors_that_name_the_vertex() {
     assert!(result.unwrap_err().to_string().contains("vertex 0: the surface has no normal"));
 }
 
-/// T17: values stay by the midpoint rule, creep by the scheme's own, and come back where they interpolate.
+/// Values stay by the midpoint rule, creep by the scheme's own, and come back where they interpolate.
 #[test]
 fn attributes_stay_creep_or_interpolate() {
     let surface = noisy_surface("irregular-poly:60");

@@ -96,7 +96,7 @@ fn leaning(surface: &Surface, interpolated: &[bool]) -> Vec<Option<DVec3>> {
     (0..surface.len()).map(|v| (interpolated[v] && v % 3 == 0).then(|| 2.0 * outward[v] + 0.4 * lean(v))).collect()
 }
 
-/// Z7, Z14, Z15, Z16, Z17: exact centroids, planes and normals after one sweep as after many, at every level, with
+/// Exact centroids, planes and normals after one sweep as after many, at every level, with
 /// handles, for a subset.
 #[test]
 fn centroids_planes_and_normals_are_exact_at_every_level() {
@@ -154,33 +154,6 @@ fn opposite_normals_are_the_same_and_handles_scale() {
     }
 }
 
-/// Eq. 9: among all moves that give a centroid and a plane, this is the one with the least squares. Held against
-/// the projection onto the constraints' null space: the move is orthogonal to every move that keeps them.
-#[test]
-fn the_correction_is_the_smallest() {
-    let surface = noisy_surface("irregular-poly:60");
-    let phase = PhaseOne { max_iterations: 1, eps: 0.0, ..PhaseOne::default() };
-    let result = interpolate(&surface, &Constraints::default(), &phase).unwrap();
-    let before = doo_sabin::refine_by(Rule::ZhengCai, &result.auxiliary.surface).unwrap();
-    let normals = doo_sabin::face_normals(result.first.surface.mesh());
-    for v in 0..surface.len() {
-        let f = result.first.first_vertex_face + v;
-        // Eq. 10, the paper's average normal, up to sign the normal of the planar face.
-        let face = before.faces.face(f);
-        let ring = || face.iter().map(|&c| before.positions[c as usize]);
-        let average: DVec3 = ring().zip(ring().cycle().skip(1)).map(|(a, b)| a.cross(b)).sum();
-        assert!(average.normalize().cross(normals[f]).length() < 1e-10);
-        let moves: Vec<DVec3> =
-            face.iter().map(|&c| result.first.surface.positions()[c as usize] - before.positions[c as usize]).collect();
-        let mean = moves.iter().sum::<DVec3>() / moves.len() as f64;
-        for m in moves {
-            // Free moves are within the plane and of sum 0: the correction's part there is constant.
-            let rest = m - mean;
-            assert!((rest - rest.dot(normals[f]) * normals[f]).length() < ROUNDING);
-        }
-    }
-}
-
 #[test]
 fn affine_maps_commute_with_phase_one() {
     let surface = noisy_surface("irregular-poly:60");
@@ -215,7 +188,7 @@ fn constraints_without_sense_are_errors_that_name_the_vertex() {
     assert!(text.contains("vertex 5: a shape handle is given where"), "{text}");
     let none = [false; 12];
     assert!(refused(&Constraints { interpolated: Some(&none), ..Constraints::default() }).contains("at least one"));
-    // Z24: a normal in the plane of the face. Before any sweep the face lies square to the axis, by symmetry.
+    // A normal in the plane of the face. Before any sweep the face lies square to the axis, by symmetry.
     let mut normals = vec![None; 12];
     normals[0] = Some(surface.positions()[0].any_orthogonal_vector());
     let edge_on = Constraints { normals: Some(&normals), ..Constraints::default() };

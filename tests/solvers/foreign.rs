@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use limitlab::Error;
 use limitlab::analysis::comparison::{Entry, compare, entries};
-use limitlab::analysis::own::{Named, Own};
+use limitlab::analysis::custom_methods::{Named, Own};
 use limitlab::analysis::spectrum::{Source, Spectrum, ends, spectrum};
 use limitlab::analysis::sweep::{rounding_floor, sweep};
 use limitlab::assemble::{Csr, LimitSystem};

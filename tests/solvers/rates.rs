@@ -1,8 +1,9 @@
 //! Closed-form rates on regular tori, and what the data see of them.
 
 use limitlab::analysis::rate::observed_rate;
-use limitlab::analysis::spectrum::{Operator, excited};
-use limitlab::analysis::sweep::{Row, Sweep, rounding_floor, sweep};
+use limitlab::analysis::spectrum::excited;
+use limitlab::analysis::sweep::{OmegaSweep, SweepRow, rounding_floor, sweep};
+use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::analysis::{Extremes, Spectrum};
 use limitlab::mesh::Mesh;
 use limitlab::schemes::Scheme;
@@ -64,7 +65,7 @@ fn undamped_jacobi_diverges_on_regular_quads_and_is_found_out_early() {
 
 const JACOBI: Method<'static> = Method::Jacobi { omega: None };
 
-fn torus_sweep(grid: &[f64]) -> Sweep {
+fn torus_sweep(grid: &[f64]) -> OmegaSweep {
     let mesh = noisy("torus:32x32");
     let system = system(&mesh, Scheme::CatmullClark);
     let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 20_000 };
@@ -109,7 +110,7 @@ fn the_noisy_torus_is_best_at_four_fifths_and_diverges_where_an_excited_mode_gro
 
 #[test]
 fn the_best_omega_has_the_fewest_iterations_then_the_smallest_error() {
-    let row = |method, omega, outcome, iterations, max| Row {
+    let row = |method, omega, outcome, iterations, max| SweepRow {
         method,
         omega,
         outcome,
@@ -129,7 +130,7 @@ fn the_best_omega_has_the_fewest_iterations_then_the_smallest_error() {
         row(pia, 1.3, Outcome::MaxIterations, 10, 1e-13),
         row(JACOBI, 0.8, converged, 5, 1e-13),
     ];
-    let sweep = Sweep { spectrum: Spectrum { a: all, jacobi: all }, thresholds: Vec::new(), rows };
+    let sweep = OmegaSweep { spectrum: Spectrum { a: all, jacobi: all }, thresholds: Vec::new(), rows };
     assert_eq!(sweep.best(pia).map(|r| r.omega), Some(1.1));
     assert_eq!(sweep.best(JACOBI).map(|r| r.omega), Some(0.8));
     assert_eq!(sweep.best(Method::Sor { omega: 1.1, order: None }), None);
@@ -146,7 +147,7 @@ fn a_mode_counts_as_excited_down_to_a_ten_thousand_millionth() {
             let sign = if (v / 10 + v % 10) % 2 == 0 { 1.0 } else { -1.0 };
             *p = *smooth + amplitude * sign * glam::DVec3::ONE;
         }
-        excited(&system, (&mesh.positions, &mesh.positions), Operator::A).unwrap().unwrap().min
+        excited(&system, (&mesh.positions, &mesh.positions), SymmetricForm::A).unwrap().unwrap().min
     };
     for amplitude in [1e-2, 1e-5, 1e-8] {
         let found = lowest(amplitude);

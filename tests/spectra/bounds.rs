@@ -3,12 +3,13 @@
 use super::{assemble, named, random_systems};
 use limitlab::analysis::a_priori::Promise;
 use limitlab::analysis::dirichlet_neumann::element_bound;
-use limitlab::analysis::eigen::End;
 use limitlab::analysis::interval::interval;
 use limitlab::analysis::singularity::Singularity;
-use limitlab::analysis::spectrum::{Operator, Source, ends, mesh_ends};
+use limitlab::analysis::spectrum::{Source, ends, mesh_ends};
+use limitlab::analysis::subspace_iteration::End;
+use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::analysis::{comparison, dense};
-use limitlab::assemble::Operator as MatrixFree;
+use limitlab::assemble::Operator;
 use limitlab::mesh::noise::add_noise;
 use limitlab::mesh::{Surface, builtin};
 use limitlab::schemes::Scheme;
@@ -27,10 +28,10 @@ fn a_regular_grid_attains_its_bounds_at_once() {
 
 /// The interval, the spectrum of A or D⁻¹A, and what valences prove of its lower end.
 fn intervals(surface: &Surface, scheme: Scheme) -> [(limitlab::analysis::interval::Interval, f64, f64, f64); 2] {
-    let operator = MatrixFree::new(surface, scheme).expect("an operator");
+    let operator = Operator::new(surface, scheme).expect("an operator");
     let exact = mesh_ends(surface, scheme).expect("values").spectrum();
     let b = operator.bounds();
-    [(Operator::A, exact.a, b.lambda_min), (Operator::Jacobi, exact.jacobi, b.jacobi_lambda_min)].map(
+    [(SymmetricForm::A, exact.a, b.lambda_min), (SymmetricForm::Jacobi, exact.jacobi, b.jacobi_lambda_min)].map(
         |(which, exact, bound)| {
             let found = interval(&operator, which).expect("finite numbers");
             (found, exact.min, exact.max, bound)
@@ -76,10 +77,10 @@ fn elements_prove_at_least_what_valences_do() {
         let b = system.bounds;
         let last = all.a.len() - 1;
         for (operator, end, valences, exact) in [
-            (Operator::A, End::Lowest, b.lambda_min, all.a[0]),
-            (Operator::A, End::Highest, b.lambda_max, all.a[last]),
-            (Operator::Jacobi, End::Lowest, b.jacobi_lambda_min, all.jacobi[0]),
-            (Operator::Jacobi, End::Highest, b.jacobi_lambda_max, all.jacobi[last]),
+            (SymmetricForm::A, End::Lowest, b.lambda_min, all.a[0]),
+            (SymmetricForm::A, End::Highest, b.lambda_max, all.a[last]),
+            (SymmetricForm::Jacobi, End::Lowest, b.jacobi_lambda_min, all.jacobi[0]),
+            (SymmetricForm::Jacobi, End::Highest, b.jacobi_lambda_max, all.jacobi[last]),
         ] {
             let bound = element_bound(&surface, scheme, operator, end).expect("closed");
             let outwards = match end {

@@ -1,10 +1,11 @@
 //! Counts by inertia and certified lower bounds.
 
 use super::{assemble, named, random_systems};
-use limitlab::analysis::certificate::{certify, eigenvalues_below};
 use limitlab::analysis::dense;
-use limitlab::analysis::eigen::End;
-use limitlab::analysis::spectrum::{Operator, ends};
+use limitlab::analysis::inertia::{certify, eigenvalues_below};
+use limitlab::analysis::spectrum::ends;
+use limitlab::analysis::subspace_iteration::End;
+use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::mesh::builtin;
 use limitlab::schemes::Scheme;
 
@@ -19,7 +20,7 @@ fn counts_by_inertia_are_those_of_dense_eigenvalues() {
                 continue;
             }
             let sigma = 0.5 * (before + all[k]);
-            match eigenvalues_below(&system, Operator::A, sigma) {
+            match eigenvalues_below(&system, SymmetricForm::A, sigma) {
                 Ok(found) => assert_eq!(found.below, k, "{name} {sigma}"),
                 Err(e) => assert!(e.to_string().contains("another shift"), "{name}: {e}"),
             }
@@ -32,7 +33,7 @@ fn certificates_lie_below_the_spectrum_and_close() {
     for name in ["quad-sphere:4", "prism:51", "irregular-quad:1000", "cube"] {
         let system = assemble(&named(name), Scheme::CatmullClark);
         let all = dense::full_eigenvalues(&system).expect("small");
-        for (operator, values) in [(Operator::A, &all.a), (Operator::Jacobi, &all.jacobi)] {
+        for (operator, values) in [(SymmetricForm::A, &all.a), (SymmetricForm::Jacobi, &all.jacobi)] {
             let (low, high) = (values[0], values[values.len() - 1]);
             let below = certify(&system, operator, End::Lowest, low).expect("fits");
             let below = below.expect("a factorization succeeds");
@@ -53,7 +54,7 @@ fn the_margin_of_a_certificate_is_that_of_the_theorem() {
     let system = assemble(&named("torus:20x14"), Scheme::CatmullClark);
     let (n, u) = (280.0, 0.5 * f64::EPSILON);
     for (end, estimate, outwards) in [(End::Lowest, 1.0 / 9.0, -1.0), (End::Highest, 1.0, 1.0)] {
-        let found = certify(&system, Operator::A, end, estimate).expect("small").expect("an end");
+        let found = certify(&system, SymmetricForm::A, end, estimate).expect("small").expect("an end");
         let gamma = (n + 1.0) * u / (1.0 - (n + 1.0) * u);
         let factor = gamma / (1.0 - gamma) * n * (4.0 / 9.0 - found.sigma).abs();
         let entries = 6.0 * u * (1.0 + found.sigma.abs());
@@ -71,7 +72,7 @@ fn odd_prisms_are_certified_where_the_valence_bound_is_nothing() {
         let low = ends(&system).expect("small").lambda_min.value;
         // theory: 0.82/k²
         assert!((low * (k * k) as f64 - 0.82).abs() < 0.06, "prism {k}: {low}");
-        let proof = certify(&system, Operator::A, End::Lowest, low).expect("fits");
+        let proof = certify(&system, SymmetricForm::A, End::Lowest, low).expect("fits");
         assert!(proof.is_some_and(|c| c.bound > 0.999 * low), "{k}: {proof:?}");
     }
 }

@@ -3,9 +3,10 @@
 use super::{assemble, named, torus, torus_symbols};
 use limitlab::analysis::dense;
 use limitlab::analysis::dirichlet_neumann::bracket;
-use limitlab::analysis::eigen::{End, Request, extreme};
 use limitlab::analysis::singularity::modes;
-use limitlab::analysis::spectrum::{Operator, ends, mesh_ends, symmetric};
+use limitlab::analysis::spectrum::{ends, mesh_ends};
+use limitlab::analysis::subspace_iteration::{EigenpairRequest, End, extreme};
+use limitlab::analysis::symmetric::{SymmetricForm, symmetric};
 use limitlab::analysis::valence_study::{regular_band, valence_study};
 use limitlab::assemble::LimitSystem;
 use limitlab::mesh::{Faces, Mesh, Surface, builtin, generate};
@@ -27,9 +28,10 @@ fn extreme_values_and_multiplicities_are_those_of_the_torus() {
         for (n, m) in [(40, 40), (41, 37), (60, 20)] {
             let system = assemble(&torus(scheme, n, m), scheme);
             let exact = torus_symbols(scheme, n, m);
-            let s = symmetric(&system, Operator::A);
+            let s = symmetric(&system, SymmetricForm::A);
             for end in [End::Lowest, End::Highest] {
-                let request = Request { end, count: 7, tolerance: 1e-11, spectrum: (system.bounds.lambda_min, 1.0) };
+                let request =
+                    EigenpairRequest { end, count: 7, tolerance: 1e-11, spectrum: (system.bounds.lambda_min, 1.0) };
                 let found = extreme(&s, &request).expect("large enough");
                 assert!(found.converged, "{scheme} {n}x{m} {end:?}");
                 for (k, v) in found.values.iter().enumerate() {
@@ -65,12 +67,12 @@ fn clusters_on_spheres_agree_with_dense_eigenvalues() {
         let all = dense::full_eigenvalues(&system).expect("below the limit");
         let b = system.bounds;
         for (operator, exact, spectrum) in [
-            (Operator::A, &all.a, (b.lambda_min, b.lambda_max)),
-            (Operator::Jacobi, &all.jacobi, (b.jacobi_lambda_min, b.jacobi_lambda_max)),
+            (SymmetricForm::A, &all.a, (b.lambda_min, b.lambda_max)),
+            (SymmetricForm::Jacobi, &all.jacobi, (b.jacobi_lambda_min, b.jacobi_lambda_max)),
         ] {
             let s = symmetric(&system, operator);
             for end in [End::Lowest, End::Highest] {
-                let request = Request { end, count: 20, tolerance: 1e-10, spectrum };
+                let request = EigenpairRequest { end, count: 20, tolerance: 1e-10, spectrum };
                 let found = extreme(&s, &request).expect("large enough");
                 assert!(found.converged);
                 for (k, v) in found.values.iter().enumerate() {
@@ -136,7 +138,7 @@ fn brackets_hold_the_ends_and_count_them() {
             assert_eq!(surface.topology().euler_characteristic(surface.faces()), 0);
             let system = LimitSystem::new(&surface, scheme).expect("a system");
             let all = dense::full_eigenvalues(&system).expect("below the limit");
-            for (operator, values) in [(Operator::A, &all.a), (Operator::Jacobi, &all.jacobi)] {
+            for (operator, values) in [(SymmetricForm::A, &all.a), (SymmetricForm::Jacobi, &all.jacobi)] {
                 for end in [End::Lowest, End::Highest] {
                     let found = bracket(&surface, scheme, operator, end, 1e-9).expect("finite numbers");
                     let Some(found) = found else { continue };
@@ -210,11 +212,11 @@ fn a_cluster_of_eight_on_a_sphere_of_quads() {
     let surface = Surface::new(named("quad-sphere:7")).expect("a closed mesh");
     let scheme = Scheme::CatmullClark;
     let found =
-        bracket(&surface, scheme, Operator::A, End::Lowest, 1e-9).expect("finite numbers").expect("eight corners");
+        bracket(&surface, scheme, SymmetricForm::A, End::Lowest, 1e-9).expect("finite numbers").expect("eight corners");
     assert_eq!((found.multiplicity, found.patches, found.kinds), (8, 8, 1));
     let system = LimitSystem::new(&surface, scheme).expect("a system");
-    let request = Request { end: End::Lowest, count: 9, tolerance: 1e-10, spectrum: (0.0, 1.0) };
-    let pairs = extreme(&symmetric(&system, Operator::A), &request).expect("large enough");
+    let request = EigenpairRequest { end: End::Lowest, count: 9, tolerance: 1e-10, spectrum: (0.0, 1.0) };
+    let pairs = extreme(&symmetric(&system, SymmetricForm::A), &request).expect("large enough");
     for v in &pairs.values[..8] {
         assert!((v.value - found.value).abs() <= found.width + v.error, "{v:?} {found:?}");
     }
@@ -227,7 +229,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
-            let modes = modes(&system, Operator::A, End::Lowest, 3).expect("modes");
+            let modes = modes(&system, SymmetricForm::A, End::Lowest, 3).expect("modes");
             (ends(&system).expect("values"), modes)
         })
     };
@@ -239,10 +241,10 @@ fn limits_are_told_with_what_would_do() {
     let system = assemble(&builtin::torus(70, 70), Scheme::CatmullClark);
     let message = dense::full_eigenvalues(&system).expect_err("too large").to_string();
     assert!(message.contains("4900") && message.contains("at most 4000"), "{message}");
-    let s = symmetric(&system, Operator::A);
-    let ask = |count| Request { end: End::Lowest, count, tolerance: 1e-9, spectrum: (0.0, 1.0) };
+    let s = symmetric(&system, SymmetricForm::A);
+    let ask = |count| EigenpairRequest { end: End::Lowest, count, tolerance: 1e-9, spectrum: (0.0, 1.0) };
     assert!(extreme(&s, &ask(60)).is_err());
-    let tiny = symmetric(&assemble(&named("cube"), Scheme::CatmullClark), Operator::A);
+    let tiny = symmetric(&assemble(&named("cube"), Scheme::CatmullClark), SymmetricForm::A);
     let message = extreme(&tiny, &ask(1)).expect_err("too small").to_string();
     assert!(message.contains("dense"), "{message}");
 }

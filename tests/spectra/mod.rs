@@ -8,7 +8,7 @@ mod singular;
 mod sweeps;
 
 use limitlab::assemble::LimitSystem;
-use limitlab::mesh::{Mesh, Surface, builtin, generate};
+use limitlab::mesh::{Mesh, Surface, builtin, random};
 use limitlab::schemes::Scheme;
 use std::f64::consts::TAU;
 
@@ -45,8 +45,8 @@ fn torus(scheme: Scheme, n: usize, m: usize) -> Mesh {
 /// Meshes of all kinds, small enough for dense eigenvalues.
 fn random_systems(count: u64) -> impl Iterator<Item = (String, Surface, Scheme, LimitSystem)> {
     (0..count).flat_map(|seed| {
-        let triangles = Surface::new(generate::random_triangulation(seed)).expect("a closed mesh");
-        let polygons = Surface::new(generate::random_polygons(seed)).expect("a closed mesh");
+        let triangles = Surface::new(random::random_triangulation(seed)).expect("a closed mesh");
+        let polygons = Surface::new(random::random_polygons(seed)).expect("a closed mesh");
         Scheme::ALL.into_iter().filter_map(move |scheme| {
             let surface = if scheme.needs_triangles() { triangles.clone() } else { polygons.clone() };
             if surface.len() > 260 {

@@ -9,8 +9,8 @@ use limitlab::assemble::LimitSystem;
 use limitlab::mesh::Surface;
 use limitlab::mesh::noise::add_noise;
 use limitlab::schemes::Scheme;
-use limitlab::solvers::gauss_seidel::sweep;
 use limitlab::solvers::ssor::symmetric_sweep;
+use limitlab::solvers::system::sweep;
 use limitlab::solvers::{Method, Outcome, Stop, run};
 
 #[test]
@@ -65,7 +65,7 @@ fn greedy_and_ordered_sweeps_solve_the_same_system() {
 
 #[test]
 fn the_spread_is_that_of_the_random_orders_at_one_omega() {
-    let row = |order: &str, omega, rho, iterations| order_study::Row {
+    let row = |order: &str, omega, rho, iterations| order_study::OrderRow {
         order: order.into(),
         omega,
         rho: Some(rho),

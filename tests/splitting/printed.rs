@@ -1,19 +1,20 @@
 //! Thall's numbers. Where the paper has a slip, the test holds the slip.
 
-use limitlab::analysis::splitting::thall::Entry;
+use limitlab::analysis::splitting::thall::PrintedNumber;
 use limitlab::analysis::splitting::thall_tables;
 
 use super::EIGEN;
 
-fn difference(entry: &Entry) -> f64 {
+fn difference(entry: &PrintedNumber) -> f64 {
     (entry.printed - entry.computed).abs()
 }
 
 #[test]
 fn matrices_and_table_i_are_right_entry_by_entry() {
     let tables = thall_tables().unwrap();
-    let of =
-        |test: &dyn Fn(&Entry) -> bool| -> Vec<Entry> { tables.entries.iter().filter(|e| test(e)).cloned().collect() };
+    let of = |test: &dyn Fn(&PrintedNumber) -> bool| -> Vec<PrintedNumber> {
+        tables.entries.iter().filter(|e| test(e)).cloned().collect()
+    };
     let matrices = of(&|e| e.item.starts_with('S'));
     assert_eq!(matrices.len(), 81 + 49);
     assert!(matrices.iter().all(|e| difference(e) < EIGEN));

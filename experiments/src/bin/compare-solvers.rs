@@ -6,7 +6,7 @@ use clap::Parser;
 use serde_json::json;
 
 use limitlab::Result;
-use limitlab::analysis::comparison::{self, Row};
+use limitlab::analysis::comparison::{self, MethodRow};
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::mesh::order::Order;
 use limitlab::solvers::Method;
@@ -78,7 +78,7 @@ fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// The rows, their errors in the units of the files.
-fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<Row<'a>>> {
+fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<MethodRow<'a>>> {
     let system = problem.system();
     let asked = match &arguments.method {
         Some(list) => list.0.clone(),

@@ -7,19 +7,20 @@ use glam::DVec3;
 use serde_json::{Map, Value, json};
 
 use limitlab::Result;
-use limitlab::analysis::a_priori::{Counts, Promise};
-use limitlab::analysis::certificate::{Certificate, certify};
+use limitlab::analysis::a_priori::{IterationCounts, Promise};
 use limitlab::analysis::dense;
-use limitlab::analysis::eigen::End;
-use limitlab::analysis::singularity::{Mode, Singularity, modes};
+use limitlab::analysis::inertia::{Certificate, certify};
+use limitlab::analysis::singularity::{Singularity, SlowMode, modes};
 use limitlab::analysis::spectral_radius::{SpectralRadius, spectral_radius};
-use limitlab::analysis::spectrum::{Ends, Estimate, Extremes, Operator, Spectrum, ends, excited, mesh_ends};
+use limitlab::analysis::spectrum::{Estimate, Extremes, Spectrum, SpectrumEnds, ends, excited, mesh_ends};
+use limitlab::analysis::subspace_iteration::End;
+use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::assemble::LimitSystem;
 use limitlab::assemble::bounds::SpectralBounds;
 use limitlab::solvers::direct::SINGULAR;
-use limitlab::solvers::gauss_seidel::sweep;
 use limitlab::solvers::method::{SOR_OMEGA, SSOR_OMEGA};
 use limitlab::solvers::ssor::symmetric_sweep;
+use limitlab::solvers::system::sweep;
 use limitlab::solvers::{Method, Stop, System};
 use limitlab_experiments::cli::{
     self, CommonFlags, Given, Input, MeshFlags, OutputFlags, Progress, StopFlags, Subject, number,
@@ -78,16 +79,16 @@ fn main() -> ExitCode {
 /// All that is known of one mesh, or of a system without one.
 struct Findings {
     bounds: SpectralBounds,
-    ends: Ends,
+    ends: SpectrumEnds,
     full: Option<dense::Eigenvalues>,
     sweeps: Vec<(Method<'static>, f64, SpectralRadius)>,
     /// What theory says of a mesh.
     verdict: Option<Singularity>,
     promise: Promise,
     /// `None` where all points coincide.
-    counts: Option<Counts>,
+    counts: Option<IterationCounts>,
     data: [Option<Extremes>; 2],
-    modes: Vec<Mode>,
+    modes: Vec<SlowMode>,
     certificates: [Option<Certificate>; 4],
     /// On an open or creased mesh the rest is about the smooth vertices. The eigenvalues of its curves, and its corners.
     curves: Vec<f64>,
@@ -245,19 +246,19 @@ fn analyse_any(
         [None; 2]
     } else {
         let excited = |which| excited(acting, (points, start), which);
-        [excited(Operator::A)?, excited(Operator::Jacobi)?]
+        [excited(SymmetricForm::A)?, excited(SymmetricForm::Jacobi)?]
     };
     let count = arguments.modes.into();
-    let modes = system.filter(|_| count > 0).map(|s| modes(s, Operator::A, End::Lowest, count)).transpose()?;
+    let modes = system.filter(|_| count > 0).map(|s| modes(s, SymmetricForm::A, End::Lowest, count)).transpose()?;
     progress.step();
     let mut certificates = [None; 4];
     if let Some(system) = system.filter(|_| arguments.certify) {
         let Spectrum { a, jacobi } = ends.spectrum();
         for (slot, (which, end, estimate)) in certificates.iter_mut().zip([
-            (Operator::A, End::Lowest, a.min),
-            (Operator::A, End::Highest, a.max),
-            (Operator::Jacobi, End::Lowest, jacobi.min),
-            (Operator::Jacobi, End::Highest, jacobi.max),
+            (SymmetricForm::A, End::Lowest, a.min),
+            (SymmetricForm::A, End::Highest, a.max),
+            (SymmetricForm::Jacobi, End::Lowest, jacobi.min),
+            (SymmetricForm::Jacobi, End::Highest, jacobi.max),
         ]) {
             *slot = certify(system, which, end, estimate)?;
         }
@@ -274,7 +275,7 @@ struct Parts<'a> {
     bounds: SpectralBounds,
     verdict: Option<Singularity>,
     stop: Result<Stop>,
-    ends: &'a dyn Fn() -> Result<Ends>,
+    ends: &'a dyn Fn() -> Result<SpectrumEnds>,
 }
 
 /// The smooth vertices of an open or creased mesh.
@@ -478,7 +479,7 @@ fn full_table(subject: &Subject, full: &dense::Eigenvalues) -> Table {
     columns.table(subject.stem("spectrum-full"), title, &Vec::from_iter(0..full.a.len()))
 }
 
-fn mode_table(subject: &Subject, modes: &[Mode]) -> Table {
+fn mode_table(subject: &Subject, modes: &[SlowMode]) -> Table {
     let mut columns = Columns::<usize>::new().col(Column::key("vertex"), |v| v.to_string());
     for (k, mode) in modes.iter().enumerate() {
         columns = columns.col(Column::number(format!("mode_{k}"), 1e-3, 6).floor(1e-3), |&v| mode.values[v]);
@@ -511,7 +512,7 @@ fn json(subject: &Subject, found: &Findings, n: usize) -> Value {
     let Spectrum { a, jacobi } = found.spectrum();
     let quantities = found.quantities();
     let each = |value: fn(&Quantity) -> Value| quantities.iter().map(|q| (q.name, value(q))).collect::<Value>();
-    let promised = |count: fn(&Counts) -> f64| found.counts.as_ref().map(|c| number(count(c)));
+    let promised = |count: fn(&IterationCounts) -> f64| found.counts.as_ref().map(|c| number(count(c)));
     let mut rho = Map::new();
     for (method, _, value) in found.radii() {
         rho.insert(method.into(), number(value));

@@ -7,7 +7,7 @@ use clap::{CommandFactory, Parser};
 use serde_json::{Value, json};
 
 use limitlab::Result;
-use limitlab::analysis::splitting::{Condition, Crossing, LocalScheme, Row, VALENCES, rows};
+use limitlab::analysis::splitting::{Condition, Crossing, LocalScheme, StarRow, VALENCES, rows};
 use limitlab_experiments::cli::{self, CommonFlags, OutputFlags, number};
 use limitlab_experiments::studies::splitting as study;
 
@@ -99,7 +99,7 @@ fn run(arguments: &Arguments, scheme: LocalScheme) -> Result<()> {
     cli::finish(&[object], &arguments.output, &arguments.common)
 }
 
-fn row_json(row: &Row) -> Value {
+fn row_json(row: &StarRow) -> Value {
     let numbers = |v: &[f64]| v.iter().map(|&x| number(x)).collect::<Vec<_>>();
     json!({
         "valence": row.valence,

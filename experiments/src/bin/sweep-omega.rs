@@ -9,7 +9,7 @@ use clap::Parser;
 use serde_json::{Map, Value, json};
 
 use limitlab::Result;
-use limitlab::analysis::sweep::{Sweep, rounding_floor, sweep};
+use limitlab::analysis::sweep::{OmegaSweep, rounding_floor, sweep};
 use limitlab::mesh::order::Order;
 use limitlab::solvers::Method;
 use limitlab_experiments::cli::{
@@ -76,7 +76,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let mut results = Vec::new();
     for name in &arguments.meshes {
         let problem = arguments.mesh.problem(name, &arguments.stop, arguments.order, &arguments.common)?;
-        let table = |sweep: &Sweep| {
+        let table = |sweep: &OmegaSweep| {
             study::table(
                 problem.subject.stem("sweep-omega"),
                 format!("ω sweep on {}", problem.subject.title),
@@ -89,7 +89,7 @@ fn run(arguments: &Arguments) -> Result<()> {
                 sweep,
             )
         };
-        let write = |sweep: &Sweep| table(sweep).write(&arguments.output.out);
+        let write = |sweep: &OmegaSweep| table(sweep).write(&arguments.output.out);
         let sweep = sweep_one(&problem, arguments, &write)?;
         write(&sweep)?;
         let table = table(&sweep);
@@ -111,8 +111,8 @@ const PAUSE: Duration = Duration::from_secs(2);
 fn sweep_one(
     problem: &Problem,
     arguments: &Arguments,
-    write: &(dyn Fn(&Sweep) -> Result<Vec<PathBuf>> + Sync),
-) -> Result<Sweep> {
+    write: &(dyn Fn(&OmegaSweep) -> Result<Vec<PathBuf>> + Sync),
+) -> Result<OmegaSweep> {
     let grids: Vec<(Method<'static>, Vec<f64>)> = arguments
         .method
         .0
@@ -124,7 +124,7 @@ fn sweep_one(
         .collect();
     let runs = grids.iter().map(|(_, g)| g.len()).sum();
     let progress = Progress::new(&problem.subject.name, runs, arguments.common.quiet);
-    let in_units_of_files = |mut sweep: Sweep| {
+    let in_units_of_files = |mut sweep: OmegaSweep| {
         for row in &mut sweep.rows {
             row.errors = row.errors * problem.scale;
         }
@@ -152,7 +152,7 @@ fn sweep_one(
 }
 
 /// The rows are those of the table, with ω as a number.
-fn json(problem: &Problem, arguments: &Arguments, sweep: &Sweep, table: &Table) -> Value {
+fn json(problem: &Problem, arguments: &Arguments, sweep: &OmegaSweep, table: &Table) -> Value {
     let mut rows = table.to_json();
     for (row, object) in sweep.rows.iter().zip(rows.as_array_mut().into_iter().flatten()) {
         object["omega"] = number(row.omega);

@@ -1,4 +1,4 @@
-//! What the programs share: flags, MESH names, exit status, progress. This room knows no formulas.
+//! Command line shared by the programs: flags, MESH names, exit status, progress. This room knows no formulas.
 
 pub mod advice;
 mod input;

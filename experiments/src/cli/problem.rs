@@ -1,4 +1,4 @@
-//! The systems that programs are asked about: that of a mesh, or one that a folder holds.
+//! Linear systems named on the command line: that of a mesh, or one that a folder holds.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! A fresh table held against a committed one.
+//! Comparison of a fresh table with a committed one, within the tolerance of each column.
 
 use super::table::{CsvFile, Kind, Table};
 use limitlab::Result;

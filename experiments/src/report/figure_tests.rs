@@ -1,3 +1,4 @@
+use super::super::canvas::Colour;
 use super::*;
 use crate::report::canvas::{Dash, Marker, PIXELS_PER_POINT};
 use crate::report::series::{Band, Bars, Rule, marker, palette};

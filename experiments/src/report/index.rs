@@ -1,4 +1,4 @@
-//! The page that lists what a folder of reports holds.
+//! Index page of a folder of reports.
 
 use limitlab::Result;
 use limitlab::output::write_file;

@@ -1,4 +1,4 @@
-//! Results on paper: tables (CSV, Markdown, JSON), their comparison with committed ones, and PNG plots.
+//! Reports: tables (CSV, Markdown, JSON), their comparison with committed ones, and PNG plots.
 //!
 //! This room takes plain columns and named series; it calls no solver and knows nothing of how a number came
 //! about. What it writes is the same, byte for byte, for the same input on the same machine.
@@ -20,6 +20,7 @@ mod canvas;
 pub mod columns;
 pub mod compare;
 pub mod figure;
+mod frame;
 pub mod index;
 mod number;
 pub mod plot;

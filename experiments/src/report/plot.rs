@@ -2,7 +2,7 @@
 
 use super::axis::{Axis, Scale, Tick};
 use super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Dash, Marker, Point, Rect, text_width};
-use super::figure::{self, FRAME_COLOUR, FRAME_WIDTH, Slot, TEXT_COLOUR};
+use super::frame::{self, FRAME_COLOUR, FRAME_WIDTH, Slot, TEXT_COLOUR};
 use super::series::{Band, Bars, Line, PALETTE, Rule, Series, palette};
 use limitlab::Result;
 
@@ -144,17 +144,17 @@ impl LinePlot {
     /// The room above the frame, in points.
     pub(super) fn top(&self) -> f64 {
         let labels = if self.has_rule_labels() { RULE_LABEL_ROOM } else { 0.0 };
-        figure::title_room(&self.title) + labels
+        frame::title_room(&self.title) + labels
     }
 
     /// The room below the frame, with or without the x axis's labels.
     pub(super) fn bottom(&self, labelled: bool) -> f64 {
-        figure::x_axis_room(&self.x_label, labelled)
+        frame::x_axis_room(&self.x_label, labelled)
     }
 
     /// The room to the left of a frame of this height.
     pub(super) fn left(&self, height: f64) -> Result<f64> {
-        figure::y_axis_room(&self.y_label, &figure::y_ticks(self.y_axis(), height))
+        frame::y_axis_room(&self.y_label, &frame::y_ticks(self.y_axis(), height))
     }
 
     /// The room to the right of the frame: the legend's.
@@ -163,25 +163,25 @@ impl LinePlot {
         let widths = legend.iter().map(|(name, _)| text_width(name, LEGEND_SIZE));
         let widest = widths.collect::<Result<Vec<_>>>()?;
         let widest = widest.into_iter().reduce(f64::max);
-        Ok(widest.map_or(figure::BARE_RIGHT, |w| LEGEND_GAP + LEGEND_KEY + 6.0 + w + 4.0))
+        Ok(widest.map_or(frame::BARE_RIGHT, |w| LEGEND_GAP + LEGEND_KEY + 6.0 + w + 4.0))
     }
 
     pub(super) fn draw(&self, canvas: &Canvas<'_>, slot: &Slot) -> Result<()> {
         let (x, y) = (slot.x_axis, self.y_axis());
         let frame = if self.equal_units { with_aspect(slot.frame, (x.hi - x.lo) / (y.hi - y.lo)) } else { slot.frame };
-        let x_ticks = figure::x_ticks(x, frame.width());
-        let y_ticks = figure::y_ticks(y, frame.height());
+        let x_ticks = frame::x_ticks(x, frame.width());
+        let y_ticks = frame::y_ticks(y, frame.height());
         self.draw_bands(canvas, frame, x)?;
         draw_grid(canvas, frame, &x_ticks, &y_ticks)?;
         self.draw_bars(canvas, frame, x, y)?;
         self.draw_rules(canvas, frame, x, y)?;
         self.draw_series(canvas, frame, x, y)?;
         canvas.outline(frame, FRAME_WIDTH, FRAME_COLOUR)?;
-        figure::draw_x_axis(canvas, frame, &x_ticks, &self.x_label, slot.labelled)?;
-        figure::draw_y_axis(canvas, frame, slot.left, &y_ticks, &self.y_label)?;
+        frame::draw_x_axis(canvas, frame, &x_ticks, &self.x_label, slot.labelled)?;
+        frame::draw_y_axis(canvas, frame, slot.left, &y_ticks, &self.y_label)?;
         self.draw_rule_labels(canvas, frame, x)?;
         self.draw_legend(canvas, frame)?;
-        figure::draw_title(canvas, frame, &self.title, self.top())
+        frame::draw_title(canvas, frame, &self.title, self.top())
     }
 
     fn draw_bands(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis) -> Result<()> {

@@ -1,4 +1,4 @@
-//! What a plot shows: named points, rules, bands and bars.
+//! Data of a plot: named points, rules, bands and bars.
 
 use super::canvas::{Colour, Dash, Marker};
 

@@ -1,8 +1,8 @@
-//! The pattern of a sparse matrix.
+//! Sparsity plot: the pattern of a sparse matrix.
 
 use super::axis::{Axis, Scale};
 use super::canvas::{Canvas, Colour, Rect};
-use super::figure::{self, FRAME_COLOUR, FRAME_WIDTH};
+use super::frame::{self, FRAME_COLOUR, FRAME_WIDTH};
 use limitlab::Result;
 
 /// A larger matrix is shown as at most so many blocks in each direction, about two pixels each: finer ones are
@@ -63,11 +63,11 @@ impl SparsityPlot {
     }
 
     pub(super) fn bottom(&self) -> f64 {
-        figure::x_axis_room("column", true)
+        frame::x_axis_room("column", true)
     }
 
     pub(super) fn left(&self, height: f64) -> Result<f64> {
-        figure::y_axis_room("row", &figure::y_ticks(self.axis(), height / 2.0))
+        frame::y_axis_room("row", &frame::y_ticks(self.axis(), height / 2.0))
     }
 
     pub(super) fn draw(&self, canvas: &Canvas<'_>, room: Rect) -> Result<()> {
@@ -95,14 +95,14 @@ impl SparsityPlot {
             canvas.fill(dot, Colour(grey, grey, grey))?;
         }
         canvas.outline(frame, FRAME_WIDTH, FRAME_COLOUR)?;
-        let x = figure::x_ticks(self.axis(), side);
-        figure::draw_x_axis(canvas, frame, &x, "column", true)?;
-        let mut y = figure::y_ticks(self.axis(), side / 2.0);
+        let x = frame::x_ticks(self.axis(), side);
+        frame::draw_x_axis(canvas, frame, &x, "column", true)?;
+        let mut y = frame::y_ticks(self.axis(), side / 2.0);
         for tick in &mut y {
             tick.at = 1.0 - tick.at; // rows count downward
         }
-        figure::draw_y_axis(canvas, frame, figure::y_axis_room("row", &y)?, &y, "row")?;
-        figure::draw_title(canvas, frame, &self.caption, figure::title_room(&self.caption))
+        frame::draw_y_axis(canvas, frame, frame::y_axis_room("row", &y)?, &y, "row")?;
+        frame::draw_title(canvas, frame, &self.caption, frame::title_room(&self.caption))
     }
 }
 

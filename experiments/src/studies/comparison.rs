@@ -5,8 +5,8 @@ use std::str::FromStr;
 use serde_json::{Value, json};
 
 use crate::report::{Column, Columns, Figure, LinePlot, Scale, Series, Table};
-use limitlab::analysis::comparison::Row;
-use limitlab::analysis::own::Named;
+use limitlab::analysis::comparison::MethodRow;
+use limitlab::analysis::custom_methods::Named;
 use limitlab::solvers::{Method, Solution};
 use limitlab::{Error, Result};
 
@@ -32,8 +32,8 @@ const AUTO: &str = "auto";
 
 /// The row of `auto`, whose parameter is the method that came to the end. Its history has an entry for each correction, so
 /// that no rate is observed.
-pub fn auto_row(solution: Solution) -> Row<'static> {
-    Row {
+pub fn auto_row(solution: Solution) -> MethodRow<'static> {
+    MethodRow {
         method: Named::Own(AUTO.into()),
         variant: "",
         parameter: solution.method.into(),
@@ -44,7 +44,7 @@ pub fn auto_row(solution: Solution) -> Row<'static> {
 }
 
 /// One row a method; `about` says which system, start and tolerance. What an outcome has for a reason is a note.
-pub fn table(id: String, title: String, about: String, rows: &[Row]) -> Table {
+pub fn table(id: String, title: String, about: String, rows: &[MethodRow]) -> Table {
     let mut table = columns().table(id, title, rows);
     table.note(format!(
         "{about} Rates are factors per iteration; `fill` counts the stored entries of the factors, where the library tells."
@@ -57,9 +57,9 @@ pub fn table(id: String, title: String, about: String, rows: &[Row]) -> Table {
     table
 }
 
-fn columns<'r>() -> Columns<'static, Row<'r>> {
+fn columns<'r>() -> Columns<'static, MethodRow<'r>> {
     Columns::new()
-        .col(Column::key("method"), |r: &Row| r.method.name().to_owned())
+        .col(Column::key("method"), |r: &MethodRow| r.method.name().to_owned())
         .col(Column::key("parameter"), |r| r.parameter.clone())
         .col(Column::text("status"), |r| r.solution.report.outcome.name())
         .col(Column::count("iterations"), |r| r.solution.report.iterations)
@@ -73,7 +73,7 @@ fn columns<'r>() -> Columns<'static, Row<'r>> {
 }
 
 /// The maximum errors over the iterations, a line for each method that iterates; `unit` is what errors are measured in.
-pub fn figure(title: String, unit: &str, rows: &[Row]) -> Figure {
+pub fn figure(title: String, unit: &str, rows: &[MethodRow]) -> Figure {
     let series = rows
         .iter()
         // A history by corrections has no place over iterations.
@@ -100,7 +100,7 @@ pub fn figure(title: String, unit: &str, rows: &[Row]) -> Figure {
 
 /// The rows as `compare-solvers --json` has them: the columns of the table, the durations in an object of their own,
 /// and what an outcome has for a reason.
-pub fn json(rows: &[Row]) -> Value {
+pub fn json(rows: &[MethodRow]) -> Value {
     let mut objects = columns().table("", "", rows).to_json();
     for (row, object) in rows.iter().zip(objects.as_array_mut().into_iter().flatten()) {
         object["seconds"] = json!({

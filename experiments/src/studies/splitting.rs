@@ -3,9 +3,9 @@
 use crate::report::{Column, Columns, Figure, LinePlot, Marker, Rule, Series, Table, palette};
 use limitlab::Result;
 use limitlab::analysis::splitting::row::MAP_ROUNDS;
-use limitlab::analysis::splitting::thall::{Entry, Membership, Orientation};
+use limitlab::analysis::splitting::thall::{MaskOrientation, Membership, PrintedNumber};
 use limitlab::analysis::splitting::{
-    Condition, Crossing, LocalScheme, Row, SplittingMatrix, ThallTables, characteristic_map, condition_over_alpha,
+    Condition, Crossing, LocalScheme, SplittingMatrix, StarRow, ThallTables, characteristic_map, condition_over_alpha,
     crossings, thall_tables,
 };
 
@@ -44,7 +44,12 @@ pub fn sampled(scheme: LocalScheme, valences: &[usize]) -> Result<Option<Sampled
 ///
 /// # Errors
 /// If eigenvalues do not converge.
-pub fn tables(scheme: LocalScheme, valences: &[usize], rows: &[Row], sampled: Option<&Sampled>) -> Result<Vec<Table>> {
+pub fn tables(
+    scheme: LocalScheme,
+    valences: &[usize],
+    rows: &[StarRow],
+    sampled: Option<&Sampled>,
+) -> Result<Vec<Table>> {
     let mut tables = vec![summary(scheme, rows), eigenvalue_table(scheme, rows), mask_table(scheme, rows)];
     if scheme == LocalScheme::CatmullClark {
         tables.extend(thall_report(&thall_tables()?));
@@ -88,8 +93,8 @@ fn yes(answer: bool) -> &'static str {
     if answer { "yes" } else { "no" }
 }
 
-fn summary(scheme: LocalScheme, rows: &[Row]) -> Table {
-    let columns = Columns::<Row>::new()
+fn summary(scheme: LocalScheme, rows: &[StarRow]) -> Table {
+    let columns = Columns::<StarRow>::new()
         .col(Column::key("valence"), |r| r.valence)
         .col(Column::text("rings"), |r| r.rings)
         .col(Column::text("size"), |r| r.eigenvalues.len())
@@ -125,8 +130,8 @@ fn summary(scheme: LocalScheme, rows: &[Row]) -> Table {
     table
 }
 
-fn eigenvalue_table(scheme: LocalScheme, rows: &[Row]) -> Table {
-    let columns = Columns::<(&Row, usize)>::new()
+fn eigenvalue_table(scheme: LocalScheme, rows: &[StarRow]) -> Table {
+    let columns = Columns::<(&StarRow, usize)>::new()
         .col(Column::key("valence"), |&(row, _)| row.valence)
         .col(Column::key("index"), |&(_, i)| i)
         .col(Column::number("real", 1e-7, 10), |&(row, i)| row.eigenvalues[i].re)
@@ -140,9 +145,9 @@ fn eigenvalue_table(scheme: LocalScheme, rows: &[Row]) -> Table {
     table
 }
 
-fn mask_table(scheme: LocalScheme, rows: &[Row]) -> Table {
-    let tangent = |k: usize| move |&(row, i): &(&Row, usize)| row.tangent_masks.as_ref().map(|masks| masks[k][i]);
-    let columns = Columns::<(&Row, usize)>::new()
+fn mask_table(scheme: LocalScheme, rows: &[StarRow]) -> Table {
+    let tangent = |k: usize| move |&(row, i): &(&StarRow, usize)| row.tangent_masks.as_ref().map(|masks| masks[k][i]);
+    let columns = Columns::<(&StarRow, usize)>::new()
         .col(Column::key("valence"), |&(row, _)| row.valence)
         .col(Column::key("position"), |&(row, i)| scheme.layout().label(row.valence, i))
         .col(Column::number("limit", 1e-9, 8), |&(row, i)| row.limit_mask[i])
@@ -158,7 +163,7 @@ fn mask_table(scheme: LocalScheme, rows: &[Row]) -> Table {
 }
 
 /// Each row as often as `count` says, with the index of an eigenvalue or a position.
-fn with_indices(rows: &[Row], count: fn(&Row) -> usize) -> Vec<(&Row, usize)> {
+fn with_indices(rows: &[StarRow], count: fn(&StarRow) -> usize) -> Vec<(&StarRow, usize)> {
     rows.iter().flat_map(|row| (0..count(row)).map(move |i| (row, i))).collect()
 }
 
@@ -225,7 +230,7 @@ fn maps(scheme: LocalScheme, valences: &[usize]) -> Result<Option<Figure>> {
 }
 
 fn thall_report(tables: &ThallTables) -> [Table; 3] {
-    let columns = Columns::<Entry>::new()
+    let columns = Columns::<PrintedNumber>::new()
         .col(Column::key("place"), |e| e.place)
         .col(Column::key("valence"), |e| e.valence)
         .col(Column::key("item"), |e| e.item.clone())
@@ -250,7 +255,7 @@ fn thall_report(tables: &ThallTables) -> [Table; 3] {
         "Relative distance ‖v − QQᵀv‖/‖v‖ of the mask from the eigenspace; then the same with the edge weights \
          multiplied by A_n.",
     );
-    let columns = Columns::<Orientation>::new()
+    let columns = Columns::<MaskOrientation>::new()
         .col(Column::key("place"), |o| o.place)
         .col(Column::key("valence"), |o| o.valence)
         .col(Column::key("masks"), |o| o.masks)

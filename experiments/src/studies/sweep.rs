@@ -2,7 +2,7 @@
 
 use crate::cli::Grid;
 use crate::report::{Column, Columns, Figure, LinePlot, Marker, Rule, Scale, Series, Table, palette};
-use limitlab::analysis::sweep::{Row, Sweep};
+use limitlab::analysis::sweep::{OmegaSweep, SweepRow};
 use limitlab::error::short;
 use limitlab::solvers::{Method, Outcome};
 
@@ -13,7 +13,7 @@ pub fn default_grid(method: Method) -> Vec<f64> {
 }
 
 /// One row a method and ω. `about` says which mesh, start and tolerance.
-pub fn table(id: String, title: String, about: String, sweep: &Sweep) -> Table {
+pub fn table(id: String, title: String, about: String, sweep: &OmegaSweep) -> Table {
     let mut table = columns().table(id, title, &sweep.rows);
     table.note(format!(
         "{about} `predicted_rho` is the spectral radius of the error matrix, `predicted_rho_data` the same over the \
@@ -46,8 +46,8 @@ pub fn table(id: String, title: String, about: String, sweep: &Sweep) -> Table {
     table
 }
 
-fn columns() -> Columns<'static, Row> {
-    Columns::<Row>::new()
+fn columns() -> Columns<'static, SweepRow> {
+    Columns::<SweepRow>::new()
         .col(Column::key("method"), |r| r.method.name())
         .col(Column::key("omega"), |r| short(r.omega))
         .col(Column::text("status"), |r| r.outcome.name())
@@ -59,7 +59,7 @@ fn columns() -> Columns<'static, Row> {
 }
 
 /// Iterations above, rates below, over ω.
-pub fn plot(title: String, methods: &[Method<'static>], sweep: &Sweep) -> Figure {
+pub fn plot(title: String, methods: &[Method<'static>], sweep: &OmegaSweep) -> Figure {
     let mut iterations = LinePlot {
         title,
         x_label: "ω".into(),

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use glam::DVec3;
-use limitlab::mesh::curve::is_scattered;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces};
 use limitlab::mesh::order::Order;
+use limitlab::mesh::space_filling::is_scattered;
 use limitlab::mesh::{Mesh, Surface, io};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::Method;

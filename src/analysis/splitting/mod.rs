@@ -29,11 +29,23 @@ pub mod spectrum;
 pub mod star;
 pub mod thall;
 
+use nalgebra::Complex;
+
 pub use characteristic::{Check, Net, characteristic_map};
 pub use condition::{Condition, Crossing, condition_over_alpha, crossings};
 pub use matrix::SplittingMatrix;
-pub use row::{Row, rows};
+pub use row::{StarRow, rows};
 pub use scheme::{LocalScheme, VALENCES};
 pub use spectrum::{Eigenspace, Mode, distance_to_space};
 pub use star::Layout;
 pub use thall::{ThallTables, thall_tables};
+
+/// By falling modulus, then real part, then imaginary part.
+fn sort(values: &mut [Complex<f64>]) {
+    values.sort_by(falling);
+}
+
+fn falling(a: &Complex<f64>, b: &Complex<f64>) -> std::cmp::Ordering {
+    let modulus = b.norm().total_cmp(&a.norm());
+    modulus.then(b.re.total_cmp(&a.re)).then(b.im.total_cmp(&a.im))
+}

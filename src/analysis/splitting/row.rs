@@ -11,7 +11,7 @@ use crate::error::Result;
 
 /// What the local matrix of one valence is like, computed, and its deviations from the closed forms.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct StarRow {
     /// The scheme whose local matrix it is.
     pub scheme: LocalScheme,
     /// Sectors n about the middle vertex or face.
@@ -51,11 +51,11 @@ pub const MAP_ROUNDS: usize = 3;
 ///
 /// # Errors
 /// [`Error::Unknown`](crate::Error::Unknown) for a valence outside [`VALENCES`](super::VALENCES).
-pub fn rows(scheme: LocalScheme, valences: &[usize]) -> Result<Vec<Row>> {
+pub fn rows(scheme: LocalScheme, valences: &[usize]) -> Result<Vec<StarRow>> {
     valences.par_iter().map(|&n| row(scheme, n)).collect()
 }
 
-fn row(scheme: LocalScheme, valence: usize) -> Result<Row> {
+fn row(scheme: LocalScheme, valence: usize) -> Result<StarRow> {
     let matrix = SplittingMatrix::new(scheme, valence)?;
     let eigenvalues = matrix.eigenvalues()?;
     let spaces = matrix.eigenspaces()?;
@@ -66,7 +66,7 @@ fn row(scheme: LocalScheme, valence: usize) -> Result<Row> {
     let has_pair = matrix.leading_pair().is_ok();
     let tangent_mask_distance =
         scheme.cosine_mask_formula(valence).map(|mask| distance_to_space(&DVector::from_vec(mask), &spaces[1].left));
-    Ok(Row {
+    Ok(StarRow {
         scheme,
         valence,
         rings: matrix.rings,

@@ -203,7 +203,7 @@ impl LocalScheme {
             LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => return None,
         }
         let mut all: Vec<_> = all.into_iter().map(Complex::from).collect();
-        super::spectrum::sort(&mut all);
+        super::sort(&mut all);
         Some(all)
     }
 

@@ -6,6 +6,7 @@ use faer::Mat;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::matrix::SplittingMatrix;
+use super::{falling, sort};
 use crate::error::{Error, Result};
 
 /// Eigenvalues of one block that are closer than this share an invariant subspace: a defective eigenvalue of
@@ -305,16 +306,6 @@ pub(super) fn all_eigenvalues(modes: &[Mode], n: usize) -> Vec<Complex<f64>> {
         }
     }
     all
-}
-
-/// By falling modulus, then real part, then imaginary part.
-pub(super) fn sort(values: &mut [Complex<f64>]) {
-    values.sort_by(falling);
-}
-
-fn falling(a: &Complex<f64>, b: &Complex<f64>) -> std::cmp::Ordering {
-    let modulus = b.norm().total_cmp(&a.norm());
-    modulus.then(b.re.total_cmp(&a.re)).then(b.im.total_cmp(&a.im))
 }
 
 /// Groups of values within [`CLUSTER`] of another of the group; λ and λ̄ count as close.

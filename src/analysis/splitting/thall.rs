@@ -17,7 +17,7 @@ use crate::schemes::catmull_clark::tangent_constant;
 
 /// A printed number and the computed one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
+pub struct PrintedNumber {
     /// Where in the paper.
     pub place: &'static str,
     /// The valence n of the star.
@@ -47,7 +47,7 @@ pub struct Membership {
 
 /// Which way m_2 × m_3 points, for a star in the plane counter-clockwise in the paper's order: positive is outward.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Orientation {
+pub struct MaskOrientation {
     /// Where in the paper.
     pub place: &'static str,
     /// The valence n of the star.
@@ -62,11 +62,11 @@ pub struct Orientation {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ThallTables {
     /// Matrices, eigenvalues, limit masks and tangent masks, number by number.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<PrintedNumber>,
     /// Tangent masks and left eigenvectors at valences 3 and 4.
     pub memberships: Vec<Membership>,
     /// At valences 3 and 4, each as printed and by the formulas.
-    pub orientations: Vec<Orientation>,
+    pub orientations: Vec<MaskOrientation>,
 }
 
 /// §3.1: 16·S at valence 4.
@@ -183,13 +183,19 @@ pub fn thall_tables() -> Result<ThallTables> {
     three.matrix_entries("§4", &MATRIX_3.map(|row| row.map(|x| x / 12.0)), &mut entries);
     four.matrix_entries("§3.1", &MATRIX_4.map(|row| row.map(|x| x / 16.0)), &mut entries);
     for (place, star, printed) in [("§4", &three, LAMBDA_3), ("§3.1", &four, 0.5)] {
-        entries.push(Entry { place, valence: star.n, item: "λ_2 = λ_3".into(), printed, computed: star.lambda });
+        entries.push(PrintedNumber {
+            place,
+            valence: star.n,
+            item: "λ_2 = λ_3".into(),
+            printed,
+            computed: star.lambda,
+        });
     }
     for (n, [divisor, vertex]) in (3..).zip(TABLE_I) {
         let mask = Star::new(n)?.limit_mask;
         let weights = std::iter::once(vertex).chain(std::iter::repeat_n(1.0, n)).chain(std::iter::repeat_n(4.0, n));
         for (i, weight) in weights.enumerate() {
-            entries.push(Entry {
+            entries.push(PrintedNumber {
                 place: "Table I",
                 valence: n,
                 item: format!("l_1[{}]", label(n, i)),
@@ -250,10 +256,15 @@ impl Star {
         })
     }
 
-    fn matrix_entries<const N: usize>(&self, place: &'static str, printed: &[[f64; N]; N], entries: &mut Vec<Entry>) {
+    fn matrix_entries<const N: usize>(
+        &self,
+        place: &'static str,
+        printed: &[[f64; N]; N],
+        entries: &mut Vec<PrintedNumber>,
+    ) {
         for (i, row) in printed.iter().enumerate() {
             for (j, &printed) in row.iter().enumerate() {
-                entries.push(Entry {
+                entries.push(PrintedNumber {
                     place,
                     valence: self.n,
                     item: format!("S[{}, {}]", label(self.n, i), label(self.n, j)),
@@ -321,11 +332,11 @@ fn mask_entries<const N: usize>(
     n: usize,
     scale: f64,
     printed: &[[f64; N]; 2],
-    entries: &mut Vec<Entry>,
+    entries: &mut Vec<PrintedNumber>,
 ) {
     for (shift, mask) in printed.iter().enumerate() {
         for (i, (&printed, computed)) in mask.iter().zip(formula_mask(n, shift)).enumerate().skip(1) {
-            entries.push(Entry {
+            entries.push(PrintedNumber {
                 place,
                 valence: n,
                 item: format!("c_{}[{}]", shift + 2, label(n, i)),
@@ -336,7 +347,7 @@ fn mask_entries<const N: usize>(
     }
 }
 
-fn orientation(place: &'static str, n: usize, masks: &'static str, [first, second]: &[Vec<f64>; 2]) -> Orientation {
+fn orientation(place: &'static str, n: usize, masks: &'static str, [first, second]: &[Vec<f64>; 2]) -> MaskOrientation {
     let angle = |turns: f64| DVec2::from_angle(TAU * turns / n as f64);
     let point = |i: usize| match i {
         0 => DVec2::ZERO,
@@ -345,5 +356,5 @@ fn orientation(place: &'static str, n: usize, masks: &'static str, [first, secon
     };
     let apply = |mask: &[f64]| -> DVec2 { mask.iter().enumerate().map(|(i, &w)| w * point(i)).sum() };
     let (a, b) = (apply(first), apply(second));
-    Orientation { place, valence: n, masks, sine: a.perp_dot(b) / (a.length() * b.length()) }
+    MaskOrientation { place, valence: n, masks, sine: a.perp_dot(b) / (a.length() * b.length()) }
 }

@@ -15,7 +15,7 @@ use crate::mesh::incidence::{next_in, prev_in};
 use crate::parallel;
 use crate::schemes::catmull_clark::{limit_mask, tangent_constant};
 use crate::solvers::Errors;
-use crate::solvers::direct::{Cholesky, Factorization, Kind};
+use crate::solvers::direct::{Cholesky, CholeskyForm, Factorization};
 use crate::solvers::system::Rows;
 use crate::{Error, Result};
 
@@ -307,7 +307,7 @@ impl Kkt {
         }
         let pattern = Arc::new(Pattern::new(offsets, columns));
         let matrix = Csr::new(Arc::clone(&pattern), values);
-        let mut factors = Cholesky::new(&Csr::new(pattern, shifted), Kind::Ldlt).map_err(|f| {
+        let mut factors = Cholesky::new(&Csr::new(pattern, shifted), CholeskyForm::Ldlt).map_err(|f| {
             let what = format!("the fairness system cannot be factored: {}", f.detail);
             Error::Computation(what)
         })?;

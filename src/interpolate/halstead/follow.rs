@@ -1,5 +1,5 @@
-//! Iterative methods watched by the fairness: how much the surface ripples while its error falls, and whether stopping
-//! early helps.
+//! Fairness of the iterates of a method: how much the surface ripples while its error falls, and whether stopping early
+//! helps.
 
 use std::ops::ControlFlow;
 
@@ -15,7 +15,7 @@ use crate::{Error, Result};
 
 /// One iterate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
+pub struct FairnessRow {
     /// The number of updates made; 0 for the start.
     pub iteration: usize,
     /// Interpolation error, in mesh units.
@@ -44,7 +44,7 @@ pub fn follow(
     normals: &[DVec3],
     method: Method,
     stop: &Stop,
-) -> Result<(Vec<Row>, Solution)> {
+) -> Result<(Vec<FairnessRow>, Solution)> {
     let mut rows = Vec::new();
     let mut failure: Option<Error> = None;
     let mut iterate = surface.clone();
@@ -52,7 +52,7 @@ pub fn follow(
         iterate.positions_mut().copy_from_slice(step.points);
         match measure(&iterate, fairness, normals) {
             Ok((energies, deviation_max, deviation_mean)) => {
-                rows.push(Row {
+                rows.push(FairnessRow {
                     iteration: step.iteration,
                     errors: step.errors,
                     energies,

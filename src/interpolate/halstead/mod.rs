@@ -13,7 +13,7 @@ pub mod follow;
 
 pub use energy::{Energies, Fairness, Weights};
 pub use fit::{Fit, fit};
-pub use follow::{Row, follow};
+pub use follow::{FairnessRow, follow};
 
 /// Refinements between the given mesh and the unknowns.
 pub const LEVELS: usize = 2;

@@ -1,5 +1,7 @@
 use super::*;
+use crate::mesh::builtin;
 use crate::mesh::incidence::Incidence;
+use crate::mesh::random::{random_polygons, random_triangulation};
 use crate::mesh::validate::{Boundary, Counts, validate};
 
 /// The counts of a mesh without defects.

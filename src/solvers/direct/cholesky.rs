@@ -16,7 +16,7 @@ use crate::solvers::iteration::{Failure, Outcome};
 
 /// Which of the two factorizations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum CholeskyForm {
     /// M = LLᵀ: fails on a pivot that is not positive.
     Llt,
     /// M = LDLᵀ: fails on a vanishing pivot only.
@@ -26,7 +26,7 @@ pub enum Kind {
 /// M factored by faer. Sequential: for these small supernodes a second thread costs more than it gives, and the
 /// result does not depend on the number of threads.
 pub struct Cholesky {
-    kind: Kind,
+    kind: CholeskyForm,
     symbolic: SymbolicCholesky<u32>,
     values: Vec<f64>,
     right_hand_sides: Mat<f64>,
@@ -45,10 +45,10 @@ impl Cholesky {
     /// # Errors
     /// [`Outcome::Singular`] on a pivot that the factorization refuses, [`Outcome::Breakdown`] when memory or
     /// 32-bit indices do not suffice.
-    pub fn new(m: &Csr, kind: Kind) -> Result<Self, Failure> {
+    pub fn new(m: &Csr, kind: CholeskyForm) -> Result<Self, Failure> {
         let name = match kind {
-            Kind::Llt => "Cholesky",
-            Kind::Ldlt => "LDLᵀ",
+            CholeskyForm::Llt => "Cholesky",
+            CholeskyForm::Ldlt => "LDLᵀ",
         };
         let broken = |why: &dyn std::fmt::Display| failed(name, Outcome::Breakdown, why);
         let pattern = faer_pattern(m);
@@ -61,7 +61,7 @@ impl Cholesky {
         room(name, "the factor", fill, 8)?;
         let mut values = vec![0.0; fill];
         match kind {
-            Kind::Llt => {
+            CholeskyForm::Llt => {
                 let need = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
                 let mut memory = MemBuffer::try_new(need).map_err(|e| broken(&e))?;
                 symbolic
@@ -81,7 +81,7 @@ impl Cholesky {
                         },
                     })?;
             }
-            Kind::Ldlt => {
+            CholeskyForm::Ldlt => {
                 let need = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
                 let mut memory = MemBuffer::try_new(need).map_err(|e| broken(&e))?;
                 symbolic
@@ -117,13 +117,13 @@ impl Factorization for Cholesky {
         }
         let stack = MemStack::new(&mut self.scratch);
         match self.kind {
-            Kind::Llt => LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+            CholeskyForm::Llt => LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
                 Conj::No,
                 b.as_mut(),
                 Par::Seq,
                 stack,
             ),
-            Kind::Ldlt => LdltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+            CholeskyForm::Ldlt => LdltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
                 Conj::No,
                 b.as_mut(),
                 Par::Seq,

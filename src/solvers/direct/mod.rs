@@ -5,7 +5,7 @@ mod cholesky;
 mod lu;
 mod second_opinion;
 
-pub use cholesky::{Cholesky, Kind};
+pub use cholesky::{Cholesky, CholeskyForm};
 pub use lu::SparseLu;
 pub use second_opinion::SecondOpinion;
 

@@ -1,4 +1,4 @@
-//! From given points to control points, by the method that is asked for.
+//! Control points of the given points, by the method asked for.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -16,8 +16,8 @@ use limitlab::solvers::gauss_seidel::by_colours;
 use limitlab::solvers::{Errors, Method, Outcome, Report, Step, Stop};
 use limitlab_experiments::cli::{Input, Progress, advice};
 
-use super::wishes::Wishes;
-use super::{Arguments, Choice};
+use super::arguments::{Arguments, Choice};
+use super::vertex_options::VertexOptions;
 
 #[derive(Default)]
 pub struct Seconds {
@@ -39,30 +39,30 @@ pub struct Control {
 }
 
 /// The control points, and the errors of what will be left of them in the digits of the file.
-pub fn control_mesh(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
-    let mut control = solved(arguments, input, wishes)?;
+pub fn control_mesh(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -> Result<Control> {
+    let mut control = solved(arguments, input, per_vertex)?;
     let frame = &input.frame;
     let rounded = |p: &DVec3| frame.there(frame.back(*p));
     if !frame.is_identity() && control.points.iter().any(|p| rounded(p) != *p) {
         let written: Vec<DVec3> = control.points.iter().map(rounded).collect();
-        control.errors = limit_errors(input, wishes.interpolated.as_deref(), &written)?;
+        control.errors = limit_errors(input, per_vertex.interpolated.as_deref(), &written)?;
     }
     Ok(control)
 }
 
-fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
+fn solved(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -> Result<Control> {
     if arguments.method == Choice::TwoPhase {
-        return two_phase(arguments, input, wishes);
+        return two_phase(arguments, input, per_vertex);
     }
     let stop = input.stop(&arguments.stop)?;
     if let Some(remark) = input.remark_on_rounding(input.frame.scale() * stop.tolerance) {
         arguments.common.remark(format_args!("{}: {remark}", input.name));
     }
     if let (Choice::Solver(method @ (Method::GaussSeidel { .. } | Method::Sor { .. })), Order::Multicolour, None) =
-        (arguments.method, arguments.order, &wishes.interpolated)
+        (arguments.method, arguments.order, &per_vertex.interpolated)
         && input.surface.features().is_none()
     {
-        return by_colour(arguments, input, wishes, method, &stop);
+        return by_colour(arguments, input, per_vertex, method, &stop);
     }
     let order;
     let method = match arguments.method {
@@ -73,7 +73,7 @@ fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Contr
         Choice::Auto | Choice::TwoPhase | Choice::Halstead | Choice::Keeping(_) => None,
     };
     let Stop { tolerance, max_iterations } = stop;
-    let interpolated = wishes.interpolated.as_deref();
+    let interpolated = per_vertex.interpolated.as_deref();
     let options = Options { method, tolerance: Tolerance::Absolute(tolerance), max_iterations, interpolated };
     // The chain of auto tells nothing before its end.
     let progress = match method {
@@ -92,7 +92,7 @@ fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Contr
     };
     let found = interpolate_watched(&input.surface, input.scheme, &options, watch).map_err(|e| input.named(e))?;
     drop(progress);
-    check(arguments, input, wishes, found.method, &found.report, &stop)?;
+    check(arguments, input, per_vertex, found.method, &found.report, &stop)?;
     Ok(Control {
         method: found.method,
         iterations: found.report.iterations,
@@ -109,7 +109,13 @@ fn solved(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Contr
 }
 
 /// All vertices, by sweeps that relax those of one colour at once, without a stored matrix.
-fn by_colour(arguments: &Arguments, input: &Input, wishes: &Wishes, method: Method, stop: &Stop) -> Result<Control> {
+fn by_colour(
+    arguments: &Arguments,
+    input: &Input,
+    per_vertex: &VertexOptions,
+    method: Method,
+    stop: &Stop,
+) -> Result<Control> {
     let start = Instant::now();
     let progress = Progress::open("solving", arguments.common.quiet);
     let surface = &input.surface;
@@ -121,7 +127,7 @@ fn by_colour(arguments: &Arguments, input: &Input, wishes: &Wishes, method: Meth
     let points = numbering.there(surface.positions());
     let (control, report) = by_colours(&operator, &points, omega, stop);
     drop(progress);
-    check(arguments, input, wishes, method.name(), &report, stop)?;
+    check(arguments, input, per_vertex, method.name(), &report, stop)?;
     Ok(Control {
         method: method.name(),
         points: numbering.back(&control),
@@ -134,7 +140,7 @@ fn by_colour(arguments: &Arguments, input: &Input, wishes: &Wishes, method: Meth
 }
 
 /// Zheng & Cai's phase one by its own rule.
-fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Control> {
+fn two_phase(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -> Result<Control> {
     let start = Instant::now();
     let order = arguments.order.order(input.surface.mesh(), input.surface.incidence());
     let phase = PhaseOne {
@@ -143,7 +149,7 @@ fn two_phase(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Co
         eps: arguments.shape.eps,
     };
     let surface = &input.surface;
-    let marks = wishes.interpolated.as_deref();
+    let marks = per_vertex.interpolated.as_deref();
     let found = zheng_cai::auxiliary(surface, marks, &phase)?;
     Ok(Control {
         method: "two-phase",
@@ -169,17 +175,17 @@ fn limit_errors(input: &Input, marks: Option<&[bool]>, control: &[DVec3]) -> Res
     })
 }
 
-fn failed(arguments: &Arguments, input: &Input, wishes: &Wishes, report: &Report, stop: &Stop) -> Failed {
+fn failed(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions, report: &Report, stop: &Stop) -> Failed {
     let chosen = matches!(arguments.method, Choice::Solver(_));
     let system = (&input.surface, input.scheme);
-    Failed::new(system, wishes.interpolated.as_deref(), chosen, report, stop)
+    Failed::new(system, per_vertex.interpolated.as_deref(), chosen, report, stop)
 }
 
 /// A run that did not converge gives no control mesh.
 fn check(
     arguments: &Arguments,
     input: &Input,
-    wishes: &Wishes,
+    per_vertex: &VertexOptions,
     method: &str,
     report: &Report,
     stop: &Stop,
@@ -198,7 +204,7 @@ fn check(
             report.iterations,
             unit * report.last().max,
             unit * stop.tolerance,
-            advice::of_failed(&failed(arguments, input, wishes, report, stop), unit)
+            advice::of_failed(&failed(arguments, input, per_vertex, report, stop), unit)
         ),
     ))
 }

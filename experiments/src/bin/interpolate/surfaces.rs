@@ -1,4 +1,4 @@
-//! From control points, or by schemes that need no system, to what is written.
+//! Surfaces that `interpolate` writes: of the control points, and by schemes that need no system.
 
 use std::time::Instant;
 
@@ -7,15 +7,15 @@ use limitlab::error::Error;
 use limitlab::interpolate::halstead::{self, Energies, Fairness, Weights, fit};
 use limitlab::interpolate::lin_luo;
 use limitlab::interpolate::normals::Rotation;
-use limitlab::interpolate::surface::{Request, SurfaceMesh, surface};
+use limitlab::interpolate::surface::{SurfaceMesh, SurfaceOptions, surface};
 use limitlab::mesh::frame::Frame;
 use limitlab::schemes::Refinement;
 use limitlab::solvers::Errors;
 use limitlab_experiments::cli::Input;
 
-use super::Arguments;
+use super::arguments::Arguments;
 use super::control::{Control, Seconds};
-use super::wishes::Wishes;
+use super::vertex_options::VertexOptions;
 
 pub struct Finished {
     pub method: &'static str,
@@ -28,14 +28,14 @@ pub struct Finished {
     pub seconds: Seconds,
 }
 
-pub fn refine(arguments: &Arguments, input: &Input, wishes: &Wishes, control: Control) -> Result<Finished> {
+pub fn refine(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions, control: Control) -> Result<Finished> {
     let start = Instant::now();
     let flags = &arguments.shape;
-    let request = Request {
+    let request = SurfaceOptions {
         levels: flags.subdivide.into(),
         limit: flags.limit,
         normals: flags.write_normals,
-        constraints: wishes.constraints(),
+        constraints: per_vertex.constraints(),
         rotation: Rotation {
             threshold: flags.normal_threshold.to_radians(),
             tolerance: flags.normal_tolerance.to_radians(),
@@ -60,7 +60,7 @@ pub fn refine(arguments: &Arguments, input: &Input, wishes: &Wishes, control: Co
 }
 
 /// The fairest control mesh, and its surface.
-pub fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<Finished> {
+pub fn fairest(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -> Result<Finished> {
     let start = Instant::now();
     let fairness = Fairness::new(&input.surface)?;
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
@@ -68,14 +68,14 @@ pub fn fairest(arguments: &Arguments, input: &Input, wishes: &Wishes) -> Result<
     let flags = &arguments.shape;
     let weights = Weights { thin_plate: flags.thin_plate, membrane: flags.membrane };
     let points = input.surface.positions();
-    let found = fit(&fairness, points, &wishes.constraints(), weights)?;
+    let found = fit(&fairness, points, &per_vertex.constraints(), weights)?;
     let solve = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let request = Request {
+    let request = SurfaceOptions {
         levels: usize::from(flags.subdivide).saturating_sub(halstead::LEVELS),
         limit: flags.limit,
         normals: flags.write_normals,
-        ..Request::default()
+        ..SurfaceOptions::default()
     };
     let made = surface(found.surface, input.scheme, &[], &request)?;
     Ok(Finished {

@@ -1,4 +1,4 @@
-//! What the items share: where meshes come from, where results go, what they are held against.
+//! Context of a run of `reproduce`: sources of meshes, the folder of results, the reports they are compared with.
 
 use std::path::{Path, PathBuf};
 

@@ -4,7 +4,7 @@ mod claims;
 mod context;
 mod corpus;
 mod figures;
-mod lines;
+mod line_preconditioner;
 mod methods;
 mod omega;
 mod orders;
@@ -71,7 +71,7 @@ const ITEMS: [Item; 15] = [
     sparsity::PATTERNS,
     splitting::LOCAL,
     orders::ORDERS,
-    lines::LINES,
+    line_preconditioner::LINES,
     valences::VALENCES,
     popping::POPPING,
     ripples::RIPPLES,

@@ -2,7 +2,7 @@
 
 use limitlab::Result;
 use limitlab::analysis::spectrum::Extremes;
-use limitlab::analysis::sweep::{Sweep, Thresholds, rounding_floor, sweep};
+use limitlab::analysis::sweep::{OmegaSweep, Thresholds, rounding_floor, sweep};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::method::SOR_OMEGA;
 use limitlab::solvers::{Method, Outcome, Stop};
@@ -27,7 +27,7 @@ const QUICK: usize = 1;
 struct Row<'a> {
     subject: &'a Subject,
     scheme: Scheme,
-    found: &'a Sweep,
+    found: &'a OmegaSweep,
     method: Method<'static>,
 }
 
@@ -84,7 +84,7 @@ fn run(context: &mut Context) -> Result<()> {
 }
 
 /// The sweep on one mesh, with a table and a picture of its own.
-fn one(context: &mut Context, subject: &Subject, scheme: Scheme) -> Result<Sweep> {
+fn one(context: &mut Context, subject: &Subject, scheme: Scheme) -> Result<OmegaSweep> {
     let system = subject.system(scheme)?;
     let grids: Vec<(Method, Vec<f64>)> = METHODS.iter().map(|&m| (m, study::default_grid(m))).collect();
     let size = subject.surface.diagonal();

@@ -1,7 +1,7 @@
-//! Does the order of Gauss-Seidel matter? Zheng-Cai §5 leave it open.
+//! Vertex orders of Gauss-Seidel compared, which Zheng-Cai §5 leave open.
 
 use limitlab::Result;
-use limitlab::analysis::order_study::{Row, order_study, random_spread};
+use limitlab::analysis::order_study::{OrderRow, order_study, random_spread};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::Stop;
 use limitlab_experiments::report::{Column, Columns};
@@ -61,7 +61,7 @@ fn run(context: &mut Context) -> Result<()> {
 }
 
 /// Each order that does not depend on chance, then the random ones at each ω.
-fn lines(rows: &[Row]) -> Vec<Line> {
+fn lines(rows: &[OrderRow]) -> Vec<Line> {
     let alone = rows.iter().filter(|r| !r.order.starts_with("random:"));
     let mut lines: Vec<Line> =
         alone.map(|r| Line { order: r.order.clone(), omega: r.omega, rho: r.rho, sweeps: r.iterations }).collect();

@@ -1,4 +1,4 @@
-//! Lin-Luo §5: how far the unified √3 surface shrinks or bulges over α, the "popping effect".
+//! Popping effect (Lin-Luo §5): shrinking and bulging of the unified √3 surface over α.
 
 use limitlab::Result;
 use limitlab::interpolate::lin_luo::surface::{Popping, popping};

@@ -1,7 +1,7 @@
-//! How much interpolating surfaces ripple, iteration by iteration, against the fairest one (Halstead, Kass & DeRose).
+//! Ripples of interpolating surfaces: fairness energy by iteration, against the fairest surface (Halstead, Kass & DeRose).
 
 use limitlab::Result;
-use limitlab::interpolate::halstead::{Fairness, Row, Weights, fit, follow};
+use limitlab::interpolate::halstead::{Fairness, FairnessRow, Weights, fit, follow};
 use limitlab::interpolate::zheng_cai::Constraints;
 use limitlab::schemes::Scheme;
 use limitlab::schemes::catmull_clark::limit_normals;
@@ -50,10 +50,10 @@ fn run(context: &mut Context) -> Result<()> {
         let rows = rows.iter().filter(move |row| SHOWN.contains(&row.iteration) || row.iteration == last);
         rows.map(move |row| (*name, row))
     });
-    let error = |row: &Row| row.errors.max / size;
-    let thin_plate = |row: &Row| row.energies.thin_plate / fairest.energies.thin_plate;
-    let deviation = |row: &Row| row.deviation_mean.to_degrees();
-    let mut table = Columns::<(&str, &Row)>::new()
+    let error = |row: &FairnessRow| row.errors.max / size;
+    let thin_plate = |row: &FairnessRow| row.energies.thin_plate / fairest.energies.thin_plate;
+    let deviation = |row: &FairnessRow| row.deviation_mean.to_degrees();
+    let mut table = Columns::<(&str, &FairnessRow)>::new()
         .col(Column::key("mesh"), |_| subject.name.clone())
         .col(Column::key("method"), |(name, _)| *name)
         .col(Column::key("iteration"), |(_, row)| row.iteration.to_string())
@@ -71,7 +71,7 @@ fn run(context: &mut Context) -> Result<()> {
          surface at the price of the error shown.",
     );
     context.table(table)?;
-    let panel = |y_label: &str, value: &dyn Fn(&Row) -> f64| LinePlot {
+    let panel = |y_label: &str, value: &dyn Fn(&FairnessRow) -> f64| LinePlot {
         x_label: "max error / L (iterations go to the left)".into(),
         y_label: y_label.into(),
         x_scale: Scale::Log,

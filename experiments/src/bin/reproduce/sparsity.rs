@@ -1,4 +1,4 @@
-//! The pattern of A in several vertex orders.
+//! Sparsity pattern of A in several vertex orders.
 
 use limitlab::Result;
 use limitlab::mesh::order::{Order, inverse};

@@ -1,7 +1,7 @@
-//! What one extraordinary vertex does to the spectrum, and which vertices slow which method.
+//! Spectrum against valence: one extraordinary vertex, and the vertices that slow each method.
 
 use limitlab::Result;
-use limitlab::analysis::valence_study::{Row, regular_band, valence_study};
+use limitlab::analysis::valence_study::{ValenceRow, regular_band, valence_study};
 use limitlab::schemes::Scheme;
 use limitlab_experiments::report::series::Bars;
 use limitlab_experiments::report::{Column, Columns, Figure, LinePlot, Rule};
@@ -28,7 +28,7 @@ fn run(context: &mut Context) -> Result<()> {
         context.figure(&format!("{}--{scheme}", VALENCES.id), &histograms(scheme, &rows))?;
         records.extend(rows.into_iter().map(|row| (scheme, row)));
     }
-    let mut table = Columns::<(Scheme, Row)>::new()
+    let mut table = Columns::<(Scheme, ValenceRow)>::new()
         .col(Column::key("scheme"), |(scheme, _)| scheme.name())
         .col(Column::key("valence"), |(_, row)| row.valence.to_string())
         .col(Column::text("vertices"), |(_, row)| row.vertices.to_string())
@@ -51,7 +51,7 @@ fn run(context: &mut Context) -> Result<()> {
     context.table(table)
 }
 
-fn histograms(scheme: Scheme, rows: &[Row]) -> Figure {
+fn histograms(scheme: Scheme, rows: &[ValenceRow]) -> Figure {
     let band = regular_band(scheme);
     let panels = rows.iter().filter(|r| DRAWN.contains(&r.valence)).map(|row| LinePlot {
         title: format!("valence {}", row.valence),

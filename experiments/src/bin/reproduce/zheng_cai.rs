@@ -13,7 +13,7 @@ use limitlab::Result;
 use limitlab::analysis::dense::gaussian_elimination;
 use limitlab::assemble::LimitSystem;
 use limitlab::schemes::Scheme;
-use limitlab::solvers::gauss_seidel::sweep;
+use limitlab::solvers::system::sweep;
 use limitlab::solvers::{Method, Stop, run as solve, run_watched};
 use limitlab_experiments::report::{Column, Columns};
 

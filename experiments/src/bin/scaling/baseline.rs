@@ -1,6 +1,6 @@
-//! The yardstick: Chebyshev iteration as one would write it first. Index-only in double precision, vertices in file
-//! order, 32-bit neighbours, and one pass over the arrays for each operation: product, residual with its norm,
-//! update. No fusion, no single precision, no order. It belongs to the measurements, not to the library.
+//! Baseline of the measurements: Chebyshev iteration as one would write it first. Index-only in double precision,
+//! vertices in file order, 32-bit neighbours, and one pass over the arrays for each operation: product, residual with
+//! its norm, update. No fusion, no single precision, no order. It belongs to the measurements, not to the library.
 
 use glam::DVec3;
 use limitlab::mesh::{Incidence, Mesh};

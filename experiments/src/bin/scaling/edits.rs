@@ -1,11 +1,11 @@
-//! Local edits beside solving anew, and the decay of the inverse that they live on.
+//! Local updates against full solves, and the decay of the inverse that makes them local.
 
 use std::time::Instant;
 
 use glam::DVec3;
 use limitlab::Result;
 use limitlab::analysis::interval::interval;
-use limitlab::analysis::spectrum::Operator as Which;
+use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::assemble::Operator;
 use limitlab::mesh::breadth_first::in_fronts;
 use limitlab::mesh::{Mesh, Surface};
@@ -118,7 +118,7 @@ pub fn decay_table(operators: &[(String, Operator)]) -> Result<Table> {
         let vertex = operator.len() / 2;
         let rings = decay(operator, vertex, 1e-12);
         let proven = operator.bounds().lambda_min;
-        let least = if proven > 0.0 { proven } else { interval(operator, Which::A)?.low };
+        let least = if proven > 0.0 { proven } else { interval(operator, SymmetricForm::A)?.low };
         let root = (1.0 / least).sqrt();
         let h = operator.weights();
         let greatest = h.iter().copied().fold(0.0, f64::max);

@@ -1,4 +1,4 @@
-//! How time and memory grow with the mesh: `scaling` writes `scaling.{md,csv,png}`, `scaling-threads`, `scaling-profile`,
+//! Time and memory against mesh size: `scaling` writes `scaling.{md,csv,png}`, `scaling-threads`, `scaling-profile`,
 //! `scaling-edits`, `scaling-steps` and `scaling-decay.{md,csv}`.
 
 mod baseline;

@@ -172,7 +172,7 @@ fn iterations<S: System>(system: &S, points: &[DVec3]) -> f64 {
     })
 }
 
-fn waves<P: limitlab::assemble::kernel::Point>(wavefront: &Wavefront, r: &[P]) -> f64 {
+fn waves<P: limitlab::assemble::weights::Point>(wavefront: &Wavefront, r: &[P]) -> f64 {
     let recurrence = Recurrence::new((0.1, 1.0));
     let mut x = r.to_vec();
     let mut scratch = wavefront.scratch();

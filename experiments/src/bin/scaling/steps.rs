@@ -1,4 +1,4 @@
-//! The steps around the solve: topology, validation, explicit assembly, refinement, files.
+//! Time of the steps around the solve: topology, validation, explicit assembly, refinement, files.
 
 use std::path::Path;
 use std::time::Instant;

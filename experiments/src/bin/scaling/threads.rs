@@ -1,4 +1,4 @@
-//! One thread beside all of them: what each method gains, and what STREAM does.
+//! Parallel speed-up: one thread against all of them, for each method and for STREAM.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! From space to the picture: views by name or by angles, orthographic and perspective, framing of given points.
+//! Projection to the image plane: views by name or by angles, orthographic and perspective, framing of given points.
 
 use glam::DVec3;
 

@@ -1,7 +1,7 @@
-//! A picture in its figure: caption, image, colour bar.
+//! Panel of a rendered picture: caption, image, colour bar.
 
 use super::super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Rect, text_width};
-use super::super::figure::{self, FRAME_COLOUR, FRAME_WIDTH, LABEL_SIZE, Slot, TEXT_COLOUR, TICK_SIZE, TITLE_SIZE};
+use super::super::frame::{self, FRAME_COLOUR, FRAME_WIDTH, LABEL_SIZE, Slot, TEXT_COLOUR, TICK_SIZE, TITLE_SIZE};
 use super::super::png::Image;
 use super::scene::Scene;
 use super::{ColourScale, Picture, raster};
@@ -21,7 +21,7 @@ const LONGEST_BAR: f64 = 220.0;
 
 impl Picture {
     pub(in super::super) fn top(&self) -> f64 {
-        figure::title_room(&self.caption)
+        frame::title_room(&self.caption)
     }
 
     pub(in super::super) fn bottom(&self) -> f64 {
@@ -55,7 +55,7 @@ impl Picture {
         }
         // A caption that is longer than its picture is wide is made smaller.
         let size = TITLE_SIZE * (frame.width() / text_width(&self.caption, TITLE_SIZE)?.max(1.0)).min(1.0);
-        let place = (frame.centre().0, frame.top - figure::title_room(&self.caption) + 2.0 + TITLE_SIZE);
+        let place = (frame.centre().0, frame.top - frame::title_room(&self.caption) + 2.0 + TITLE_SIZE);
         canvas.text(&self.caption, place, size, Anchor::Middle, false, TEXT_COLOUR)
     }
 }

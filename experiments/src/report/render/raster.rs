@@ -1,4 +1,4 @@
-//! Which triangle, ball or line is seen in every pixel.
+//! Rasterisation: the triangle, ball or line that is seen in every pixel.
 //!
 //! Corners lie on a grid of 1/256 pixel, so that the coverage of a pixel's centre is decided exactly in integers:
 //! triangles that share an edge neither leave a gap nor draw a pixel twice (a centre on an edge belongs to the

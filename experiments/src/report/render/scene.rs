@@ -1,4 +1,4 @@
-//! From a picture's arrays to what the rasteriser takes: checked, cut into triangles, projected.
+//! Scene of a picture for the rasteriser: arrays checked, cut into triangles, projected.
 
 use std::f64::consts::TAU;
 

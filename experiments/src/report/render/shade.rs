@@ -1,4 +1,4 @@
-//! Light: from a normal and a colour to the colour of a pixel.
+//! Shading: the colour of a pixel from a normal and a colour.
 //!
 //! Everything is in the camera's axes (x right, y up, z to the eye) and treats the line of sight as z. The constants
 //! are tuned by eye; the key light grazes what faces the eye, because that is where ripples hide.

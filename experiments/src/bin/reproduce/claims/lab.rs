@@ -1,4 +1,4 @@
-//! What the claims compute with: meshes at random and by name, and small tools used by several of them.
+//! Meshes at random and by name, and small tools, for the claims.
 
 use std::cell::OnceCell;
 use std::ops::ControlFlow;
@@ -13,7 +13,7 @@ use limitlab::Result;
 use limitlab::analysis::dense;
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
 use limitlab::assemble::LimitSystem;
-use limitlab::mesh::{Mesh, Surface, builtin, generate};
+use limitlab::mesh::{Mesh, Surface, builtin, generate, random};
 use limitlab::solvers::{Method, Outcome, Solution, Stop, run, run_watched};
 
 use crate::context::{Context, Subject};
@@ -41,12 +41,12 @@ impl<'a> Lab<'a> {
     /// Closed polygon meshes at random, all valences at least 3: spheres, tori, sums and unions of those, duals,
     /// quads, mixed polygons, triangles.
     pub fn polygons(&self) -> &[Subject] {
-        self.polygons.get_or_init(|| small("random-polygons", generate::random_polygons))
+        self.polygons.get_or_init(|| small("random-polygons", random::random_polygons))
     }
 
     /// Closed triangle meshes at random.
     pub fn triangles(&self) -> &[Subject] {
-        self.triangles.get_or_init(|| small("random-triangles", generate::random_triangulation))
+        self.triangles.get_or_init(|| small("random-triangles", random::random_triangulation))
     }
 
     /// The closed real models, or stand-ins of several kinds, of at most [`MODEL_VERTICES`] vertices.

@@ -5,7 +5,7 @@ use nalgebra::DVector;
 
 use limitlab::Result;
 use limitlab::analysis::splitting::spectrum::distance_to_space;
-use limitlab::analysis::splitting::thall::{Entry, ThallTables, formula_mask};
+use limitlab::analysis::splitting::thall::{PrintedNumber, ThallTables, formula_mask};
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix, thall_tables};
 use limitlab::schemes::Scheme;
 use limitlab::schemes::catmull_clark::{refine, refine_in_place};
@@ -127,7 +127,7 @@ pub const CLAIMS: &[Claim] = &[
 ];
 
 /// The largest |printed − computed| of the entries chosen; NaN if there is none.
-fn deviation(tables: &ThallTables, choose: impl Fn(&Entry) -> bool) -> f64 {
+fn deviation(tables: &ThallTables, choose: impl Fn(&PrintedNumber) -> bool) -> f64 {
     let chosen: Vec<f64> =
         tables.entries.iter().filter(|e| choose(e)).map(|e| (e.printed - e.computed).abs()).collect();
     if chosen.is_empty() {
@@ -145,7 +145,7 @@ fn or_nan(values: Vec<f64>, fold: fn(Vec<f64>) -> f64) -> f64 {
     if values.is_empty() { f64::NAN } else { fold(values) }
 }
 
-fn is_matrix(e: &Entry) -> bool {
+fn is_matrix(e: &PrintedNumber) -> bool {
     e.item.starts_with("S[")
 }
 
@@ -248,7 +248,7 @@ fn table_1_from(tables: &ThallTables) -> Finding {
 
 fn tables_2_and_3(_: &Lab) -> Result<Finding> {
     let tables = thall_tables()?;
-    let slip = |e: &Entry| e.place == "Table II" && e.item.starts_with("c_3");
+    let slip = |e: &PrintedNumber| e.place == "Table II" && e.item.starts_with("c_3");
     // Column c_3 of Table II is the formula's shift the other way round: two sectors on is one back.
     let other_way = formula_mask(3, 2);
     let printed: Vec<f64> = tables.entries.iter().filter(|e| slip(e)).map(|e| e.printed).collect();

@@ -14,7 +14,7 @@ use limitlab::mesh::Surface;
 use limitlab::mesh::order::Order;
 use limitlab::schemes::doo_sabin::Rule;
 use limitlab::schemes::{Refinement, Scheme};
-use limitlab::solvers::gauss_seidel::sweep;
+use limitlab::solvers::system::sweep;
 use limitlab::solvers::{Method, Outcome, Stop};
 
 use super::finding::{Evidence, Finding};

@@ -1,4 +1,5 @@
-//! Zheng & Cai: the claims about faces of the first refinement, where the surface meets its points.
+//! Zheng and Cai's faces of the first refinement, where the surface meets its points (Z7, Z8, Z14–Z16, Z18, Z21,
+//! Z24, Z25).
 
 use glam::DVec3;
 

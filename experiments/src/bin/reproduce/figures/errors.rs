@@ -1,4 +1,4 @@
-//! Where the errors are, and what they look like where they last.
+//! Maps of interpolation errors, and of the modes in which they last.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! The papers' pictures again: meshes, interpolating surfaces, where the errors are.
+//! Pictures of the papers, rendered anew: meshes, interpolating surfaces, errors.
 //!
 //! A picture is `figures--NAME.png`; the table `figures` says what each shows, on which mesh, and how far the surface
 //! is from the points.

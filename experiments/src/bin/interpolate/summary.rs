@@ -1,15 +1,20 @@
-//! What the program says of a run.
+//! Summary of a run: remarks on standard error, and the JSON object.
 
 use glam::DVec3;
 use limitlab::Result;
 use limitlab_experiments::cli::{self, Input, number};
 use serde_json::{Value, json};
 
+use super::arguments::{Arguments, Choice};
 use super::surfaces::Finished;
-use super::wishes::Wishes;
-use super::{Arguments, Choice};
+use super::vertex_options::VertexOptions;
 
-pub fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Finished) -> Result<()> {
+pub fn print_summary(
+    arguments: &Arguments,
+    input: &Input,
+    per_vertex: &VertexOptions,
+    result: &Finished,
+) -> Result<()> {
     let Finished { made, errors, seconds, .. } = result;
     let common = &arguments.common;
     if !made.not_flattened.is_empty() {
@@ -56,14 +61,14 @@ pub fn tell(arguments: &Arguments, input: &Input, wishes: &Wishes, result: &Fini
         "mean_error": number(errors.mean),
         "tolerance": number(result.tolerance),
         "output": arguments.output.display().to_string(),
-        "interpolated": wishes.interpolated.as_ref().map_or(input.surface.len(), marked),
+        "interpolated": per_vertex.interpolated.as_ref().map_or(input.surface.len(), marked),
         "subdivide": arguments.shape.subdivide,
         "limit": arguments.shape.limit,
         "surface": {
             "vertices": made.surface.len(),
             "faces": made.surface.faces().len(),
         },
-        "normals": wishes.normals.as_ref().map_or(Value::Null, |n| json!({
+        "normals": per_vertex.normals.as_ref().map_or(Value::Null, |n| json!({
             "given": given(n),
             "set": made.normals_set,
         })),

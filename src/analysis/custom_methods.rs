@@ -1,4 +1,4 @@
-//! Methods of a caller's own, run and reported as the methods of the house are.
+//! Custom methods: a caller's own iterations, run and reported as those of the library.
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -21,7 +21,7 @@ pub type Start<'s> =
 /// converged, by a product.
 ///
 /// ```
-/// use limitlab::analysis::own::Own;
+/// use limitlab::analysis::custom_methods::Own;
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Surface, builtin};

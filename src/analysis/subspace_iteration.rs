@@ -51,7 +51,7 @@ pub enum End {
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug)]
-pub struct Request {
+pub struct EigenpairRequest {
     /// The end to count from, inwards.
     pub end: End,
     /// Eigenpairs, counted with multiplicity.
@@ -130,21 +130,21 @@ impl Eigenpairs {
 /// block that memory does not hold, or entries that are not finite.
 ///
 /// ```
-/// use limitlab::analysis::eigen::{End, Request, extreme};
-/// use limitlab::analysis::spectrum::{Operator, symmetric};
+/// use limitlab::analysis::subspace_iteration::{EigenpairRequest, End, extreme};
+/// use limitlab::analysis::symmetric::{SymmetricForm, symmetric};
 /// use limitlab::assemble::LimitSystem;
 /// use limitlab::schemes::Scheme;
 /// use limitlab::mesh::{Surface, builtin};
 ///
 /// let surface = Surface::new(builtin::torus(30, 30))?;
 /// let system = LimitSystem::new(&surface, Scheme::CatmullClark)?;
-/// let request = Request { end: End::Lowest, count: 5, tolerance: 1e-10, spectrum: (0.0, 1.0) };
-/// let pairs = extreme(&symmetric(&system, Operator::A), &request)?;
+/// let request = EigenpairRequest { end: End::Lowest, count: 5, tolerance: 1e-10, spectrum: (0.0, 1.0) };
+/// let pairs = extreme(&symmetric(&system, SymmetricForm::A), &request)?;
 /// // ((2 + cos θ)/3)((2 + cos φ)/3): 1/9 once, the next value four times.
 /// assert_eq!(pairs.clusters(1e-9).iter().map(|c| c.multiplicity).collect::<Vec<_>>(), [1, 4]);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
-pub fn extreme(s: &Csr, request: &Request) -> Result<Eigenpairs> {
+pub fn extreme(s: &Csr, request: &EigenpairRequest) -> Result<Eigenpairs> {
     let n = s.len();
     let width = (request.count + GUARDS).next_multiple_of(LANES);
     if width > WIDEST {

@@ -1,4 +1,4 @@
-//! What is wished of single vertices.
+//! Options of single vertices: whether they are interpolated, normals, shape handles, α.
 
 use glam::DVec3;
 use limitlab::Result;
@@ -7,17 +7,17 @@ use limitlab::interpolate::zheng_cai::Constraints;
 use limitlab::mesh::vertex_data;
 use limitlab_experiments::cli::Input;
 
-use super::ShapeFlags;
+use super::arguments::ShapeFlags;
 
 /// The flags about single vertices, one entry a vertex each.
-pub struct Wishes {
+pub struct VertexOptions {
     pub interpolated: Option<Vec<bool>>,
     pub normals: Option<Vec<Option<DVec3>>>,
     pub handles: Option<Vec<f64>>,
     pub alpha: Option<Vec<f64>>,
 }
 
-impl Wishes {
+impl VertexOptions {
     pub fn read(flags: &ShapeFlags, input: &Input) -> Result<Self> {
         let n = input.surface.len();
         let marks = flags.vertices.as_deref();
@@ -48,7 +48,7 @@ impl Wishes {
                 *a = 1.0;
             }
         }
-        Ok(Wishes { interpolated, normals, handles, alpha })
+        Ok(VertexOptions { interpolated, normals, handles, alpha })
     }
 
     pub fn constraints(&self) -> Constraints<'_> {

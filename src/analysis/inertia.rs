@@ -15,8 +15,8 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::eigen::End;
-use super::spectrum::{Operator, symmetric};
+use super::subspace_iteration::End;
+use super::symmetric::{SymmetricForm, symmetric};
 use crate::assemble::{Csr, LimitSystem};
 use crate::error::{Error, Result};
 
@@ -53,8 +53,8 @@ const ROUNDOFF: f64 = 0.5 * f64::EPSILON;
 ///
 /// # Errors
 /// A factor of more than 4 GiB.
-pub fn certify(system: &LimitSystem, operator: Operator, end: End, estimate: f64) -> Result<Option<Certificate>> {
-    let s = symmetric(system, operator);
+pub fn certify(system: &LimitSystem, form: SymmetricForm, end: End, estimate: f64) -> Result<Option<Certificate>> {
+    let s = symmetric(system, form);
     let symbolic = analyse(&s, SupernodalThreshold::AUTO, MOST_ENTRIES)?;
     let need = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
     let mut memory = MemBuffer::try_new(need).map_err(|_| out_of_memory(s.len()))?;
@@ -111,8 +111,8 @@ const LARGEST_BACKWARD_ERROR: f64 = 1e-11;
 /// # Errors
 /// A factor too large (some 200 000 vertices), a vanishing pivot (σ is an eigenvalue of a leading block), or a
 /// factorization without pivoting that was not stable: then another σ will do.
-pub fn eigenvalues_below(system: &LimitSystem, operator: Operator, sigma: f64) -> Result<Inertia> {
-    inertia(&symmetric(system, operator), sigma)
+pub fn eigenvalues_below(system: &LimitSystem, form: SymmetricForm, sigma: f64) -> Result<Inertia> {
+    inertia(&symmetric(system, form), sigma)
 }
 
 /// The number of eigenvalues of the symmetric matrix `s` below `sigma`, as [`eigenvalues_below`].

@@ -1,10 +1,10 @@
-//! Renumbering along a space-filling curve: which meshes lie scattered through memory, and the way to bring them together.
+//! Renumbering along a space-filling curve, for meshes whose vertices lie scattered through memory.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DVec3;
 
-use super::order::Numbering;
+use super::numbering::Numbering;
 use super::{Faces, Mesh, bounding_box};
 use crate::parallel;
 

@@ -1,9 +1,9 @@
-//! Do the tensor products of regular quads make a preconditioner that pays?
+//! Line preconditioner on quad meshes: iterations, estimated time, and whether it pays.
 
 use glam::DVec3;
 
 use limitlab::Result;
-use limitlab::analysis::lines::{Count, Preconditioner, Regularity, count};
+use limitlab::analysis::line_preconditioner::{Count, LinePreconditioner, Regularity, count};
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::interpolate;
 use limitlab::mesh::noise::move_vertices;
@@ -62,7 +62,7 @@ impl<'a> Row<'a> {
         let stop = Stop { tolerance: TOLERANCE * surface.diagonal(), max_iterations: LIMIT };
         let points = surface.positions();
         let regularity = Regularity::new(&surface);
-        let preconditioner = Preconditioner::new(&system, &regularity)?;
+        let preconditioner = LinePreconditioner::new(&system, &regularity)?;
         let scaled = |r: &[DVec3]| r.iter().zip(&system.h).map(|(r, h)| *r * *h).collect();
         let plain = count(&system, points, &stop, scaled)?;
         let lines = count(&system, points, &stop, |r| preconditioner.apply(r))?;

@@ -1,4 +1,4 @@
-//! Line preconditioner on quad meshes: how regular they are, and whether that pays.
+//! Line preconditioner on quad meshes: tridiagonal solves along lines of edges through regular vertices.
 //!
 //! Where all valences are 4 and all faces quads, Catmull-Clark's symmetric matrix is a tensor product along the two
 //! families of edge lines, M = C ⊗ C with C = tridiag(1, 4, 1), and M⁻¹ is a pass of tridiagonal solves along one
@@ -14,7 +14,7 @@
 //! arcsin((3 − 1)/(3 + 1)) = 30° (Wielandt). As σEx = Ex, both y = C⁻¹Ex and σy lie within 30° of Ex, hence
 //! ⟨x, B x⟩ = ½⟨y, σy⟩ ≥ ½ cos 60° ‖y‖².
 //!
-//! The [`Preconditioner`] adds what is missing at irregular vertices: before and after B, the matrix is solved exactly on
+//! The [`LinePreconditioner`] adds what is missing at irregular vertices: before and after B, the matrix is solved exactly on
 //! the two rings around each, one after the other and back (symmetric multiplicative Schwarz). Then the condition number
 //! is 1.002 on quads refined twice: three iterations in place of thirty. It does not pay all the same: see the
 //! table `lines` of `reproduce`.
@@ -109,7 +109,7 @@ fn chains(surface: &Surface, regular: &[bool]) -> Vec<(Vec<u32>, bool)> {
 }
 
 /// An approximate inverse of Catmull-Clark's M from the chains of a closed mesh; symmetric and positive definite.
-pub struct Preconditioner<'a> {
+pub struct LinePreconditioner<'a> {
     m: &'a Csr,
     regularity: &'a Regularity,
     /// The two places of a regular vertex: chain, and index in it.
@@ -126,7 +126,7 @@ struct Star {
     inverse: DMatrix<f64>,
 }
 
-impl<'a> Preconditioner<'a> {
+impl<'a> LinePreconditioner<'a> {
     /// # Errors
     /// If M is singular on a star: a mesh of a few vertices of valence 3.
     ///
@@ -143,7 +143,7 @@ impl<'a> Preconditioner<'a> {
         }
         let irregular = (0..system.len()).filter(|&v| !regularity.regular[v]);
         let stars = irregular.map(|v| Star::new(&system.m, v)).collect::<Result<_>>()?;
-        Ok(Preconditioner { m: &system.m, regularity, places, stars })
+        Ok(LinePreconditioner { m: &system.m, regularity, places, stars })
     }
 
     /// B r.
@@ -404,7 +404,7 @@ mod tests {
         for name in ["torus:9x7", "irregular-quad:200", "irregular-poly:150"] {
             let mesh = noisy(name);
             let (_, regularity, system) = parts(&mesh);
-            let b = Preconditioner::new(&system, &regularity).unwrap();
+            let b = LinePreconditioner::new(&system, &regularity).unwrap();
             let x = &mesh.positions;
             let y: Vec<DVec3> = x.iter().rev().copied().collect();
             let dot = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
@@ -423,7 +423,7 @@ mod tests {
         let mesh = noisy("quad-sphere:4");
         let (_, regularity, system) = parts(&mesh);
         let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 100 };
-        let b = Preconditioner::new(&system, &regularity).unwrap();
+        let b = LinePreconditioner::new(&system, &regularity).unwrap();
         let plain = |r: &[DVec3]| r.iter().zip(&system.h).map(|(r, h)| *r * *h).collect();
         let [plain, lines] = [
             count(&system, &mesh.positions, &stop, plain).unwrap(),
@@ -438,6 +438,6 @@ mod tests {
     #[test]
     fn a_singular_matrix_is_refused() {
         let (_, regularity, system) = parts(&builtin::builtin("cube").unwrap());
-        assert!(Preconditioner::new(&system, &regularity).is_err());
+        assert!(LinePreconditioner::new(&system, &regularity).is_err());
     }
 }
