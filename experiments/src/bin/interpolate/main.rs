@@ -5,6 +5,7 @@ mod surfaces;
 mod tell;
 mod wishes;
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -16,12 +17,14 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::error::Error;
+use limitlab::mesh::features::Tags;
+use limitlab::mesh::file_tags::Subdivision;
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, io};
 use limitlab::output::{allow_replacing, check_target};
 use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::Method;
-use limitlab_experiments::cli::{self, CommonFlags, MeshFlags, StopFlags};
+use limitlab_experiments::cli::{self, CommonFlags, MeshFlags, StopFlags, subdivision_of};
 
 use control::control_mesh;
 use surfaces::{fairest, keeping, leave, refine, require_finite, unified};
@@ -34,10 +37,10 @@ use wishes::Wishes;
 #[derive(Parser)]
 #[command(name = "interpolate", version)]
 struct Arguments {
-    /// A mesh file (.obj, .off, .ply) or a built-in name
+    /// A mesh file (.obj, .off, .ply, .usda) or a built-in name
     #[arg(value_name = "MESH")]
     input: String,
-    /// The mesh to write (.obj, .off, .ply): the control mesh, or the surface with --subdivide or --limit
+    /// The mesh to write (.obj, .off, .ply, .usda): the control mesh, or the surface with --subdivide or --limit
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
@@ -82,7 +85,7 @@ struct ShapeFlags {
     #[arg(long, value_name = "LIST|FILE")]
     vertices: Option<String>,
     /// Normals of the surface at given points: a file with lines `vertex nx ny nz`, or a mesh file with normals
-    /// (.obj, .off, .ply). Loop, √3 and Catmull-Clark turn rings of the mesh refined twice or more, Doo-Sabin tilts faces
+    /// (.obj, .off, .ply, .usda). Loop, √3 and Catmull-Clark turn rings of the mesh refined twice or more, Doo-Sabin tilts faces
     #[arg(long, value_name = "FILE")]
     normals: Option<PathBuf>,
     /// Turn rings only where the normal is off by more than this angle in degrees
@@ -241,14 +244,27 @@ fn run(arguments: &Arguments) -> Result<()> {
         allow_replacing(&arguments.output)?;
     }
     let made = &result.made;
-    match input.welded.as_ref().filter(|_| made.surface.len() == input.surface.len()) {
-        None => io::write(&arguments.output, made.surface.mesh(), made.normals.as_deref())?,
+    let (normals, levels) = (made.normals.as_deref(), arguments.shape.subdivide);
+    // The surface itself is its faces; refined control meshes have other edges than the tags.
+    let is_control = !arguments.shape.limit && levels == 0;
+    let subdivision = if is_control { subdivision_of(input.scheme) } else { Subdivision::None };
+    // The fairest control mesh is refined too.
+    let has_edges = is_control && made.surface.len() == input.surface.len();
+    let tags = if has_edges { input.file_tags() } else { Cow::Owned(Tags::default()) };
+    let write = |mesh: &Mesh, normals: Option<&[DVec3]>| {
+        io::write_control(&arguments.output, mesh, normals, subdivision, &tags)
+    };
+    let remark = match input.welded.as_ref().filter(|_| made.surface.len() == input.surface.len()) {
+        None => write(made.surface.mesh(), normals)?,
         // The file's own vertices and faces, one position for each that was made one.
         Some((place, faces)) => {
             let spread = |values: &[DVec3]| -> Vec<DVec3> { place.iter().map(|&v| values[v as usize]).collect() };
             let mesh = Mesh::new(spread(made.surface.positions()), faces.clone());
-            io::write(&arguments.output, &mesh, made.normals.as_deref().map(spread).as_deref())?;
+            write(&mesh, normals.map(spread).as_deref())?
         }
+    };
+    if let Some(remark) = remark {
+        arguments.common.remark(format_args!("{}: {remark}", arguments.output.display()));
     }
     result.seconds.write = start.elapsed().as_secs_f64();
     tell(arguments, &input, &wishes, &result)
