@@ -11,7 +11,7 @@ fn files(c: &mut Criterion) {
     let folder = tempfile::tempdir().expect("a folder");
     let mut group = c.benchmark_group("files");
     group.sample_size(10);
-    for ending in ["off", "obj", "ply"] {
+    for ending in ["off", "obj", "ply", "usda"] {
         let path = folder.path().join(format!("mesh.{ending}"));
         io::write(&path, &mesh, None).expect("a file");
         let bytes = std::fs::metadata(&path).expect("a file").len();

@@ -191,6 +191,31 @@ impl<'a> Scanner<'a> {
         Some(number)
     }
 
+    /// The floating-point number here among marks: it ends at white space, a comma, a bracket, a `;` or a `#` too.
+    /// Otherwise `None`, and the place stays.
+    pub fn number_in_list(&mut self) -> Option<f64> {
+        let rest = self.rest();
+        let word = &rest[..word_in_list(rest)];
+        let number = match short_decimal(word) {
+            Some((number, _)) => number,
+            None => std::str::from_utf8(word).ok()?.parse().ok()?,
+        };
+        self.at += word.len();
+        Some(number)
+    }
+
+    /// The whole number here among marks, if it fits 32 bits. Otherwise `None`, and the place stays.
+    pub fn unsigned_in_list(&mut self) -> Option<u32> {
+        let rest = self.rest();
+        let (value, length) = leading_digits(rest)?;
+        if rest.get(length).is_some_and(|&b| !ends_word_in_list(b)) {
+            return None;
+        }
+        let value = u32::try_from(value).ok()?;
+        self.at += length;
+        Some(value)
+    }
+
     /// Begins a table of rows.
     pub fn begin_rows(&mut self) {
         self.rows = Rows::First { of_first_table: matches!(self.rows, Rows::None) };
@@ -400,6 +425,15 @@ fn is_separator(b: u8) -> bool {
     is_blank(b) || is_line_end(b) || b == b'\\'
 }
 
+/// How long the word here is, among marks.
+pub(crate) fn word_in_list(rest: &[u8]) -> usize {
+    rest.iter().position(|&b| ends_word_in_list(b)).unwrap_or(rest.len())
+}
+
+fn ends_word_in_list(b: u8) -> bool {
+    is_separator(b) || matches!(b, b',' | b'(' | b')' | b'[' | b']' | b'{' | b'}' | b';' | b'=' | b'#' | b'"')
+}
+
 /// Whether a line is continued here: at a backslash that is the last character of it or of the file.
 pub(crate) fn continues_line(rest: &[u8]) -> bool {
     matches!(rest, [b'\\'] | [b'\\', b'\n' | b'\r', ..])
@@ -413,6 +447,45 @@ pub(crate) fn push_number(text: &mut Vec<u8>, x: f64) -> io::Result<()> {
     } else {
         write!(text, "{x}")
     }
+}
+
+/// Appends a number of at most nine significant digits, which hold every number in single precision; `nan` and `inf` for
+/// what is not finite.
+pub(crate) fn push_nine_digits(text: &mut Vec<u8>, x: f64) -> io::Result<()> {
+    const LEAST: i32 = -4;
+    const TENS: [f64; 13] = [1e-4, 1e-3, 1e-2, 1e-1, 1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8];
+    const POWERS: [f64; 13] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12];
+    let size = x.abs();
+    if x.is_nan() {
+        text.extend_from_slice(b"nan");
+        return Ok(());
+    }
+    if !(TENS[0]..1e9).contains(&size) {
+        let rounded = if size == 0.0 || !x.is_finite() { x } else { format!("{x:.8e}").parse().unwrap_or(x) };
+        return push_number(text, rounded);
+    }
+    // Nine digits as a whole number, of which so many are decimals. The formatting machinery would take most of a
+    // writer's time.
+    let above = TENS.iter().take_while(|&&ten| ten <= size).count();
+    let mut decimals = (9 - LEAST) as usize - above;
+    let mut digits = (size * POWERS[decimals]).round() as u64;
+    while decimals > 0 && digits.is_multiple_of(10) {
+        digits /= 10;
+        decimals -= 1;
+    }
+    if x < 0.0 {
+        text.push(b'-');
+    }
+    let unit = POWERS[decimals] as u64;
+    push_unsigned(text, digits / unit);
+    if decimals > 0 {
+        text.push(b'.');
+        let start = text.len();
+        // A leading 1 keeps the zeros behind the point.
+        push_unsigned(text, unit + digits % unit);
+        text.remove(start);
+    }
+    Ok(())
 }
 
 /// Appends the three coordinates, separated by spaces.

@@ -9,7 +9,10 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Faces, Mesh, obj, obj_normals, off, ply};
+use super::features::Tags;
+use super::file_tags::{FileTags, Subdivision};
+use super::validate::Boundary;
+use super::{Faces, Mesh, obj, obj_normals, off, ply, usd};
 use crate::memory::require;
 use crate::output::write_file;
 use crate::{Error, Result};
@@ -23,9 +26,13 @@ pub struct Loaded {
     pub mesh: Mesh,
     /// Where each vertex and face stands; `None` for binary files.
     pub lines: Option<Lines>,
-    /// One normal a vertex, as in the file: not checked, not normalised. OFF and PLY only; for OBJ see
+    /// One normal a vertex, as in the file: not checked, not normalised. OFF, PLY and USD only; for OBJ see
     /// [`read_normals`].
     pub normals: Option<Vec<DVec3>>,
+    /// What is sharp. OBJ and USD only.
+    pub tags: FileTags,
+    /// The scheme that the file is made for, if it says that. USD only.
+    pub subdivision: Option<Subdivision>,
     /// What a user should know, a sentence each: above all what the file holds and the mesh does not keep.
     pub remarks: Vec<String>,
 }
@@ -47,6 +54,7 @@ enum Format {
     Obj,
     Off,
     Ply,
+    Usd,
 }
 
 impl Format {
@@ -56,9 +64,15 @@ impl Format {
             "obj" => Ok(Format::Obj),
             "off" => Ok(Format::Off),
             "ply" => Ok(Format::Ply),
+            "usda" => Ok(Format::Usd),
+            "usd" | "usdc" | "usdz" => {
+                Err(Error::parse(path, None, "USD is read and written as text only: let the name end in .usda"))
+            }
             // Standard streams, and the pipes that shells make, have names without ending.
             "" if path.starts_with("/dev") => Ok(Format::Obj),
-            _ => Err(Error::parse(path, None, "not a known mesh format: the name must end in .obj, .off or .ply")),
+            _ => {
+                Err(Error::parse(path, None, "not a known mesh format: the name must end in .obj, .off, .ply or .usda"))
+            }
         }
     }
 
@@ -77,6 +91,7 @@ impl Format {
                 Format::Obj => obj::check_head(&bytes[..lines], path),
                 Format::Off => off::check_head(&bytes[..lines], path),
                 Format::Ply => ply::check_head(&bytes[..lines], path),
+                Format::Usd => usd::check_head(&bytes[..lines], path),
             }?;
             let size = file.metadata().map_err(refused)?.len();
             require(BYTES * size, || format!("{}: the mesh", path.display()), "use a smaller one")?;
@@ -99,7 +114,7 @@ pub fn check_name(path: &Path) -> Result<()> {
     Format::of(path).map(|_| ())
 }
 
-/// Reads a mesh file, whose extension (`.obj`, `.off` or `.ply` in any case) names its format; what lies in `/dev` and
+/// Reads a mesh file, whose extension (`.obj`, `.off`, `.ply` or `.usda` in any case) names its format; what lies in `/dev` and
 /// has none is OBJ.
 ///
 /// # Errors
@@ -112,6 +127,7 @@ pub fn read(path: &Path) -> Result<Loaded> {
         Format::Obj => obj::read_bytes(&bytes, path),
         Format::Off => off::read_bytes(&bytes, path),
         Format::Ply => ply::read_bytes(&bytes, path),
+        Format::Usd => usd::read_bytes(&bytes, path),
     }
 }
 
@@ -132,7 +148,8 @@ pub fn read_normals(path: &Path) -> Result<Option<Vec<DVec3>>> {
 }
 
 /// Writes a mesh file, with `normals` (one a vertex) if given, in the format that the extension names. All doubles
-/// read back equal. The file appears as a whole or not at all ([`write_file`]).
+/// read back equal, but from USD, which holds [nine digits](usd::write_control_to). The file appears as a whole or not at
+/// all ([`write_file`]).
 ///
 /// # Errors
 /// [`Error::Parse`] for an unknown extension, [`Error::Io`] if the file cannot be written.
@@ -140,12 +157,50 @@ pub fn read_normals(path: &Path) -> Result<Option<Vec<DVec3>>> {
 /// # Panics
 /// If there are not as many normals as vertices.
 pub fn write(path: &Path, mesh: &Mesh, normals: Option<&[DVec3]>) -> Result<()> {
+    write_control(path, mesh, normals, Subdivision::None, &Tags::default()).map(drop)
+}
+
+/// As [`write()`], a control mesh: with its sharp edges and vertices and the rule of its boundary, where the format has
+/// them (OBJ, USD), and the scheme that refines it, where the format knows that (USD). What a reader would miss is said.
+///
+/// # Errors
+/// As [`write()`].
+///
+/// # Panics
+/// If there are not as many normals as vertices.
+pub fn write_control(
+    path: &Path,
+    mesh: &Mesh,
+    normals: Option<&[DVec3]>,
+    subdivision: Subdivision,
+    tags: &Tags,
+) -> Result<Option<&'static str>> {
     let format = Format::of(path)?;
     write_file(path, |out| match format {
-        Format::Obj => obj::write_to(out, mesh, normals),
+        Format::Obj => {
+            obj::write_to(out, mesh, normals)?;
+            obj::write_tags_to(out, tags)
+        }
         Format::Off => off::write_to(out, mesh, normals),
         Format::Ply => ply::write_to(out, mesh, normals),
+        Format::Usd => usd::write_control_to(out, mesh, normals, subdivision, tags),
+    })?;
+    let has_sharp = !(tags.creases.is_empty() && tags.corners.is_empty());
+    Ok(match format {
+        Format::Obj | Format::Usd => None,
+        Format::Off | Format::Ply if has_sharp => Some("creases and corners are not written: use .usda or .obj"),
+        // Edge-and-corner is what is taken where a file says nothing.
+        Format::Off | Format::Ply if matches!(tags.boundary, Boundary::EdgeOnly | Boundary::AsInterior) => {
+            Some("the rule of the boundary is not written: use .usda or .obj")
+        }
+        Format::Off | Format::Ply => None,
     })
+}
+
+/// What is wrong with a face of fewer than three corners.
+pub(super) fn few_corners(face: usize, size: usize) -> String {
+    let s = if size == 1 { "" } else { "s" };
+    format!("face {face} has {size} corner{s}, a face needs at least 3: remove it")
 }
 
 pub(super) fn check_normals(mesh: &Mesh, normals: Option<&[DVec3]>) {
@@ -230,9 +285,7 @@ impl Builder {
     pub fn end_face(&mut self, line: usize) -> std::result::Result<(), String> {
         let size = self.corners.len() - self.offsets[self.faces()] as usize;
         if size < 3 {
-            let face = self.faces();
-            let s = if size == 1 { "" } else { "s" };
-            return Err(format!("face {face} has {size} corner{s}, a face needs at least 3: remove it"));
+            return Err(few_corners(self.faces(), size));
         }
         let Ok(end) = u32::try_from(self.corners.len()) else {
             return Err("more face corners than 32-bit indices can name".into());
@@ -250,6 +303,8 @@ impl Builder {
             mesh: Mesh::new(self.positions, Faces::from_parts(self.offsets, self.corners)),
             lines: self.lines,
             normals,
+            tags: FileTags::default(),
+            subdivision: None,
             remarks,
         }
     }
@@ -271,7 +326,7 @@ mod tests {
     fn formats_are_known_by_extension() {
         let folder = tempfile::tempdir().unwrap();
         let mesh = Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], Faces::from_lists([[0, 1, 2]]));
-        for name in ["a.obj", "a.OFF", "a.Ply"] {
+        for name in ["a.obj", "a.OFF", "a.Ply", "a.Usda"] {
             let path = folder.path().join(name);
             write(&path, &mesh, None).unwrap();
             let loaded = read(&path).unwrap();
@@ -286,8 +341,12 @@ mod tests {
             let path = folder.path().join(name);
             for error in [write(&path, &mesh, None).err(), read(&path).err()] {
                 let text = error.unwrap().to_string();
-                assert!(text.ends_with("must end in .obj, .off or .ply"), "{text}");
+                assert!(text.ends_with("must end in .obj, .off, .ply or .usda"), "{text}");
             }
+        }
+        for name in ["a.usd", "a.usdc", "a.USDZ"] {
+            let text = check_name(Path::new(name)).unwrap_err().to_string();
+            assert!(text.ends_with("let the name end in .usda"), "{text}");
         }
     }
 

@@ -1,7 +1,7 @@
 //! Magic numbers: what a file is, by its first bytes, where it is no text of points and faces.
 
 /// First bytes of what is met under the name of a mesh file, what it is, and what to do.
-const KNOWN: [(&[u8], &str); 20] = [
+const KNOWN: [(&[u8], &str); 22] = [
     (b"\xFF\xFE", UTF_16),
     (b"\xFE\xFF", UTF_16),
     (b"\0", "it begins with zero bytes: it is binary, or was damaged when it was copied"),
@@ -14,14 +14,16 @@ const KNOWN: [(&[u8], &str); 20] = [
     (b"version https://git-lfs", "it is a pointer of Git LFS: fetch the file itself (git lfs pull)"),
     (b"ply", "it is a PLY file: let its name end in .ply"),
     (b"OFF", "it is an OFF file: let its name end in .off"),
+    (b"#usda", "it is a USD file: let its name end in .usda"),
+    (b"PXR-USDC", "it is binary USD: save it as text, .usda"),
     (b"solid", "it is an STL file: convert it, and weld its vertices"),
-    (b"glTF", "it is a glTF file: convert it to .obj, .off or .ply"),
-    (b"Kaydara FBX", "it is an FBX file: convert it to .obj, .off or .ply"),
-    (b"DRACO", "it is a Draco file: convert it to .obj, .off or .ply"),
-    (b"# vtk DataFile", "it is a VTK file: convert it to .obj, .off or .ply"),
-    (b"ISO-10303-21", "it is a STEP file: convert it to .obj, .off or .ply"),
+    (b"glTF", "it is a glTF file: convert it to .obj, .off, .ply or .usda"),
+    (b"Kaydara FBX", "it is an FBX file: convert it to .obj, .off, .ply or .usda"),
+    (b"DRACO", "it is a Draco file: convert it to .obj, .off, .ply or .usda"),
+    (b"# vtk DataFile", "it is a VTK file: convert it to .obj, .off, .ply or .usda"),
+    (b"ISO-10303-21", "it is a STEP file: convert it to .obj, .off, .ply or .usda"),
     (b"<", "it is XML or HTML: if it was downloaded, this is the page and not the file"),
-    (b"{", "it is JSON: convert the mesh in it to .obj, .off or .ply"),
+    (b"{", "it is JSON: convert the mesh in it to .obj, .off, .ply or .usda"),
 ];
 
 const UTF_16: &str = "it is text in UTF-16 or UTF-32: save it as UTF-8 or ASCII";

@@ -6,13 +6,16 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::Mesh;
+use super::features::Tags;
+use super::file_tags::{CornerTag, CreaseTag, FileTags, check_sharpness};
 use super::io::{Builder, Lines, Loaded, check_normals, write_rows};
 use super::magic::other_kind;
-use crate::text::{Scanner, continues_line, leading_digits, push_point, push_unsigned};
+use super::validate::Boundary;
+use crate::text::{Scanner, continues_line, leading_digits, push_number, push_point, push_unsigned};
 use crate::{Error, Result};
 
 /// Statements that are read over, by what they are about.
-const DROPPED: [(&str, &[&[u8]]); 8] = [
+const DROPPED: [(&str, &[&[u8]]); 9] = [
     ("texture coordinates (vt)", &[b"vt"]),
     ("normals (vn)", &[b"vn"]),
     ("group names (g, o)", &[b"g", b"o"]),
@@ -20,6 +23,7 @@ const DROPPED: [(&str, &[&[u8]]); 8] = [
     ("material statements", &[b"usemtl", b"mtllib", b"usemap", b"maplib"]),
     ("lines (l)", &[b"l"]),
     ("points (p)", &[b"p"]),
+    ("tags that are not of sharpness (t)", &[b"t"]),
     (
         "free-form and display statements",
         &[
@@ -58,12 +62,15 @@ const NAMES: [&[u8]; 6] = [b"g", b"o", b"usemtl", b"mtllib", b"usemap", b"maplib
 ///
 /// Corners may be `v`, `v/vt`, `v//vn`, `v/vt/vn`, and negative to count back from the last vertex read so far; a
 /// backslash continues a statement of numbers, but no name, for Windows paths may end with it. One remark names with counts what
-/// the mesh does not keep: all other statements, weights and colours after coordinates. Another tells if the last line has no end, for an OBJ file announces no
+/// the mesh does not keep: all other statements but OpenSubdiv's tags of sharpness (vertices from 0 there),
+/// `t crease 2/1/0 a b sharpness`, `t corner 1/1/0 v sharpness` and `t interpolateboundary 1/0/0 k` (k: 0 none, 1 edge and
+/// corner, 2 edge only), of which a line may hold several edges or vertices, with a sharpness for all or one each; weights and colours after coordinates. Another tells if the last line has no end, for an OBJ file announces no
 /// counts by which a cut could be noticed.
 ///
 /// # Errors
 /// [`Error::Parse`] with the line: another kind of file; a coordinate that is no number, a corner that is none or that reaches before the
-/// first vertex, a face of fewer than three corners; a file without any vertex.
+/// first vertex, a face of fewer than three corners; a tag of sharpness of another form, of a vertex that there is not, or
+/// a negative one; a file without any vertex.
 ///
 /// ```
 /// use limitlab::mesh::obj::read_bytes;
@@ -78,6 +85,7 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     let mut builder = Builder::new(Some(Lines::default()));
     let mut dropped = [0usize; DROPPED.len()];
     let (mut weighted, mut unequal, mut coloured) = (0usize, 0usize, 0usize);
+    let mut tags = TagLines::default();
     let mut not_continued = None;
     let mut unknown: Option<(usize, Error)> = None;
     loop {
@@ -116,6 +124,10 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
                     builder.corner(corner(&mut s, &builder)?);
                 }
                 builder.end_face(line).map_err(at)?;
+            }
+            b"t" if is_sharpness(&s) => {
+                s.advance(1);
+                tags.read(&mut s, line)?;
             }
             keyword => {
                 match kind_of(keyword) {
@@ -165,10 +177,18 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
             "a backslash ends line {line}, whose statement is not one of numbers: the next line is read for itself"
         ));
     }
+    if tags.boundary_is_none {
+        remarks.push(
+            "the tag interpolateboundary is 0, by which faces at a boundary have no surface: the rule is that of --boundary"
+                .into(),
+        );
+    }
     if s.ends_within_a_line() {
         remarks.push("the last line has no end: was the file cut off?".into());
     }
-    Ok(builder.finish(path, None, remarks))
+    tags.found.check_vertices(path, builder.vertices())?;
+    let loaded = builder.finish(path, None, remarks);
+    Ok(Loaded { tags: tags.found, ..loaded })
 }
 
 /// Refuses the first bytes of a file, whole lines, if all that they hold is no OBJ.
@@ -228,6 +248,113 @@ pub(super) fn skip_statement(s: &mut Scanner, keyword: &[u8]) -> bool {
             return has_backslash;
         }
     }
+}
+
+/// Whether the tag here is one of sharpness.
+fn is_sharpness(s: &Scanner) -> bool {
+    let mut place = s.clone();
+    place.advance(1);
+    skip_blanks(&mut place);
+    matches!(place.peek_token(), b"crease" | b"corner" | b"interpolateboundary")
+}
+
+/// The tags of sharpness read so far, with the numbers of the present one.
+#[derive(Default)]
+struct TagLines {
+    found: FileTags,
+    boundary_is_none: bool,
+    whole: Vec<u32>,
+    numbers: Vec<f64>,
+}
+
+impl TagLines {
+    /// Reads a tag of sharpness from its name on.
+    fn read(&mut self, s: &mut Scanner, line: usize) -> Result<()> {
+        skip_blanks(s);
+        let name = s.token();
+        let of = String::from_utf8_lossy(name);
+        skip_blanks(s);
+        let refuse = || s.unexpected(format_args!("how many numbers the tag {of} has, such as 2/1/0"));
+        let [whole, numbers, words] = tag_counts(s.peek_token()).ok_or_else(refuse)?;
+        s.token();
+        self.whole.clear();
+        self.numbers.clear();
+        for k in 0..whole {
+            skip_blanks(s);
+            let refuse = |s: &Scanner| s.unexpected(format_args!("whole number {} of {whole} of the tag {of}", k + 1));
+            let number = s.unsigned();
+            self.whole.push(number.ok_or_else(|| refuse(s))?);
+        }
+        for k in 0..numbers {
+            skip_blanks(s);
+            let number = s.number();
+            let refuse = |s: &Scanner| s.unexpected(format_args!("sharpness {} of {numbers} of the tag {of}", k + 1));
+            let number = number.ok_or_else(|| refuse(s))?;
+            check_sharpness(number).map_err(|what| s.error(format!("the tag {of} has {what}")))?;
+            self.numbers.push(number);
+        }
+        let mut skipped = 0;
+        skip_blanks(s);
+        while skipped < words && !s.at_line_end() {
+            s.token();
+            skip_blanks(s);
+            skipped += 1;
+        }
+        if !s.at_line_end() {
+            return Err(
+                s.unexpected(format_args!("the end of the tag {of}, which has {whole}/{numbers}/{words} values"))
+            );
+        }
+        let each = match name {
+            b"crease" => 2,
+            _ => 1,
+        };
+        let items = self.whole.len() / each;
+        let is_rule = name == b"interpolateboundary";
+        let fits = self.whole.len().is_multiple_of(each)
+            && if is_rule { (items, self.numbers.len()) == (1, 0) } else { [1, items].contains(&self.numbers.len()) };
+        if !fits || items == 0 {
+            let form = match name {
+                b"crease" => "`t crease 2/1/0 a b sharpness`, or 2n/n/0",
+                b"corner" => "`t corner 1/1/0 vertex sharpness`, or n/n/0",
+                _ => "`t interpolateboundary 1/0/0 rule`",
+            };
+            return Err(
+                s.error_at(line, format!("the tag {of} has {whole}/{numbers}/{words} values: the form is {form}"))
+            );
+        }
+        if is_rule {
+            let rule = match self.whole[0] {
+                0 => None,
+                1 => Some(Boundary::EdgeAndCorner),
+                2 => Some(Boundary::EdgeOnly),
+                other => {
+                    let what = "is no interpolateboundary: use 0 (none), 1 (edge and corner) or 2 (edge only)";
+                    return Err(s.error_at(line, format!("{other} {what}")));
+                }
+            };
+            self.boundary_is_none = rule.is_none();
+            self.found.boundary = rule;
+            return Ok(());
+        }
+        let line = u32::try_from(line).unwrap_or(u32::MAX);
+        for (k, vertices) in self.whole.chunks_exact(each).enumerate() {
+            let sharpness = self.numbers[if self.numbers.len() == 1 { 0 } else { k }];
+            match *vertices {
+                [a, b] => self.found.creases.push(CreaseTag { ends: [a, b], sharpness, line }),
+                [vertex] => self.found.corners.push(CornerTag { vertex, sharpness, line }),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The three counts of a tag: whole numbers, numbers, words.
+fn tag_counts(token: &[u8]) -> Option<[u32; 3]> {
+    let mut parts = std::str::from_utf8(token).ok()?.split('/').map(|part| part.parse().ok());
+    let counts = [parts.next()??, parts.next()??, parts.next()??];
+    parts.next().is_none().then_some(counts)
 }
 
 fn coordinates(s: &mut Scanner, vertex: usize) -> Result<DVec3> {
@@ -328,6 +455,36 @@ pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> 
             }
         }
         Ok(())
+    })
+}
+
+/// Writes the sharp edges and vertices and the rule of the boundary as OpenSubdiv's tags, a line each; a boundary that is
+/// treated as interior is its rule 0.
+pub fn write_tags_to(out: &mut dyn Write, tags: &Tags) -> io::Result<()> {
+    let rule = match tags.boundary {
+        Boundary::AsInterior => Some(0),
+        Boundary::EdgeAndCorner => Some(1),
+        Boundary::EdgeOnly => Some(2),
+        Boundary::Refuse => None,
+    };
+    if let Some(rule) = rule {
+        writeln!(out, "t interpolateboundary 1/0/0 {rule}")?;
+    }
+    write_rows(out, tags.creases.len(), |text, k| {
+        let ([a, b], sharpness) = tags.creases[k];
+        text.extend_from_slice(b"t crease 2/1/0 ");
+        push_unsigned(text, a.into());
+        text.push(b' ');
+        push_unsigned(text, b.into());
+        text.push(b' ');
+        push_number(text, sharpness)
+    })?;
+    write_rows(out, tags.corners.len(), |text, k| {
+        let (vertex, sharpness) = tags.corners[k];
+        text.extend_from_slice(b"t corner 1/1/0 ");
+        push_unsigned(text, vertex.into());
+        text.push(b' ');
+        push_number(text, sharpness)
     })
 }
 
@@ -447,6 +604,61 @@ mod tests {
             ("g a\nPK\u{3}\u{4} x\ny\n", "a.obj, line 2: \"PK\\u{3}\\u{4}\" is not an OBJ statement"),
         ] {
             assert_eq!(refusal(text), message);
+        }
+    }
+
+    #[test]
+    fn tags_of_opensubdiv_are_read_at_their_lines_and_written() {
+        let tags = "t crease 2/1/0 0 1 10\nt crease 4/2/0 1 2 2 \\\n0 3 inf # two\nt crease 4/1/0 0 1 1 2 2.5\n\
+                    t corner 1/1/0 2 10\nt corner 2/1/1 0 1 4 word\nt interpolateboundary 1/0/0 2\nt hole 1/0/0 0\n";
+        let loaded = parse(&format!("{tags}{TRIANGLE}f 1 2 3\n")).unwrap();
+        let creases: Vec<_> = loaded.tags.creases.iter().map(|c| (c.ends, c.sharpness, c.line)).collect();
+        let expected =
+            [([0, 1], 10.0, 1), ([1, 2], 3.0, 2), ([2, 0], f64::INFINITY, 2), ([0, 1], 2.5, 4), ([1, 2], 2.5, 4)];
+        assert_eq!(creases, expected);
+        let corners: Vec<_> = loaded.tags.corners.iter().map(|c| (c.vertex, c.sharpness, c.line)).collect();
+        assert_eq!(corners, [(2, 10.0, 5), (0, 4.0, 6), (1, 4.0, 6)]);
+        assert_eq!(loaded.tags.boundary, Some(Boundary::EdgeOnly));
+        assert_eq!(loaded.remarks, ["not kept: 1 tags that are not of sharpness (t)"]);
+
+        let given = Tags {
+            boundary: Boundary::EdgeAndCorner,
+            creases: vec![([0, 1], 10.0), ([2, 1], f64::INFINITY)],
+            corners: vec![(2, 0.1)],
+        };
+        let mut text = format!("{TRIANGLE}f 1 2 3\n").into_bytes();
+        write_tags_to(&mut text, &given).unwrap();
+        let loaded = read_bytes(&text, Path::new("a.obj")).unwrap();
+        assert_eq!(loaded.tags.boundary, Some(Boundary::EdgeAndCorner));
+        assert_eq!(loaded.tags.creases.iter().map(|c| (c.ends, c.sharpness)).collect::<Vec<_>>(), given.creases);
+        assert_eq!(loaded.tags.corners.iter().map(|c| (c.vertex, c.sharpness)).collect::<Vec<_>>(), given.corners);
+        let rule = |rule: u8| parse(&format!("{TRIANGLE}t interpolateboundary 1/0/0 {rule}\n")).unwrap();
+        assert_eq!((rule(0).tags.boundary, rule(0).remarks.len()), (None, 1));
+        assert_eq!((rule(1).tags.boundary, rule(1).remarks.len()), (Some(Boundary::EdgeAndCorner), 0));
+    }
+
+    #[test]
+    fn tags_of_another_form_are_told_at_their_line() {
+        for (tag, start) in [
+            ("crease", "the line ends where how many numbers the tag crease has, such as 2/1/0 should be"),
+            ("crease 2/1 0 1 10", "\"2/1\" is not how many numbers the tag crease has"),
+            ("crease 2/1/0 0 1", "the line ends where sharpness 1 of 1 of the tag crease should be"),
+            ("crease 2/1/0 0 -1 10", "\"-1\" is not whole number 2 of 2 of the tag crease"),
+            ("crease 2/1/0 0 1 10 10", "\"10\" is not the end of the tag crease, which has 2/1/0 values"),
+            ("crease 3/1/0 0 1 2 10", "the tag crease has 3/1/0 values: the form is `t crease 2/1/0 a b sharpness`"),
+            ("crease 6/2/0 0 1 1 2 2 0 10 10", "the tag crease has 6/2/0 values"),
+            ("crease 0/1/0 10", "the tag crease has 0/1/0 values"),
+            ("crease 2/1/0 0 1 -3", "the tag crease has the sharpness -3: a number from 0 on is needed"),
+            ("crease 4000000000/1/0 0 1", "the line ends where whole number 3 of 4000000000 of the tag crease"),
+            ("crease 2/1/0 0 3 10", "vertex 3 is not in the mesh: it has 3, numbered from 0"),
+            ("corner 1/1/0 0 nan", "the tag corner has the sharpness NaN"),
+            ("corner 1/0/0 0", "the tag corner has 1/0/0 values: the form is `t corner 1/1/0 vertex sharpness`"),
+            ("corner 1/1/0 9 10", "vertex 9 is not in the mesh"),
+            ("interpolateboundary 1/0/0 3", "3 is no interpolateboundary: use 0 (none), 1 (edge and corner) or 2"),
+            ("interpolateboundary 1/1/0 1 1", "the tag interpolateboundary has 1/1/0 values"),
+        ] {
+            let text = refusal(&format!("{TRIANGLE}t {tag}\n"));
+            assert!(text.starts_with(&format!("a.obj, line 4: {start}")), "{text}");
         }
     }
 

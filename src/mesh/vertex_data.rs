@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::features::checked;
+use super::file_tags::{check_corner, check_crease, not_there};
 use super::io::{self, has_mesh_ending};
 use super::{Surface, magic};
 use crate::error::{Error, Result};
@@ -102,11 +102,7 @@ pub fn creases(path: &Path, surface: &Surface) -> Result<Vec<([u32; 2], f64)>> {
     let mut creases = Vec::new();
     lines(path, surface.len(), "a b sharpness", |line, ends: [usize; 2], [sharpness]: [f64; 1]| {
         let ends = ends.map(|v| v as u32);
-        let refuse = |what: String| Error::parse(path, Some(line), format!("edge {}–{} {what}", ends[0], ends[1]));
-        if surface.incidence().half_edge(surface.faces(), ends).is_none() {
-            return Err(refuse("is not in the mesh: its vertices, numbered from 0, share no edge".into()));
-        }
-        checked(sharpness).map_err(refuse)?;
+        check_crease(path, line, surface, ends, ends, sharpness)?;
         creases.push((ends, sharpness));
         Ok(())
     })?;
@@ -120,7 +116,7 @@ pub fn creases(path: &Path, surface: &Surface) -> Result<Vec<([u32; 2], f64)>> {
 pub fn corners(path: &Path, vertices: usize) -> Result<Vec<(u32, f64)>> {
     let mut corners = Vec::new();
     lines(path, vertices, "vertex sharpness", |line, [v]: [usize; 1], [sharpness]: [f64; 1]| {
-        checked(sharpness).map_err(|what| Error::parse(path, Some(line), format!("vertex {v} {what}")))?;
+        check_corner(path, line, v as u32, sharpness)?;
         corners.push((v as u32, sharpness));
         Ok(())
     })?;
@@ -175,7 +171,7 @@ fn lines<const V: usize, const K: usize>(
             return Err(s.unexpected(format_args!("the end of a line `{form}`")));
         }
         if let Some(vertex) = ends.iter().find(|&&v| v >= vertices) {
-            return Err(s.error(format!("vertex {vertex} is not in the mesh: it has {vertices}, numbered from 0")));
+            return Err(s.error(not_there(vertex, vertices)));
         }
         visit(line, ends, row)?;
     }

@@ -1,4 +1,4 @@
-//! Any bytes through the readers: of the three mesh formats, of normals in OBJ files, of lists of vertices, normals and
+//! Any bytes through the readers: of the four mesh formats, of normals in OBJ files, of lists of vertices, normals and
 //! numbers. What is refused is refused in one line; what is read can be written, and reads back equal.
 
 use std::fmt::Debug;
@@ -22,11 +22,15 @@ const SMALL: usize = 10_000;
 /// The first byte chooses the reader, the others are the file.
 pub fn check(data: &[u8]) {
     let Some((&kind, bytes)) = data.split_first() else { return };
-    match kind % 6 {
-        3 => vertices(bytes),
-        4 => normals(bytes),
-        5 => numbers(bytes),
-        format => mesh(&FORMATS[format as usize], bytes),
+    // Bytes that the corpus has keep their readers.
+    match kind {
+        6 | 192.. => mesh(&FORMATS[3], bytes),
+        _ => match kind % 6 {
+            3 => vertices(bytes),
+            4 => normals(bytes),
+            5 => numbers(bytes),
+            format => mesh(&FORMATS[format as usize], bytes),
+        },
     }
 }
 
@@ -42,9 +46,13 @@ fn one_line(text: &str) {
 
 fn mesh(format: &Format, bytes: &[u8]) {
     let path = Path::new("x.mesh");
-    let Some(Loaded { mesh, lines, normals, remarks, .. }) = accepted((format.read)(bytes, path)) else { return };
+    let Some(Loaded { mesh, lines, normals, remarks, tags, .. }) = accepted((format.read)(bytes, path)) else { return };
     assert!(lines.iter().all(|l| l.vertices.len() == mesh.len() && l.faces.len() == mesh.faces.len()));
     remarks.iter().for_each(|remark| one_line(remark));
+    let vertices = tags.creases.iter().flat_map(|c| c.ends).chain(tags.corners.iter().map(|c| c.vertex));
+    assert!(vertices.max().is_none_or(|v| (v as usize) < mesh.len()));
+    let sharpnesses = tags.creases.iter().map(|c| c.sharpness).chain(tags.corners.iter().map(|c| c.sharpness));
+    assert!(sharpnesses.into_iter().all(|s| s >= 0.0));
     let finite = mesh.positions.iter().all(|p| p.is_finite());
     let lines = lines.as_ref().map(|l| (&l.vertices[..], &l.faces[..]));
     for boundary in [Boundary::Refuse, Boundary::AsInterior] {

@@ -22,7 +22,7 @@ use limitlab_experiments::cli::{self, CommonFlags, MeshFlags};
 #[derive(Parser)]
 #[command(name = "assemble", version)]
 struct Arguments {
-    /// A mesh file (.obj, .off, .ply) or a built-in name
+    /// A mesh file (.obj, .off, .ply, .usda) or a built-in name
     #[arg(value_name = "MESH")]
     input: String,
     /// Folder for the five files

@@ -21,7 +21,7 @@ use limitlab_experiments::studies::comparison::{self as study, Asked};
 #[derive(Parser)]
 #[command(name = "compare-solvers", version)]
 struct Arguments {
-    /// Mesh files (.obj, .off, .ply), built-in names, or folders with M.mtx, H.mtx and P.mtx; torus:32x32 with --noise 0.1 unless told
+    /// Mesh files (.obj, .off, .ply, .usda), built-in names, or folders with M.mtx, H.mtx and P.mtx; torus:32x32 with --noise 0.1 unless told
     #[arg(value_name = "MESH|SYSTEM_DIR")]
     meshes: Vec<String>,
     /// Methods, separated by commas, auto among them; all unless told

@@ -34,7 +34,7 @@ use limitlab_experiments::report::{Column, Columns, Figure, LinePlot, Rule, Tabl
 #[derive(Parser)]
 #[command(name = "spectrum", version)]
 struct Arguments {
-    /// Mesh files (.obj, .off, .ply), built-in names, or folders with M.mtx, H.mtx and P.mtx; unless told, four
+    /// Mesh files (.obj, .off, .ply, .usda), built-in names, or folders with M.mtx, H.mtx and P.mtx; unless told, four
     /// built-in ones with --noise 0.1
     #[arg(value_name = "MESH|SYSTEM_DIR")]
     meshes: Vec<String>,

@@ -24,7 +24,7 @@ use limitlab_experiments::studies::sweep as study;
 #[derive(Parser)]
 #[command(name = "sweep-omega", version)]
 struct Arguments {
-    /// Mesh files (.obj, .off, .ply), built-in names, or folders with M.mtx, H.mtx and P.mtx; unless
+    /// Mesh files (.obj, .off, .ply, .usda), built-in names, or folders with M.mtx, H.mtx and P.mtx; unless
     /// told, four built-in ones with --noise 0.1
     #[arg(value_name = "MESH|SYSTEM_DIR")]
     meshes: Vec<String>,

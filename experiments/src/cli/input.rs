@@ -13,6 +13,7 @@ use limitlab::assemble::Stages;
 use limitlab::error::{Error, Result, short};
 use limitlab::interpolate::solver::require_memory;
 use limitlab::mesh::features::{Features, Rule, SHARP, Tags, creases_by_angle};
+use limitlab::mesh::file_tags::{FileTags, Subdivision};
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::io::{self, Loaded, has_mesh_ending};
 use limitlab::mesh::noise::{Noise, move_vertices};
@@ -32,18 +33,18 @@ pub struct MeshFlags {
     /// Move every vertex by a Gaussian of standard deviation A × the mean edge length, from SEED (1 unless told)
     #[arg(long, value_name = "A[:SEED]")]
     pub noise: Option<Noise>,
-    /// An open mesh: edge-and-corner (boundary edges are sharp, vertices with one face are corners) unless told, edge-only
-    /// (the curve is smooth there), as-interior (boundary vertices as interior ones: loop, sqrt3 and mid-edge only) or refuse
+    /// An open mesh: edge-and-corner (boundary edges are sharp, vertices with one face are corners) unless told here or in
+    /// the file, edge-only (the curve is smooth there), as-interior (boundary vertices as interior ones: loop, sqrt3 and mid-edge only) or refuse
     #[arg(long, value_name = "RULE")]
     pub boundary: Option<Boundary>,
     /// Make one vertex of those at the same position: seams are closed; the control mesh keeps the file's vertices
     #[arg(long)]
     pub weld: bool,
-    /// Sharp edges: a file with lines `a b sharpness`, vertices numbered from 0; 10 and more is sharp for ever,
-    /// less is taken 1 at each level (semi-sharp: catmull-clark and loop)
+    /// Sharp edges, beside those of the mesh file (.usda, .obj): a file with lines `a b sharpness`, vertices numbered from
+    /// 0; 10 and more is sharp for ever, less is taken 1 at each level (semi-sharp: catmull-clark and loop)
     #[arg(long, value_name = "FILE")]
     pub creases: Option<PathBuf>,
-    /// Sharp vertices: a file with lines `vertex sharpness`
+    /// Sharp vertices, beside those of the mesh file (.usda, .obj): a file with lines `vertex sharpness`
     #[arg(long, value_name = "FILE")]
     pub corners: Option<PathBuf>,
     /// Make edges sharp whose faces meet at more than this angle between their normals, in degrees
@@ -65,6 +66,8 @@ pub struct Input {
     /// Where the file's own points lie: all lengths of this mesh times [`Frame::scale`] are in mesh units.
     pub frame: Frame,
     pub scheme: Scheme,
+    /// What is sharp, by the file and by the flags. The rule of the boundary is to refuse it where there is none.
+    pub tags: Tags,
     /// Where the vertices of the file went, and its faces, with --weld.
     pub welded: Option<(Vec<u32>, Faces)>,
     /// Reading the file or making the built-in mesh.
@@ -117,6 +120,8 @@ impl MeshFlags {
             mesh: builtin::builtin(name)?,
             lines: None,
             normals: None,
+            tags: FileTags::default(),
+            subdivision: None,
             remarks: Vec::new(),
         })
     }
@@ -133,7 +138,7 @@ impl MeshFlags {
         let mut results = Vec::with_capacity(names.len());
         for name in names {
             let loaded = self.loaded(name.as_ref(), common)?;
-            results.push(validate(&loaded.mesh, numbers(&loaded.lines), self.rule()));
+            results.push(validate(&loaded.mesh, numbers(&loaded.lines), self.rule(&loaded.tags)));
         }
         super::print_results(&results)?;
         Ok(true)
@@ -159,13 +164,14 @@ impl MeshFlags {
         let loaded = self.loaded(name, common)?;
         let read_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let Loaded { mut mesh, mut lines, .. } = loaded;
+        let Loaded { mut mesh, mut lines, tags, subdivision, .. } = loaded;
         let welded = self.weld.then(|| self.welded(name, &mut mesh, &mut lines, common)).flatten();
-        let surface = Surface::examined(mesh, numbers(&lines), self.rule()).map_err(|report| {
+        let surface = Surface::examined(mesh, numbers(&lines), self.rule(&tags)).map_err(|report| {
             report.remarks.iter().for_each(|remark| common.remark(format_args!("{name}: {remark}")));
             Error::mesh(name, advice::of_defects(&report))
         })?;
-        let mut surface = self.with_features(name, surface, common)?;
+        let place = welded.as_ref().map(|(place, _)| &place[..]);
+        let (mut surface, tags) = self.with_features(name, surface, (&tags, place), common)?;
         for remark in surface.remarks() {
             common.remark(format_args!("{name}: {remark}"));
         }
@@ -178,6 +184,10 @@ impl MeshFlags {
             common.remark(format_args!("{name}: scheme {scheme} (choose with --scheme)"));
             scheme
         });
+        if let Some(asked) = subdivision.filter(|&asked| asked != Subdivision::None && asked != subdivision_of(scheme))
+        {
+            common.remark(format_args!("{name}: the file asks for {asked} (choose with --scheme)"));
+        }
         let label = match self.noise {
             Some(noise) => format!("{name} --noise {noise}"),
             None => name.to_owned(),
@@ -188,6 +198,7 @@ impl MeshFlags {
             surface,
             frame,
             scheme,
+            tags,
             welded,
             read_seconds,
             check_seconds: start.elapsed().as_secs_f64(),
@@ -224,14 +235,21 @@ impl MeshFlags {
         Some((place, faces))
     }
 
-    /// What boundary edges are.
-    fn rule(&self) -> Boundary {
-        self.boundary.unwrap_or(Boundary::EdgeAndCorner)
+    /// What boundary edges are: by the flag, by the file, or as the programs take them.
+    fn rule(&self, of_file: &FileTags) -> Boundary {
+        self.boundary.or(of_file.boundary).unwrap_or(Boundary::EdgeAndCorner)
     }
 
-    /// The mesh with the sharp edges and vertices that are asked for; refused if nine tenths of its boundary are a seam,
-    /// unless that is wanted.
-    fn with_features(&self, name: &str, surface: Surface, common: &CommonFlags) -> Result<Surface> {
+    /// The mesh with the sharp edges and vertices that its file and the flags ask for, and these; refused if nine tenths of
+    /// its boundary are a seam, unless the flag says that it is wanted: files say what boundaries are whether there are any or
+    /// not.
+    fn with_features(
+        &self,
+        name: &str,
+        surface: Surface,
+        of_file: (&FileTags, Option<&[u32]>),
+        common: &CommonFlags,
+    ) -> Result<(Surface, Tags)> {
         if let (None, Some((edges, [a, b]))) = (self.boundary, seams(&surface)) {
             let all = surface.boundary_edges();
             let of = if edges == all { format!("all {all}") } else { format!("{edges} of {all}") };
@@ -240,7 +258,7 @@ impl MeshFlags {
                 common.remark(format_args!(
                     "{name}: {of} boundary edges lie on each other (first: vertices {a} and {b}): seams, which --weld closes"
                 ));
-                return self.with_tags(name, surface);
+                return self.with_tags(name, surface, of_file);
             }
             let which = if self.weld { "" } else { "use --weld to make one of them, or " };
             return Err(Error::mesh(
@@ -251,24 +269,32 @@ impl MeshFlags {
                 ),
             ));
         }
-        self.with_tags(name, surface)
+        self.with_tags(name, surface, of_file)
     }
 
-    fn with_tags(&self, name: &str, surface: Surface) -> Result<Surface> {
-        if self.creases.is_none() && self.corners.is_none() && self.crease_angle.is_none() {
-            return Ok(surface);
+    fn with_tags(
+        &self,
+        name: &str,
+        surface: Surface,
+        (of_file, place): (&FileTags, Option<&[u32]>),
+    ) -> Result<(Surface, Tags)> {
+        let rule = self.rule(of_file);
+        let rule_there = if surface.is_closed() { Boundary::Refuse } else { rule };
+        if of_file.is_empty() && self.creases.is_none() && self.corners.is_none() && self.crease_angle.is_none() {
+            return Ok((surface, Tags { boundary: rule_there, ..Tags::default() }));
         }
-        let mut tags = Tags { boundary: self.rule(), ..Tags::default() };
+        let mut tags = of_file.checked(Path::new(name), &surface, place, rule)?;
         if let Some(path) = &self.creases {
-            tags.creases = vertex_data::creases(path, &surface)?;
+            tags.creases.extend(vertex_data::creases(path, &surface)?);
         }
         if let Some(degrees) = self.crease_angle {
             tags.creases.extend(creases_by_angle(&surface, degrees).into_iter().map(|ends| (ends, SHARP)));
         }
         if let Some(path) = &self.corners {
-            tags.corners = vertex_data::corners(path, surface.len())?;
+            tags.corners.extend(vertex_data::corners(path, surface.len())?);
         }
-        surface.tagged(&tags).map_err(|e| Error::mesh(name, e.to_string()))
+        let surface = surface.tagged(&tags).map_err(|e| Error::mesh(name, e.to_string()))?;
+        Ok((surface, Tags { boundary: rule_there, ..tags }))
     }
 
     /// Adds the noise to the points of a valid mesh, and takes them to their frame; or a vertex, and what is wrong there.
@@ -286,6 +312,15 @@ impl MeshFlags {
         })?;
         frame.enter(surface.positions_mut());
         Ok(frame)
+    }
+}
+
+/// What the scheme is to a subdivision tool: the faces themselves where tools do not have it.
+pub fn subdivision_of(scheme: Scheme) -> Subdivision {
+    match scheme {
+        Scheme::CatmullClark => Subdivision::CatmullClark,
+        Scheme::Loop => Subdivision::Loop,
+        Scheme::Sqrt3 | Scheme::Nasri | Scheme::ZhengCai | Scheme::MidEdge => Subdivision::None,
     }
 }
 
@@ -346,6 +381,37 @@ impl Input {
             self.frame.leave(points.to_mut());
         }
         points
+    }
+
+    /// What is sharp, in the vertices of the file: with --weld, on every face at the edge, and at every vertex there.
+    pub fn file_tags(&self) -> Cow<'_, Tags> {
+        let Some((place, faces)) = &self.welded else { return Cow::Borrowed(&self.tags) };
+        let ordered = |[a, b]: [u32; 2]| if a < b { [a, b] } else { [b, a] };
+        let mut sharp: Vec<_> = self.tags.creases.iter().map(|&(ends, sharpness)| (ordered(ends), sharpness)).collect();
+        // Of an edge that is named twice the greater one counts, and comes first.
+        sharp.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+        sharp.dedup_by_key(|&mut (ends, _)| ends);
+        let mut creases = Vec::new();
+        if !sharp.is_empty() {
+            for face in faces.iter() {
+                for (k, &a) in face.iter().enumerate() {
+                    let ends = [a, face[(k + 1) % face.len()]];
+                    let there = ordered(ends.map(|v| place[v as usize]));
+                    if let Ok(at) = sharp.binary_search_by_key(&there, |&(ends, _)| ends) {
+                        creases.push((ordered(ends), sharp[at].1));
+                    }
+                }
+            }
+        }
+        creases.sort_by_key(|&(ends, _)| ends);
+        creases.dedup_by_key(|&mut (ends, _)| ends);
+        let mut sharpness = vec![0.0_f64; self.surface.len()];
+        for &(v, s) in &self.tags.corners {
+            sharpness[v as usize] = s.max(sharpness[v as usize]);
+        }
+        let at = |v: usize| sharpness[place[v] as usize];
+        let corners = (0..place.len()).filter(|&v| at(v) > 0.0).map(|v| (v as u32, at(v))).collect();
+        Cow::Owned(Tags { boundary: self.tags.boundary, creases, corners })
     }
 
     /// The largest coordinate of the given points, in mesh units.

@@ -7,7 +7,7 @@ mod problem;
 mod process;
 mod progress;
 
-pub use input::{Input, MeshFlags, STAND_IN_NOISE};
+pub use input::{Input, MeshFlags, STAND_IN_NOISE, subdivision_of};
 pub use json::print_json;
 pub use problem::{Given, Problem, Subject};
 pub use process::{exit, say};

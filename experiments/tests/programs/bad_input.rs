@@ -163,7 +163,7 @@ fn missing_files_folders_and_unknown_names() {
     assert!(line.contains("cube") && line.contains("quad-sphere:K"), "the names are listed: {line}");
     fs::write(folder.path().join("mesh.stl"), "solid").unwrap();
     let line = assert_all_refuse(&folder, "mesh.stl", &[]);
-    assert!(line.contains(".obj, .off or .ply"), "{line}");
+    assert!(line.contains(".obj, .off, .ply or .usda"), "{line}");
     let line = assert_all_refuse(&folder, "cube", &["--scheme", "loop"]);
     assert!(line.contains("face 0 has 4 corners"), "{line}");
 }
@@ -171,7 +171,7 @@ fn missing_files_folders_and_unknown_names() {
 #[test]
 fn garbage_is_refused_in_every_format() {
     let noise: Vec<u8> = (0..4000u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
-    for name in ["x.obj", "x.off", "x.ply"] {
+    for name in ["x.obj", "x.off", "x.ply", "x.usda"] {
         for bytes in [&b""[..], b"\n\n\n", b"\0\0\0\0", b"\xff\xfe\xfd", b"hello world\n", &noise] {
             refused(name, bytes);
         }
@@ -202,7 +202,7 @@ fn garbage_is_refused_in_every_format() {
 fn truncated_files_are_refused() {
     let folder = tempdir().unwrap();
     let mesh = noisy("icosphere:1");
-    for name in ["good.obj", "good.off", "good.ply"] {
+    for name in ["good.obj", "good.off", "good.ply", "good.usda"] {
         let path = folder.path().join(name);
         io::write(&path, &mesh, None).unwrap();
         let bytes = fs::read(&path).unwrap();
@@ -216,7 +216,7 @@ fn truncated_files_are_refused() {
 fn numbers_that_are_not_finite_are_refused_with_their_place() {
     let folder = tempdir().unwrap();
     let mesh = built_in("octahedron");
-    for name in ["x.obj", "x.off", "x.ply"] {
+    for name in ["x.obj", "x.off", "x.ply", "x.usda"] {
         for bad in [f64::NAN, f64::INFINITY] {
             let mut mesh = mesh.clone();
             mesh.positions[4].y = bad;
@@ -473,7 +473,7 @@ fn the_output_s_name_tells_its_format() {
     for name in ["v", "v.stl", "v.obj.bak"] {
         let output = run(INTERPOLATE, folder.path(), ["cube", "-o", name, "--quiet", "--method", "pia"]);
         let line = assert_refused(&output, name);
-        assert!(line.contains(name) && line.contains(".obj, .off or .ply"), "{line}");
+        assert!(line.contains(name) && line.contains(".obj, .off, .ply or .usda"), "{line}");
     }
     #[cfg(unix)]
     {

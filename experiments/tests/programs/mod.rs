@@ -7,6 +7,7 @@ mod metadata;
 mod process;
 mod results;
 mod systems;
+mod tags;
 
 use std::fs;
 use std::path::Path;

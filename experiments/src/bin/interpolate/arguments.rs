@@ -17,10 +17,10 @@ use limitlab_experiments::cli::{self, CommonFlags, MeshFlags, StopFlags};
 #[derive(Parser)]
 #[command(name = "interpolate", version)]
 pub struct Arguments {
-    /// A mesh file (.obj, .off, .ply) or a built-in name
+    /// A mesh file (.obj, .off, .ply, .usda) or a built-in name
     #[arg(value_name = "MESH")]
     pub input: String,
-    /// The mesh to write (.obj, .off, .ply): the control mesh, or the surface with --subdivide or --limit
+    /// The mesh to write (.obj, .off, .ply, .usda): the control mesh, or the surface with --subdivide or --limit
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
@@ -65,7 +65,7 @@ pub struct ShapeFlags {
     #[arg(long, value_name = "LIST|FILE")]
     pub vertices: Option<String>,
     /// Normals of the surface at given points: a file with lines `vertex nx ny nz`, or a mesh file with normals
-    /// (.obj, .off, .ply). Loop, √3 and Catmull-Clark turn rings of the mesh refined twice or more, Doo-Sabin tilts faces
+    /// (.obj, .off, .ply, .usda). Loop, √3 and Catmull-Clark turn rings of the mesh refined twice or more, Doo-Sabin tilts faces
     #[arg(long, value_name = "FILE")]
     pub normals: Option<PathBuf>,
     /// Turn rings only where the normal is off by more than this angle in degrees

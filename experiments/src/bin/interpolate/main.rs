@@ -6,6 +6,7 @@ mod summary;
 mod surfaces;
 mod vertex_options;
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -16,10 +17,12 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::error::Error;
+use limitlab::mesh::features::Tags;
+use limitlab::mesh::file_tags::Subdivision;
 use limitlab::mesh::{Mesh, io};
 use limitlab::output::{allow_replacing, check_target};
 use limitlab::schemes::Scheme;
-use limitlab_experiments::cli;
+use limitlab_experiments::cli::{self, subdivision_of};
 
 use arguments::{Arguments, Choice, conflict};
 use control::control_mesh;
@@ -118,14 +121,27 @@ fn run(arguments: &Arguments) -> Result<()> {
         allow_replacing(&arguments.output)?;
     }
     let made = &result.made;
-    match input.welded.as_ref().filter(|_| made.surface.len() == input.surface.len()) {
-        None => io::write(&arguments.output, made.surface.mesh(), made.normals.as_deref())?,
+    let (normals, levels) = (made.normals.as_deref(), arguments.shape.subdivide);
+    // The surface itself is its faces; refined control meshes have other edges than the tags.
+    let is_control = !arguments.shape.limit && levels == 0;
+    let subdivision = if is_control { subdivision_of(input.scheme) } else { Subdivision::None };
+    // The fairest control mesh is refined too.
+    let has_edges = is_control && made.surface.len() == input.surface.len();
+    let tags = if has_edges { input.file_tags() } else { Cow::Owned(Tags::default()) };
+    let write = |mesh: &Mesh, normals: Option<&[DVec3]>| {
+        io::write_control(&arguments.output, mesh, normals, subdivision, &tags)
+    };
+    let remark = match input.welded.as_ref().filter(|_| made.surface.len() == input.surface.len()) {
+        None => write(made.surface.mesh(), normals)?,
         // The file's own vertices and faces, one position for each that was made one.
         Some((place, faces)) => {
             let spread = |values: &[DVec3]| -> Vec<DVec3> { place.iter().map(|&v| values[v as usize]).collect() };
             let mesh = Mesh::new(spread(made.surface.positions()), faces.clone());
-            io::write(&arguments.output, &mesh, made.normals.as_deref().map(spread).as_deref())?;
+            write(&mesh, normals.map(spread).as_deref())?
         }
+    };
+    if let Some(remark) = remark {
+        arguments.common.remark(format_args!("{}: {remark}", arguments.output.display()));
     }
     result.seconds.write = start.elapsed().as_secs_f64();
     print_summary(arguments, &input, &per_vertex, &result)

@@ -1,0 +1,135 @@
+//! Sharpness in files: read by the programs, written by `interpolate`, read again.
+
+use std::fs;
+
+use limitlab::mesh::io;
+use limitlab::mesh::validate::Boundary;
+use tempfile::tempdir;
+
+use super::{INTERPOLATE, assert_done, assert_refused, json, run, run_on, text};
+
+/// The edges at the top of the built-in cube, as lines `a b sharpness`.
+fn top_of_cube() -> String {
+    let cube = limitlab::mesh::builtin::builtin("cube").unwrap();
+    let top = cube.faces.face(5);
+    (0..4).map(|k| format!("{} {} 10\n", top[k], top[(k + 1) % 4])).collect()
+}
+
+#[test]
+fn a_control_mesh_keeps_its_tags_in_usd_and_obj() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("top.txt"), top_of_cube()).unwrap();
+    let lone = fs::read_to_string(folder.path().join("top.txt")).unwrap()[..1].to_owned();
+    fs::write(folder.path().join("corner.txt"), format!("{lone} 12\n")).unwrap();
+    let tags = ["--creases", "top.txt", "--corners", "corner.txt"];
+    for (cage, again) in [("cage.usda", "again.usda"), ("cage.obj", "again.obj")] {
+        let solved = |arguments: &[&str]| {
+            let output =
+                run(INTERPOLATE, folder.path(), [arguments, &["--json", "--scheme", "catmull-clark"]].concat());
+            assert_done(&output, cage);
+            (json(&output), text(&output.stderr).to_owned())
+        };
+        let (first, _) = solved(&[&["cube", "-o", cage][..], &tags].concat());
+        assert_eq!((&first["creases"], &first["corners"]), (&4.into(), &1.into()));
+        let loaded = io::read(&folder.path().join(cage)).unwrap();
+        assert_eq!((loaded.tags.creases.len(), loaded.tags.corners.len()), (4, 1));
+        assert!(loaded.tags.creases.iter().all(|c| c.sharpness == 10.0));
+        assert_eq!(loaded.tags.corners[0].sharpness, 12.0);
+        // A closed mesh has no rule of its boundary.
+        assert_eq!(loaded.tags.boundary, None);
+        // The file alone has the same effect as the flags.
+        let (second, remarks) = solved(&[cage, "-o", again]);
+        assert_eq!(second["blocks"], first["blocks"]);
+        assert!(!remarks.contains("asks for"), "{remarks}");
+        assert_eq!(io::read(&folder.path().join(again)).unwrap().tags.creases.len(), 4);
+        // Tags of file and flags add up.
+        fs::write(folder.path().join("other.txt"), "0 10\n7 10\n").unwrap();
+        let (third, _) = solved(&[cage, "-o", again, "--corners", "other.txt"]);
+        assert!(third["corners"].as_u64() >= Some(2), "{third}");
+    }
+    // The surface itself is its faces.
+    let output = run(INTERPOLATE, folder.path(), ["icosphere:1", "-o", "surface.usda", "--subdivide", "1"]);
+    assert_done(&output, "surface");
+    let surface = fs::read_to_string(folder.path().join("surface.usda")).unwrap();
+    assert!(surface.contains("subdivisionScheme = \"none\""), "{surface}");
+    let cage = fs::read_to_string(folder.path().join("cage.usda")).unwrap();
+    assert!(cage.contains("subdivisionScheme = \"catmullClark\""), "{cage}");
+    // Formats without tags say so.
+    for (name, told) in [("cage.off", true), ("cage.ply", true), ("cage.obj", false)] {
+        let output = run(INTERPOLATE, folder.path(), [&["cube", "-o", name][..], &tags].concat());
+        assert_done(&output, name);
+        let remark = format!("{name}: creases and corners are not written: use .usda or .obj");
+        assert_eq!(text(&output.stderr).contains(&remark), told, "{}", text(&output.stderr));
+    }
+}
+
+/// Two quads beside each other, by a scheme and with more properties from line 7 on.
+fn open_scene(scheme: &str, more: &str) -> String {
+    format!(
+        "#usda 1.0\ndef Mesh \"m\"\n{{\nuniform token subdivisionScheme = \"{scheme}\"\n\
+         point3f[] points = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (1, 1, 1), (2, 1, 0)]\n\
+         int[] faceVertexCounts = [4, 4] int[] faceVertexIndices = [0, 1, 4, 3, 1, 2, 5, 4]\n{more}\n}}\n"
+    )
+}
+
+#[test]
+fn the_file_s_rule_of_the_boundary_holds_unless_the_flag_is_given() {
+    let folder = tempdir().unwrap();
+    let rule = "uniform token interpolateBoundary = \"edgeOnly\"";
+    fs::write(folder.path().join("a.usda"), open_scene("loop", rule)).unwrap();
+    let corners = |flags: &[&str], output: &str| {
+        let arguments = [&["a.usda", "-o", output, "--json"][..], flags].concat();
+        let run = run(INTERPOLATE, folder.path(), arguments);
+        assert_done(&run, output);
+        assert!(text(&run.stderr).contains("a.usda: the file asks for loop"), "{}", text(&run.stderr));
+        (json(&run)["corners"].as_u64().unwrap(), io::read(&folder.path().join(output)).unwrap().tags.boundary)
+    };
+    assert_eq!(corners(&[], "b.usda"), (0, Some(Boundary::EdgeOnly)));
+    assert_eq!(corners(&[], "b.obj"), (0, Some(Boundary::EdgeOnly)));
+    let flag = ["--boundary", "edge-and-corner"];
+    assert_eq!(corners(&flag, "b.usda"), (4, Some(Boundary::EdgeAndCorner)));
+    assert_eq!(corners(&flag, "b.obj"), (4, Some(Boundary::EdgeAndCorner)));
+}
+
+#[test]
+fn tags_of_a_file_are_told_at_their_line() {
+    let folder = tempdir().unwrap();
+    let crease = |ends: &str, sharpness: &str| {
+        format!("int[] creaseIndices = [{ends}]\nint[] creaseLengths = [2]\nfloat[] creaseSharpnesses = [{sharpness}]")
+    };
+    for (more, told) in [
+        (crease("0,\n4", "10"), "a.usda, line 7: edge 0–4 is not in the mesh"),
+        (crease("1, 4", "2.5"), "a.usda, line 7: edge 1–4 has the sharpness 2.5: semi-sharp"),
+        (crease("1, 6", "10"), "a.usda, line 7: creaseIndices: vertex 6 is not in the mesh"),
+        ("int[] cornerIndices = [\n1]\nfloat[] cornerSharpnesses = [5]".into(), "a.usda, line 8: vertex 1 has the"),
+    ] {
+        fs::write(folder.path().join("a.usda"), open_scene("catmullClark", &more)).unwrap();
+        let line = assert_refused(&run_on(INTERPOLATE, folder.path(), "a.usda", &[]), &more);
+        assert!(line.contains(told), "{line}");
+    }
+    let quads = "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 1 0\nv 1 1 1\nv 2 1 0\nf 1 2 5 4\nf 2 3 6 5\n";
+    fs::write(folder.path().join("a.obj"), format!("{quads}t crease 2/1/0 1 4 10\nt crease 2/1/0 0 5 10\n")).unwrap();
+    let line = assert_refused(&run_on(INTERPOLATE, folder.path(), "a.obj", &[]), "obj");
+    assert!(line.contains("a.obj, line 10: edge 0–5 is not in the mesh"), "{line}");
+}
+
+#[test]
+fn tags_go_through_welding() {
+    let folder = tempdir().unwrap();
+    // Two quads with a seam between them, sharp there and at one end of it: 1–2 and 4–7 lie on each other.
+    let quads = "v 0 0 0\nv 1 0 0\nv 1 1 1\nv 0 1 0\nv 1 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 1\nf 1 2 3 4\nf 5 6 7 8\n";
+    let tags = "t crease 2/1/0 4 7 10\nt corner 1/1/0 2 10\n";
+    fs::write(folder.path().join("a.obj"), format!("{quads}{tags}")).unwrap();
+    let output = run_on(INTERPOLATE, folder.path(), "a.obj", &["--weld", "--json"]);
+    assert_done(&output, "weld");
+    let found = json(&output);
+    assert_eq!((&found["vertices"], &found["creases"]), (&6.into(), &1.into()));
+    let cage = io::read(&folder.path().join("result.obj")).unwrap();
+    assert_eq!(cage.mesh.len(), 8);
+    assert_eq!(cage.tags.creases.iter().map(|c| c.ends).collect::<Vec<_>>(), [[1, 2], [4, 7]]);
+    assert_eq!(cage.tags.corners.iter().map(|c| c.vertex).collect::<Vec<_>>(), [2, 7]);
+    // What is not there is told with the numbers of the file.
+    fs::write(folder.path().join("a.obj"), format!("{quads}t crease 2/1/0 6 4 10\n")).unwrap();
+    let line = assert_refused(&run_on(INTERPOLATE, folder.path(), "a.obj", &["--weld"]), "no edge");
+    assert!(line.contains("a.obj, line 11: edge 6–4 is not in the mesh"), "{line}");
+}
