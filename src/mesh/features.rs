@@ -40,12 +40,12 @@ pub enum Rule {
     Smooth,
     /// One edge that is sharp for ever ends here.
     Dart,
-    /// Smooth in the end, but for some levels not: an edge is semi-sharp, or the vertex itself.
-    SemiSharp,
     /// Two sharp edges: a point of a curve.
     Crease,
     /// It rests.
     Corner,
+    /// Smooth in the end, but for some levels not: an edge is semi-sharp, or the vertex itself.
+    SemiSharp,
 }
 
 /// Sharp edges from one vertex to the next, each inner vertex a [`Rule::Crease`].

@@ -99,9 +99,12 @@ fn tags_of_a_file_are_told_at_their_line() {
     };
     for (more, told) in [
         (crease("0,\n4", "10"), "a.usda, line 7: edge 0–4 is not in the mesh"),
-        (crease("1, 4", "2.5"), "a.usda, line 7: edge 1–4 has the sharpness 2.5: semi-sharp"),
+        (crease("1, 4", "-2.5"), "line 9: creaseSharpnesses has at place 0 the sharpness -2.5"),
         (crease("1, 6", "10"), "a.usda, line 7: creaseIndices: vertex 6 is not in the mesh"),
-        ("int[] cornerIndices = [\n1]\nfloat[] cornerSharpnesses = [5]".into(), "a.usda, line 8: vertex 1 has the"),
+        (
+            "int[] cornerIndices = [\n1]\nfloat[] cornerSharpnesses = [-5]".into(),
+            "cornerSharpnesses has at place 0 the sharpness -5",
+        ),
     ] {
         fs::write(folder.path().join("a.usda"), open_scene("catmullClark", &more)).unwrap();
         let line = assert_refused(&run_on(INTERPOLATE, folder.path(), "a.usda", &[]), &more);
