@@ -478,7 +478,8 @@ impl Interpolator {
                     moved.clear();
                     let (_, found) = self.solve_block(&held, &mut moved, &Stop { tolerance: DIRECTION, ..*stop });
                     iterations += found.iterations;
-                    if no_progress(found.outcome) && !(found.last().max <= DIRECTION.sqrt()) {
+                    let error = found.last().max;
+                    if no_progress(found.outcome) && (error.is_nan() || error > DIRECTION.sqrt()) {
                         return Err(());
                     }
                     Ok(stars.product(&moved))
