@@ -179,7 +179,7 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     }
     if tags.boundary_is_none {
         remarks.push(
-            "the tag interpolateboundary is 0, by which faces at a boundary have no surface: the rule is that of --boundary"
+            "the tag interpolateboundary is 0, by which faces at a boundary have no surface: another rule is taken"
                 .into(),
         );
     }

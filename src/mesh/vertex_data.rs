@@ -94,16 +94,18 @@ pub fn numbers(text: &str, vertices: usize, otherwise: f64) -> Result<Vec<f64>> 
     Ok(rows.into_iter().map(value).collect())
 }
 
-/// Reads sharp edges: lines `a b sharpness`, a and b the ends of an edge.
+/// Reads sharp edges: lines `a b sharpness`, a and b the ends of an edge. Where vertices are numbered otherwise than those of
+/// the surface, `place` tells where each went.
 ///
 /// # Errors
 /// Lines of another form, an edge that the mesh lacks, a sharpness that is none, with the line.
-pub fn creases(path: &Path, surface: &Surface) -> Result<Vec<([u32; 2], f64)>> {
+pub fn creases(path: &Path, surface: &Surface, place: Option<&[u32]>) -> Result<Vec<([u32; 2], f64)>> {
     let mut creases = Vec::new();
-    lines(path, surface.len(), "a b sharpness", |line, ends: [usize; 2], [sharpness]: [f64; 1]| {
-        let ends = ends.map(|v| v as u32);
-        check_crease(path, line, surface, ends, ends, sharpness)?;
-        creases.push((ends, sharpness));
+    let vertices = place.map_or(surface.len(), <[u32]>::len);
+    lines(path, vertices, "a b sharpness", |line, ends: [usize; 2], [sharpness]: [f64; 1]| {
+        let there = ends.map(|v| place.map_or(v as u32, |place| place[v]));
+        check_crease(path, line, surface, ends.map(|v| v as u32), there, sharpness)?;
+        creases.push((there, sharpness));
         Ok(())
     })?;
     Ok(creases)

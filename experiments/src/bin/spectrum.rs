@@ -452,7 +452,7 @@ fn of_a_system(found: &Findings, n: usize) -> &'static str {
 }
 
 fn promised(count: f64) -> String {
-    if count.is_finite() { count.to_string() } else { "unknown (the bound for λ_min is 0)".into() }
+    if count.is_finite() { count.to_string() } else { "unknown (no positive bound for λ_min)".into() }
 }
 
 fn radius_table(subject: &Subject, found: &Findings) -> Table {

@@ -285,13 +285,16 @@ impl MeshFlags {
         }
         let mut tags = of_file.checked(Path::new(name), &surface, place, rule)?;
         if let Some(path) = &self.creases {
-            tags.creases.extend(vertex_data::creases(path, &surface)?);
+            tags.creases.extend(vertex_data::creases(path, &surface, place)?);
         }
         if let Some(degrees) = self.crease_angle {
             tags.creases.extend(creases_by_angle(&surface, degrees).into_iter().map(|ends| (ends, SHARP)));
         }
         if let Some(path) = &self.corners {
-            tags.corners.extend(vertex_data::corners(path, surface.len())?);
+            let vertices = place.map_or(surface.len(), <[u32]>::len);
+            let there = |v: u32| place.map_or(v, |place| place[v as usize]);
+            let corners = vertex_data::corners(path, vertices)?;
+            tags.corners.extend(corners.into_iter().map(|(v, sharpness)| (there(v), sharpness)));
         }
         let surface = surface.tagged(&tags).map_err(|e| Error::mesh(name, e.to_string()))?;
         Ok((surface, Tags { boundary: rule_there, ..tags }))
@@ -372,6 +375,28 @@ impl Input {
                 ),
             )),
         }
+    }
+
+    /// The number of vertices of the file.
+    pub fn file_len(&self) -> usize {
+        self.welded.as_ref().map_or(self.surface.len(), |(place, _)| place.len())
+    }
+
+    /// Values of the file's vertices as values of the surface's: of those that were made one the first that is not `absent`.
+    ///
+    /// # Panics
+    /// If there is not one a vertex of the file.
+    pub fn joined<T: Clone + PartialEq>(&self, values: Vec<T>, absent: T) -> Vec<T> {
+        assert_eq!(values.len(), self.file_len(), "one value a vertex of the file");
+        let Some((place, _)) = &self.welded else { return values };
+        let mut joined = vec![absent.clone(); self.surface.len()];
+        for (value, &v) in values.into_iter().zip(place) {
+            let slot = &mut joined[v as usize];
+            if *slot == absent {
+                *slot = value;
+            }
+        }
+        joined
     }
 
     /// The points as they were given, with their noise: in mesh units.

@@ -113,6 +113,10 @@ fn a_seam_is_refused_and_can_be_welded() {
     assert_eq!((&open["vertices"], &open["boundary"]), (&6.into(), &6.into()));
     let welded = solved(&["--weld", "--boundary", "edge-only"]);
     assert_eq!((&welded["vertices"], &welded["boundary"]), (&4.into(), &4.into()));
+    // Vertices are called by the file's numbers: 3 is where 1 is, and edge 3–4 is one of the second triangle.
+    fs::write(folder.path().join("tags.txt"), "3 4 10\n").unwrap();
+    let tagged = solved(&["--weld", "--creases", "tags.txt", "--vertices", "3..5"]);
+    assert_eq!((&tagged["vertices"], &tagged["interpolated"]), (&4.into(), &3.into()));
     // The control mesh has the file's vertices and faces.
     let cage = io::read(&folder.path().join(welded["output"].as_str().unwrap())).unwrap().mesh;
     assert_eq!((cage.len(), cage.faces.face(1)), (6, &[3, 4, 5][..]));

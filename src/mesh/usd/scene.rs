@@ -386,8 +386,7 @@ impl<'a> Parts<'a> {
         }
         if self.boundary_is_none {
             remarks.push(
-                "interpolateBoundary is none, by which faces at a boundary have no surface: the rule is that of \
-                 --boundary"
+                "interpolateBoundary is none, by which faces at a boundary have no surface: another rule is taken"
                     .into(),
             );
         }

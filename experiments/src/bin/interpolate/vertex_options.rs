@@ -19,15 +19,17 @@ pub struct VertexOptions {
 
 impl VertexOptions {
     pub fn read(flags: &ShapeFlags, input: &Input) -> Result<Self> {
-        let n = input.surface.len();
+        let n = input.file_len();
         let marks = flags.vertices.as_deref();
         let interpolated = marks.map(|t| vertex_data::vertex_marks(t, n)).transpose().map_err(|e| match e {
             Error::Unknown(what) => Error::Unknown(format!("--vertices: {what}")),
             other => other,
         })?;
+        let interpolated = interpolated.map(|marks| input.joined(marks, false));
         let is_interpolated = |v: usize| interpolated.as_ref().is_none_or(|m| m[v]);
         let file = flags.normals.as_deref();
-        let mut normals = file.map(|p| vertex_data::normals(p, n)).transpose()?;
+        let normals = file.map(|p| vertex_data::normals(p, n)).transpose()?;
+        let mut normals = normals.map(|normals| input.joined(normals, None));
         if let Some(normals) = normals.as_mut().filter(|n| n.iter().all(Option::is_some)) {
             // A file with a normal for every vertex means those that are interpolated.
             for (v, normal) in normals.iter_mut().enumerate() {
@@ -35,14 +37,16 @@ impl VertexOptions {
             }
         }
         let text = flags.shape_handle.as_deref();
-        let mut handles = text.map(|t| vertex_data::numbers(t, n, 1.0)).transpose()?;
+        let handles = text.map(|t| vertex_data::numbers(t, n, 1.0)).transpose()?;
+        let mut handles = handles.map(|handles| input.joined(handles, 1.0));
         if text.is_some_and(|t| t.parse::<f64>().is_ok()) {
             for (v, handle) in handles.iter_mut().flatten().enumerate() {
                 *handle = if is_interpolated(v) { *handle } else { 1.0 };
             }
         }
         let text = flags.alpha.as_deref();
-        let mut alpha = text.map(|t| vertex_data::numbers(t, n, 0.0)).transpose()?;
+        let alpha = text.map(|t| vertex_data::numbers(t, n, 0.0)).transpose()?;
+        let mut alpha = alpha.map(|alpha| input.joined(alpha, 0.0));
         for (v, a) in alpha.iter_mut().flatten().enumerate() {
             if interpolated.as_ref().is_some_and(|m| m[v]) {
                 *a = 1.0;

@@ -147,7 +147,27 @@ impl Context {
         self.read(model.file, model.boundary)
     }
 
-    fn read(&self, file: &str, boundary: Boundary) -> Result<Subject> {
+    /// The files of a folder of models, by name.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn files(&self, below: &str) -> Result<Vec<String>> {
+        let folder = self.models.as_ref().map_or_else(PathBuf::new, |folder| folder.join(below));
+        let refused = |e| Error::io(&folder, "read", e);
+        let mut files: Vec<String> = Vec::new();
+        for entry in std::fs::read_dir(&folder).map_err(refused)? {
+            let name = entry.map_err(refused)?.file_name();
+            files.push(format!("{below}/{}", name.to_string_lossy()));
+        }
+        files.sort();
+        Ok(files)
+    }
+
+    /// A model by its file.
+    ///
+    /// # Errors
+    /// As [`model`](Self::model).
+    pub fn read(&self, file: &str, boundary: Boundary) -> Result<Subject> {
         let Some(folder) = &self.models else {
             return Err(Error::Computation(format!("{file} is a real model: run with --meshes DIR")));
         };
@@ -194,23 +214,15 @@ impl Context {
     /// # Errors
     /// If a folder or file cannot be read, or a closed model is invalid.
     pub fn subjects(&self, otherwise: &[&str], most: usize) -> Result<Vec<Subject>> {
-        let Some(folder) = &self.models else {
+        if !self.real() {
             return otherwise
                 .iter()
                 .map(|name| self.stand_in(name))
                 .filter(|s| s.as_ref().is_ok_and(|s| s.surface.len() <= most) || s.is_err())
                 .collect();
-        };
-        let closed = folder.join("closed");
-        let refused = |e| Error::io(&closed, "read", e);
-        let mut files: Vec<String> = Vec::new();
-        for entry in std::fs::read_dir(&closed).map_err(refused)? {
-            let name = entry.map_err(refused)?.file_name();
-            files.push(format!("closed/{}", name.to_string_lossy()));
         }
-        files.sort();
         let mut subjects = Vec::new();
-        for file in files {
+        for file in self.files("closed")? {
             let subject = self.read(&file, Boundary::Refuse)?;
             if subject.surface.len() <= most {
                 subjects.push(subject);

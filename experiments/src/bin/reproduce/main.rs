@@ -7,6 +7,7 @@ mod figures;
 mod line_preconditioner;
 mod methods;
 mod omega;
+mod open_meshes;
 mod orders;
 mod pia;
 mod popping;
@@ -62,7 +63,7 @@ struct Arguments {
 }
 
 /// All items, in the order in which they run.
-const ITEMS: [Item; 15] = [
+const ITEMS: [Item; 16] = [
     pia::TABLE1,
     thall::ITERATIONS,
     zheng_cai::SECTION_3_5,
@@ -75,6 +76,7 @@ const ITEMS: [Item; 15] = [
     valences::VALENCES,
     popping::POPPING,
     ripples::RIPPLES,
+    open_meshes::OPEN_MESHES,
     figures::ALL,
     claims::LEDGER,
     claims::FINDINGS,
