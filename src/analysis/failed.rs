@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::singularity::{SingularComponent, Singularity};
 use crate::mesh::Surface;
+use crate::mesh::features::Features;
 use crate::schemes::Scheme;
 use crate::solvers::{Outcome, Report, Stop};
 
@@ -37,8 +38,10 @@ impl Failed {
     ) -> Self {
         let mut verdict = Singularity::detect(surface, scheme);
         let mut signs = verdict.colouring.iter().enumerate().filter(|(_, sign)| **sign != 0);
-        // A vertex that stays holds the others: only whole components are singular.
-        if interpolated.is_some_and(|marks| signs.any(|(v, _)| !marks[v])) {
+        // A vertex that stays holds the others: only whole components are singular. And with darts the left null vector, by
+        // which points that nothing reaches are told, is another than the colouring.
+        let other_null_vector = surface.features().is_some_and(Features::has_stars);
+        if other_null_vector || interpolated.is_some_and(|marks| signs.any(|(v, _)| !marks[v])) {
             verdict.singular.clear();
         }
         let largest = surface.positions().iter().fold(DVec3::ZERO, |m, p| m.max(p.abs())).max_element();

@@ -42,7 +42,7 @@ pub struct Surface {
 }
 
 /// What is known of the faces.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Connectivity {
     is_closed: bool,
     /// What boundary edges are, where there may be some.
@@ -146,21 +146,21 @@ impl Surface {
     /// # Ok::<(), limitlab::Error>(())
     /// ```
     pub fn tagged(&self, tags: &Tags) -> Result<Self> {
+        self.clone().into_tagged(tags)
+    }
+
+    /// As [`tagged`](Self::tagged), without a copy of the mesh.
+    ///
+    /// # Errors
+    /// As [`tagged`](Self::tagged).
+    pub fn into_tagged(self, tags: &Tags) -> Result<Self> {
         if !self.is_closed() && tags.boundary == Boundary::Refuse {
-            return Self::examined(self.mesh.clone(), None, Boundary::Refuse).map_err(Error::Defects);
+            return Self::examined(self.mesh, None, Boundary::Refuse).map_err(Error::Defects);
         }
-        let sides = &self.connectivity.sides;
-        let features = Features::new(self.faces(), self.incidence(), sides, tags)?;
-        let connectivity = Connectivity {
-            boundary: tags.boundary,
-            sides: sides.clone(),
-            features,
-            incidence: self.connectivity.incidence.clone(),
-            topology: self.connectivity.topology.clone(),
-            renumbered: self.connectivity.renumbered.clone(),
-            ..Connectivity::new(self.is_closed())
-        };
-        Ok(Surface { mesh: self.mesh.clone(), connectivity: Arc::new(connectivity) })
+        let features = Features::new(self.faces(), self.incidence(), self.boundary_half_edges(), tags)?;
+        let Surface { mesh, connectivity } = self;
+        let connectivity = Connectivity { boundary: tags.boundary, features, ..Arc::unwrap_or_clone(connectivity) };
+        Ok(Surface { mesh, connectivity: Arc::new(connectivity) })
     }
 
     /// The same faces with other points.

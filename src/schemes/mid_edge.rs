@@ -20,7 +20,8 @@ use crate::parallel;
 ///
 /// `xᵀMx = Σ_i n_i x_i² + 2 Σ_ij x_i x_j = Σ_ij (x_i + x_j)²` over the edges, so λ_min(A) ≥ 0, and A is singular exactly
 /// where x_j = −x_i along every edge of a component is possible: on bipartite ones, of any valence. (Every closed mesh of
-/// quads without a handle is one.) On meshes of triangles λ_min(A) is 0.25 to 0.27, on irregular polygons 0.038 to 0.045
+/// quads without a handle is one.) On a curve, where a quad mesh is continued by reflection, 2b − v, the row ½v + ⅛Σv_j becomes
+/// that of quadratic B-splines, ⅛(a + 6v + b). On meshes of triangles λ_min(A) is 0.25 to 0.27, on irregular polygons 0.038 to 0.045
 /// (`spectrum` on tori, spheres, irregular meshes of 500 to 20 000 vertices and two models).
 pub(super) const DEFINITION: Definition = Definition {
     name: "mid-edge",

@@ -296,7 +296,7 @@ impl MeshFlags {
             let corners = vertex_data::corners(path, vertices)?;
             tags.corners.extend(corners.into_iter().map(|(v, sharpness)| (there(v), sharpness)));
         }
-        let surface = surface.tagged(&tags).map_err(|e| Error::mesh(name, e.to_string()))?;
+        let surface = surface.into_tagged(&tags).map_err(|e| Error::mesh(name, e.to_string()))?;
         Ok((surface, Tags { boundary: rule_there, ..tags }))
     }
 
