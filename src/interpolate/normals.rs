@@ -70,7 +70,7 @@ pub fn unit_normals(normals: &[Option<DVec3>]) -> Result<Vec<Option<DVec3>>> {
 ///
 /// # Errors
 /// A given normal without direction; one opposite to the surface's, where the axis of the turn is not defined; a
-/// vertex where the surface has no normal; what the scheme refuses. All name the vertex.
+/// vertex where the surface has no normal, or that is not smooth; what the scheme refuses. All name the vertex.
 ///
 /// # Panics
 /// If the scheme is not [primal](Class::Primal), `normals` has not one entry a vertex, or
@@ -85,6 +85,13 @@ pub fn rotate_rings(
     assert_eq!(normals.len(), control.len(), "one entry a vertex");
     assert!(rotation.levels > 0, "at least one level");
     let wanted = unit_normals(normals)?;
+    if let Some(features) = control.features()
+        && let Some(v) = (0..control.len()).find(|&v| wanted[v].is_some() && !features.is_smooth(v))
+    {
+        let what =
+            format!("vertex {v} is sharp, and has no ring that could be turned about its point: leave its normal out");
+        return Err(Error::mesh("normals", what));
+    }
     scheme.check_size(control.mesh(), rotation.levels + 1)?;
     let mut surface = scheme.refined(control)?;
     let mut turned: Vec<(u32, f64)> = Vec::new();

@@ -116,11 +116,19 @@ pub struct Auxiliary {
 /// other solvers.
 ///
 /// # Errors
-/// No vertex is interpolated.
+/// No vertex is interpolated; a boundary, creases.
 ///
 /// # Panics
 /// If `interpolated` has not one entry a vertex, or an order names a vertex that the mesh lacks.
 pub fn auxiliary(surface: &Surface, interpolated: Option<&[bool]>, phase: &PhaseOne) -> Result<Auxiliary> {
+    // Its rows are those of vertices with whole faces around them.
+    let what = "Zheng and Cai's first phase";
+    if surface.features().is_some() {
+        return Err(Error::Creased { what });
+    }
+    if !surface.is_closed() {
+        return Err(Error::Open { edges: surface.boundary_edges(), scheme: what });
+    }
     let mesh = surface.mesh();
     let constraints = Constraints { interpolated, ..Constraints::default() };
     constraints.check(mesh.len())?;

@@ -6,6 +6,8 @@ use limitlab::analysis::comparison::with_spectrum;
 use limitlab::analysis::singularity::Singularity;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::{LimitSystem, Stages};
+use limitlab::interpolate::normals::{Rotation, rotate_rings};
+use limitlab::interpolate::zheng_cai::{self, PhaseOne};
 use limitlab::interpolate::{Interpolator, Options, Tolerance, interpolate, limit_points, staged};
 use limitlab::mesh::features::{Rule, Tags};
 use limitlab::mesh::generate::union;
@@ -210,6 +212,28 @@ fn what_cannot_be_is_refused_by_name() {
     assert!(message(contradiction).contains("contradict"));
     // Sharpness zero is none.
     assert!(cube.tagged(&creases([0, 1], 0.0)).unwrap().features().is_none());
+}
+
+/// What has no rules for boundaries says so, and gives no wrong answer.
+#[test]
+fn pipelines_without_rules_for_boundaries_refuse_them() {
+    let surface = open(super::grid(5, 6, false), Boundary::EdgeAndCorner);
+    let refused = zheng_cai::auxiliary(&surface, None, &PhaseOne::default());
+    assert!(matches!(refused, Err(Error::Creased { .. })));
+    let mut normals = vec![None; surface.len()];
+    normals[8] = Some(DVec3::Z);
+    let turn = |normals: &[Option<DVec3>]| {
+        rotate_rings(
+            &surface,
+            Scheme::CatmullClark.refinement(),
+            normals,
+            Rotation { levels: 1, ..Rotation::default() },
+        )
+    };
+    assert!(turn(&normals).is_ok());
+    normals[0] = Some(DVec3::Z);
+    let message = turn(&normals).unwrap_err().to_string();
+    assert!(message.contains("vertex 0 is sharp"), "{message}");
 }
 
 #[test]
