@@ -55,7 +55,7 @@ def Xform "root" (
             int[] faceVertexCounts = [4,
                 3]
             int[] faceVertexIndices = [0, 1, 2, 3,
-                0, 3, 4,]; rel material:binding = </root/_materials/M>
+                0, 3, 4,]; rel material:binding = </scene/_materials/M>
             normal3f[] normals = [(0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 0, 1)] (
                 interpolation = "faceVarying"
             )

@@ -102,6 +102,9 @@ pub const LINES: List<usize> = List {
     ],
 };
 
+/// Built-in meshes that are opened in place of the open models.
+pub const OPENED: [&str; 4] = ["quad-sphere:4", "irregular-quad:1000", "irregular-tri:1000", "irregular-poly:1000"];
+
 /// Built-in meshes in place of all closed models: of every method's table.
 pub const ALL_METHODS: [&str; 9] = [
     "cube",
@@ -114,8 +117,6 @@ pub const ALL_METHODS: [&str; 9] = [
     "irregular-tri:1000",
     "irregular-poly:1000",
 ];
-/// Built-in meshes that are opened in place of the open models.
-pub const OPENED: [&str; 4] = ["quad-sphere:4", "irregular-quad:1000", "irregular-tri:1000", "irregular-poly:1000"];
 /// The same, of the claims.
 pub const CLAIMS: [&str; 8] = [
     "torus:32x32",
