@@ -71,7 +71,7 @@ impl Format {
             // Standard streams, and the pipes that shells make, have names without ending.
             "" if path.starts_with("/dev") => Ok(Format::Obj),
             _ => {
-                Err(Error::parse(path, None, "not a known mesh format: the name must end in .obj, .off, .ply or .usda"))
+                Err(Error::parse(path, None, "not a known mesh format: the name must end in .usda, .obj, .off or .ply"))
             }
         }
     }
@@ -341,7 +341,7 @@ mod tests {
             let path = folder.path().join(name);
             for error in [write(&path, &mesh, None).err(), read(&path).err()] {
                 let text = error.unwrap().to_string();
-                assert!(text.ends_with("must end in .obj, .off, .ply or .usda"), "{text}");
+                assert!(text.ends_with("must end in .usda, .obj, .off or .ply"), "{text}");
             }
         }
         for name in ["a.usd", "a.usdc", "a.USDZ"] {

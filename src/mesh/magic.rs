@@ -17,13 +17,13 @@ const KNOWN: [(&[u8], &str); 22] = [
     (b"#usda", "it is a USD file: let its name end in .usda"),
     (b"PXR-USDC", "it is binary USD: save it as text, .usda"),
     (b"solid", "it is an STL file: convert it, and weld its vertices"),
-    (b"glTF", "it is a glTF file: convert it to .obj, .off, .ply or .usda"),
-    (b"Kaydara FBX", "it is an FBX file: convert it to .obj, .off, .ply or .usda"),
-    (b"DRACO", "it is a Draco file: convert it to .obj, .off, .ply or .usda"),
-    (b"# vtk DataFile", "it is a VTK file: convert it to .obj, .off, .ply or .usda"),
-    (b"ISO-10303-21", "it is a STEP file: convert it to .obj, .off, .ply or .usda"),
+    (b"glTF", "it is a glTF file: convert it to .usda, .obj, .off or .ply"),
+    (b"Kaydara FBX", "it is an FBX file: convert it to .usda, .obj, .off or .ply"),
+    (b"DRACO", "it is a Draco file: convert it to .usda, .obj, .off or .ply"),
+    (b"# vtk DataFile", "it is a VTK file: convert it to .usda, .obj, .off or .ply"),
+    (b"ISO-10303-21", "it is a STEP file: convert it to .usda, .obj, .off or .ply"),
     (b"<", "it is XML or HTML: if it was downloaded, this is the page and not the file"),
-    (b"{", "it is JSON: convert the mesh in it to .obj, .off, .ply or .usda"),
+    (b"{", "it is JSON: convert the mesh in it to .usda, .obj, .off or .ply"),
 ];
 
 const UTF_16: &str = "it is text in UTF-16 or UTF-32: save it as UTF-8 or ASCII";

@@ -167,7 +167,7 @@ fn missing_files_folders_and_unknown_names() {
     assert!(line.contains("cube") && line.contains("quad-sphere:K"), "the names are listed: {line}");
     fs::write(folder.path().join("mesh.stl"), "solid").unwrap();
     let line = assert_all_refuse(&folder, "mesh.stl", &[]);
-    assert!(line.contains(".obj, .off, .ply or .usda"), "{line}");
+    assert!(line.contains(".usda, .obj, .off or .ply"), "{line}");
     let line = assert_all_refuse(&folder, "cube", &["--scheme", "loop"]);
     assert!(line.contains("face 0 has 4 corners"), "{line}");
 }
@@ -477,7 +477,7 @@ fn the_output_s_name_tells_its_format() {
     for name in ["v", "v.stl", "v.obj.bak"] {
         let output = run(INTERPOLATE, folder.path(), ["cube", "-o", name, "--quiet", "--method", "pia"]);
         let line = assert_refused(&output, name);
-        assert!(line.contains(name) && line.contains(".obj, .off, .ply or .usda"), "{line}");
+        assert!(line.contains(name) && line.contains(".usda, .obj, .off or .ply"), "{line}");
     }
     #[cfg(unix)]
     {
