@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-use super::local_limit::StarRule;
+use super::local_limit::{Star, StarRule};
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Circulant, Definition, PaperNames, SingularSet};
@@ -229,38 +229,9 @@ fn opposite(surface: &Surface, c: u32, v: usize) -> DVec3 {
 /// assert!(mask.iter().zip(exact).all(|(found, exact)| (found - exact).abs() < 1e-15));
 /// ```
 pub fn dart_mask(n: usize) -> Vec<f64> {
-    let count = n as f64;
-    let share = 1.0 / (count * count);
-    let mut smooth = vec![count * count];
-    smooth.extend([4.0, 1.0].repeat(n));
-    let (edge, face) = (|j: usize| 1 + 2 * (j % n), |j: usize| 2 + 2 * (j % n));
-    sharp::left_eigenvector(smooth, |from, to| {
-        // v' = ((n−2) v + Σ (e_j + f'_j)/n)/n.
-        to[0] += (count - 2.0) / count * from[0];
-        for j in 0..n {
-            to[edge(j)] += share * from[0];
-            // f'_j = (v + e_j + e_{j+1} + f_j)/4.
-            let quarter = 0.25 * (from[face(j)] + share * from[0]);
-            for k in [0, edge(j), edge(j + 1), face(j)] {
-                to[k] += quarter;
-            }
-            if j == 0 {
-                // The midpoint.
-                for k in [0, edge(0)] {
-                    to[k] += 0.5 * from[edge(0)];
-                }
-                continue;
-            }
-            // e'_j = (6v + 6e_j + e_{j−1} + e_{j+1} + f_{j−1} + f_j)/16.
-            let part = from[edge(j)] / 16.0;
-            for k in [0, edge(j)] {
-                to[k] += 6.0 * part;
-            }
-            for k in [edge(j - 1), edge(j + 1), face(j - 1), face(j)] {
-                to[k] += part;
-            }
-        }
-    })
+    let row = Star::dart(n, 4).row(StarRule::CatmullClark);
+    let around = row.edges.iter().zip(&row.faces).flat_map(|(&edge, &face)| [edge, face]);
+    std::iter::once(row.own).chain(around).collect()
 }
 
 /// The weights of the tangent across the boundary at a vertex of `m` faces there. `None` from four on: the limit normals of

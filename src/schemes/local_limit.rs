@@ -61,6 +61,12 @@ fn left(sharpness: f64, steps: usize) -> f64 {
 }
 
 impl Star {
+    /// That of a dart of valence `n` among faces of one size, from its sharp edge on.
+    pub(crate) fn dart(n: usize, size: usize) -> Self {
+        let edges = (0..n).map(|j| if j == 0 { SHARP } else { 0.0 }).collect();
+        Star { edges, vertex: 0.0, sizes: vec![size; n] }
+    }
+
     fn rule(&self, steps: usize) -> Rule {
         let sharp = self.edges.iter().filter(|&&s| left(s, steps) > 0.0).count();
         match sharp {

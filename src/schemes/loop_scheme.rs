@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-use super::local_limit::StarRule;
+use super::local_limit::{Star, StarRule};
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Definition, PaperNames, SingularSet, from_limit_weight};
@@ -182,31 +182,8 @@ pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
 /// assert!(mask.iter().zip(exact).all(|(found, exact)| (found - exact).abs() < 1e-15));
 /// ```
 pub fn dart_mask(n: usize) -> Vec<f64> {
-    let [vertex, neighbor] = vertex_mask(n);
-    let [own, other] = limit_mask(n);
-    let mut smooth = vec![own];
-    smooth.extend(vec![other; n]);
-    let edge = |j: usize| 1 + j % n;
-    sharp::left_eigenvector(smooth, |from, to| {
-        to[0] += vertex * from[0];
-        for j in 0..n {
-            to[edge(j)] += neighbor * from[0];
-            let part = from[edge(j)] / 8.0;
-            if j == 0 {
-                // The midpoint.
-                for k in [0, edge(0)] {
-                    to[k] += 4.0 * part;
-                }
-                continue;
-            }
-            for k in [0, edge(j)] {
-                to[k] += 3.0 * part;
-            }
-            for k in [edge(j - 1), edge(j + 1)] {
-                to[k] += part;
-            }
-        }
-    })
+    let row = Star::dart(n, 3).row(StarRule::Loop);
+    std::iter::once(row.own).chain(row.edges).collect()
 }
 
 /// The weights of the tangent across the boundary at a vertex of `m` triangles there. `None` from six on: the limit normals of

@@ -61,22 +61,6 @@ pub(super) fn dart_star(surface: &Surface, features: &Features, v: usize, star: 
     star.rotate_left(place);
 }
 
-/// The limit of a process that is repeated until it has converged to rounding: `mask ← step(mask)`, a step that shrinks
-/// the errors of a mask of sum 1 by the factor 0.66 at most.
-pub(super) fn left_eigenvector(mut mask: Vec<f64>, step: impl Fn(&[f64], &mut [f64])) -> Vec<f64> {
-    /// 0.66^100 = 1e-18.
-    const STEPS: usize = 100;
-    let mut next = vec![0.0; mask.len()];
-    for _ in 0..STEPS {
-        next.fill(0.0);
-        step(&mask, &mut next);
-        std::mem::swap(&mut mask, &mut next);
-    }
-    let sum: f64 = mask.iter().sum();
-    mask.iter_mut().for_each(|weight| *weight /= sum);
-    mask
-}
-
 /// The weights of a tangent across the boundary at a vertex of m faces there: of its m + 1 edge neighbours, and of the
 /// opposite corners of its m faces. That of the vertex itself makes their sum 0.
 pub(super) struct Across {
