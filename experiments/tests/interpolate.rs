@@ -168,7 +168,7 @@ fn two_phases_give_exact_centroids_with_handles_and_subsets() {
     let control = surface(&control.mesh);
     let expected = Refinement::DooSabin.refine_n(&control, 2).unwrap();
     assert!(distance(&plain.mesh.positions, &expected.positions) < ROUNDING);
-    let limits = doo_sabin::limit_positions(doo_sabin::Rule::DooSabin, &control).unwrap();
+    let limits = doo_sabin::limit_positions(doo_sabin::CornerRule::DooSabin, &control).unwrap();
     assert!(distance(&limits, &given.positions) < ROUNDING);
 }
 

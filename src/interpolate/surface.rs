@@ -7,7 +7,7 @@ use super::limit_points;
 use super::normals::{Rotation, rotate_rings};
 use super::zheng_cai::{Constraints, FirstRefinement};
 use crate::mesh::Surface;
-use crate::schemes::doo_sabin::{self, Rule};
+use crate::schemes::doo_sabin::{self, CornerRule};
 use crate::schemes::{Class, Refinement, Scheme};
 use crate::{Error, Result};
 
@@ -65,7 +65,7 @@ pub fn surface(control: Surface, scheme: Scheme, points: &[DVec3], request: &Sur
             SurfaceMesh::plain(control)
         }
         Some(rule) => {
-            let corrected = rule == Rule::ZhengCai || given.normals.is_some() || given.handles.is_some();
+            let corrected = rule == CornerRule::ZhengCai || given.normals.is_some() || given.handles.is_some();
             if corrected {
                 let first = FirstRefinement::new(&control, rule, points, given)?;
                 SurfaceMesh {
@@ -83,7 +83,7 @@ pub fn surface(control: Surface, scheme: Scheme, points: &[DVec3], request: &Sur
         // The first step of a control mesh is by its own rule.
         let rule = match rule {
             Some(rule) if request.levels == 0 => Some(rule),
-            Some(_) => Some(Rule::DooSabin),
+            Some(_) => Some(CornerRule::DooSabin),
             None => None,
         };
         let (system, scheme) = (scheme, scheme.refinement());

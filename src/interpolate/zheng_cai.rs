@@ -13,7 +13,7 @@ use crate::error::short;
 use crate::mesh::{Mesh, Surface};
 use crate::parallel;
 use crate::schemes::Refinement;
-use crate::schemes::doo_sabin::{Rule, refine_by};
+use crate::schemes::doo_sabin::{CornerRule, refine_by};
 use crate::{Error, Result};
 
 /// Vertices of one task.
@@ -244,7 +244,7 @@ impl FirstRefinement {
     ///
     /// # Panics
     /// If `points` or a list of constraints has not one entry a vertex.
-    pub fn new(auxiliary: &Surface, rule: Rule, points: &[DVec3], constraints: &Constraints) -> Result<Self> {
+    pub fn new(auxiliary: &Surface, rule: CornerRule, points: &[DVec3], constraints: &Constraints) -> Result<Self> {
         assert_eq!(points.len(), auxiliary.len(), "one point a vertex");
         constraints.check(points.len())?;
         let normals = constraints.normals.map(unit_normals).transpose()?;
@@ -328,7 +328,7 @@ pub struct TwoPhase {
 pub fn interpolate(surface: &Surface, constraints: &Constraints, phase: &PhaseOne) -> Result<TwoPhase> {
     constraints.check(surface.len())?;
     let auxiliary = auxiliary(surface, constraints.interpolated, phase)?;
-    let first = FirstRefinement::new(&auxiliary.surface, Rule::ZhengCai, surface.positions(), constraints)?;
+    let first = FirstRefinement::new(&auxiliary.surface, CornerRule::ZhengCai, surface.positions(), constraints)?;
     Ok(TwoPhase { auxiliary, first })
 }
 

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::interpolatory::{RegularMask, SQRT_3, tangents, vertices};
 use super::loop_scheme::{refined_topology, split_in_four};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
-use super::ring::{Place, Rings, Rule};
+use super::ring::{Place, RingRule, Rings};
 use super::star::{Tangents, next_in_triangle, prev_in_triangle, require_room, require_triangles, twin};
 use crate::Result;
 use crate::mesh::{Mesh, Surface};
@@ -88,7 +88,7 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
     require_triangles(surface, NAME)?;
     require_room(mesh, 4)?;
-    let rule = Rule { place: Place::Edge, mask: |n| (CENTER, extraordinary_mask(n)), amplitudes };
+    let rule = RingRule { place: Place::Edge, mask: |n| (CENTER, extraordinary_mask(n)), amplitudes };
     let rings = Rings::new(surface, rule);
     let edges = topology.edge_numbers();
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));

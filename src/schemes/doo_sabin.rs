@@ -18,23 +18,23 @@ use crate::parallel;
 
 /// The rule of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rule {
+pub enum CornerRule {
     /// V'_i = Σ_j α_ij V_j (Zheng-Cai Eq. 1).
     DooSabin,
     /// V'_i = (V_i + centroid)/2 (Zheng-Cai Eq. 4), meant for the first step only.
     ZhengCai,
 }
 
-impl Rule {
+impl CornerRule {
     /// The weights of the corners of an `m`-gon in its corner 0, in order. Doo-Sabin: (m+5)/(4m), then
     /// (3 + 2cos(2πj/m))/(4m); Zheng-Cai: ½ + 1/(2m), then 1/(2m).
     pub fn circulant(self, m: usize) -> Vec<f64> {
         let size = m as f64;
         let weight = |j: usize| match (self, j) {
-            (Rule::DooSabin, 0) => (size + 5.0) / (4.0 * size),
-            (Rule::DooSabin, _) => (3.0 + 2.0 * (TAU * j as f64 / size).cos()) / (4.0 * size),
-            (Rule::ZhengCai, 0) => 0.5 + 0.5 / size,
-            (Rule::ZhengCai, _) => 0.5 / size,
+            (CornerRule::DooSabin, 0) => (size + 5.0) / (4.0 * size),
+            (CornerRule::DooSabin, _) => (3.0 + 2.0 * (TAU * j as f64 / size).cos()) / (4.0 * size),
+            (CornerRule::ZhengCai, 0) => 0.5 + 0.5 / size,
+            (CornerRule::ZhengCai, _) => 0.5 / size,
         };
         (0..m).map(weight).collect()
     }
@@ -42,7 +42,7 @@ impl Rule {
 
 /// The new point of every corner: the geometry of one step. O(m) for a face of m corners, since the rule is a
 /// circulant of the constant, the first harmonic and the identity.
-pub fn corner_points(mesh: &Mesh, rule: Rule) -> Vec<DVec3> {
+pub fn corner_points(mesh: &Mesh, rule: CornerRule) -> Vec<DVec3> {
     let corners = mesh.faces.corners();
     let mut points = filled(corners.len(), DVec3::ZERO);
     parallel::parts(split_by_face(&mesh.faces, CHUNK, &mut points), |range, mut part| {
@@ -57,7 +57,7 @@ pub fn corner_points(mesh: &Mesh, rule: Rule) -> Vec<DVec3> {
     points
 }
 
-fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: Rule, points: &mut [DVec3]) {
+fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: CornerRule, points: &mut [DVec3]) {
     let size = face.len() as f64;
     let (mut sum, mut cosine, mut sine) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
     for (&v, unit) in face.iter().zip(circle) {
@@ -69,8 +69,8 @@ fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: Rule, 
     for ((&v, unit), new) in face.iter().zip(circle).zip(points) {
         let point = positions[v as usize];
         *new = match rule {
-            Rule::DooSabin => 0.25 * point + (0.75 * sum + 0.5 * (unit.x * cosine + unit.y * sine)) / size,
-            Rule::ZhengCai => 0.5 * (point + sum / size),
+            CornerRule::DooSabin => 0.25 * point + (0.75 * sum + 0.5 * (unit.x * cosine + unit.y * sine)) / size,
+            CornerRule::ZhengCai => 0.5 * (point + sum / size),
         };
     }
 }
@@ -84,16 +84,16 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     refined_topology,
     halves: None,
     size: |c| Size { vertices: c.corners, faces: c.faces + c.edges() + c.vertices, corners: 4 * c.corners },
-    limit_positions: |surface| limit_positions(Rule::DooSabin, surface),
-    limit_normals: |surface| limit_normals(Rule::DooSabin, surface),
+    limit_positions: |surface| limit_positions(CornerRule::DooSabin, surface),
+    limit_normals: |surface| limit_normals(CornerRule::DooSabin, surface),
 };
 
-/// One step of Doo-Sabin: [`refine_by`] with [`Rule::DooSabin`].
+/// One step of Doo-Sabin: [`refine_by`] with [`CornerRule::DooSabin`].
 ///
 /// # Errors
 /// As [`refine_by`].
 pub fn refine(surface: &Surface) -> Result<Mesh> {
-    refine_by(Rule::DooSabin, surface)
+    refine_by(CornerRule::DooSabin, surface)
 }
 
 /// One step by either rule.
@@ -105,7 +105,7 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
 /// # Errors
 /// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or the
 /// result is too large for 32-bit indices.
-pub fn refine_by(rule: Rule, surface: &Surface) -> Result<Mesh> {
+pub fn refine_by(rule: CornerRule, surface: &Surface) -> Result<Mesh> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
     require_closed(surface)?;
     require_room(mesh, 4)?;
@@ -142,7 +142,7 @@ pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
 ///
 /// # Errors
 /// [`Error::Open`](crate::Error::Open).
-pub fn limit_positions(rule: Rule, surface: &Surface) -> Result<Vec<DVec3>> {
+pub fn limit_positions(rule: CornerRule, surface: &Surface) -> Result<Vec<DVec3>> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
     require_closed(surface)?;
     let mut limits = vec![DVec3::ZERO; mesh.len()];
@@ -159,7 +159,7 @@ pub fn limit_positions(rule: Rule, surface: &Surface) -> Result<Vec<DVec3>> {
 ///
 /// # Errors
 /// [`Error::Open`](crate::Error::Open).
-pub fn limit_normals(rule: Rule, surface: &Surface) -> Result<Vec<DVec3>> {
+pub fn limit_normals(rule: CornerRule, surface: &Surface) -> Result<Vec<DVec3>> {
     let mesh = surface.mesh();
     let limits = limit_positions(rule, surface)?;
     let points = corner_points(mesh, rule);

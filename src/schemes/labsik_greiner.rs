@@ -16,7 +16,7 @@ use glam::DVec3;
 
 use super::interpolatory::{RegularMask, SQRT_3, tangents, vertices};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
-use super::ring::{Place, Rings, Rule};
+use super::ring::{Place, RingRule, Rings};
 use super::sqrt3::{flip, refined_topology};
 use super::star::{Tangents, prev_in_triangle, require_room, require_triangles, twin};
 use crate::Result;
@@ -105,7 +105,7 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
     let mesh = surface.mesh();
     require_triangles(surface, NAME)?;
     require_room(mesh, 3)?;
-    let rule = Rule { place: Place::Triangle, mask: extraordinary_mask, amplitudes };
+    let rule = RingRule { place: Place::Triangle, mask: extraordinary_mask, amplitudes };
     let rings = Rings::new(surface, rule);
     let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
     parallel::append(&mut positions, &mesh.positions);

@@ -44,7 +44,7 @@ pub(crate) struct StarRow {
 
 /// What a vertex follows in one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Rule {
+enum StepRule {
     Smooth,
     Dart,
     Crease,
@@ -67,14 +67,14 @@ impl Star {
         Star { edges, vertex: 0.0, sizes: vec![size; n] }
     }
 
-    fn rule(&self, steps: usize) -> Rule {
+    fn rule(&self, steps: usize) -> StepRule {
         let sharp = self.edges.iter().filter(|&&s| left(s, steps) > 0.0).count();
         match sharp {
-            _ if left(self.vertex, steps) > 0.0 => Rule::Corner,
-            0 => Rule::Smooth,
-            1 => Rule::Dart,
-            2 => Rule::Crease,
-            _ => Rule::Corner,
+            _ if left(self.vertex, steps) > 0.0 => StepRule::Corner,
+            0 => StepRule::Smooth,
+            1 => StepRule::Dart,
+            2 => StepRule::Crease,
+            _ => StepRule::Corner,
         }
     }
 
@@ -105,12 +105,12 @@ impl Star {
         let mut row = StarRow { own: 0.0, edges: vec![0.0; n], faces: vec![0.0; self.sizes.len()] };
         let x = n as f64;
         match self.rule(steps) {
-            Rule::Corner => row.own = 1.0,
-            Rule::Crease => {
+            StepRule::Corner => row.own = 1.0,
+            StepRule::Crease => {
                 row.own = 2.0 / 3.0;
                 self.crease(steps).into_iter().for_each(|j| row.edges[j] = 1.0 / 6.0);
             }
-            Rule::Smooth => match rule {
+            StepRule::Smooth => match rule {
                 StarRule::CatmullClark => {
                     row.own = x / (x + 5.0);
                     row.edges.fill(4.0 / (x * (x + 5.0)));
@@ -122,7 +122,7 @@ impl Star {
                     row.edges.fill((1.0 - row.own) / x);
                 }
             },
-            Rule::Dart => {
+            StepRule::Dart => {
                 row.own = 1.0;
                 for _ in 0..PRODUCTS {
                     let next = self.before(rule, steps.max(1), &row);
@@ -173,12 +173,12 @@ impl Star {
             let c = weight * row.own;
             match self.rule(steps) {
                 _ if c == 0.0 => {}
-                Rule::Corner => out.own += c,
-                Rule::Crease => {
+                StepRule::Corner => out.own += c,
+                StepRule::Crease => {
                     out.own += 0.75 * c;
                     self.crease(steps).into_iter().for_each(|j| out.edges[j] += 0.125 * c);
                 }
-                Rule::Smooth | Rule::Dart => match rule {
+                StepRule::Smooth | StepRule::Dart => match rule {
                     StarRule::CatmullClark => {
                         out.own += c * (x - 2.0) / x;
                         out.edges.iter_mut().for_each(|e| *e += c / (x * x));
@@ -208,8 +208,8 @@ impl Star {
 
     /// The rules that the vertex follows in step k, each by the number of steps after which it would hold, and its weight.
     fn blend(&self, k: usize) -> Vec<(f64, usize)> {
-        let same =
-            self.rule(k) == self.rule(k + 1) && (self.rule(k) != Rule::Crease || self.crease(k) == self.crease(k + 1));
+        let same = self.rule(k) == self.rule(k + 1)
+            && (self.rule(k) != StepRule::Crease || self.crease(k) == self.crease(k + 1));
         if same {
             return vec![(1.0, k)];
         }

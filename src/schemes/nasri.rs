@@ -1,7 +1,7 @@
 //! Nasri's system: Doo-Sabin with its own first step, on any closed polygon mesh (Nasri 1987; Zheng-Cai §2).
 
 use super::Refinement;
-use super::doo_sabin::Rule;
+use super::doo_sabin::CornerRule;
 use super::scheme::{Circulant, Definition, PaperNames, QUADRATIC, SingularSet};
 
 /// h(n) = 1/n; a face of m corners adds the circulant of Doo-Sabin's corner rule: ¼ on its diagonal,
@@ -21,7 +21,7 @@ pub(super) const DEFINITION: Definition = Definition {
     singular: SingularSet::Never,
     regular_symbol: (0.25, 9.0 / 16.0),
     refinement: Refinement::DooSabin,
-    first_rule: Some(Rule::DooSabin),
+    first_rule: Some(CornerRule::DooSabin),
     curve_weight: QUADRATIC,
     star_rule: None,
 };

@@ -23,7 +23,7 @@ pub(super) enum Place {
 }
 
 /// The rule of a scheme at vertices of valence n ≥ 3, n ≠ 6.
-pub(super) struct Rule {
+pub(super) struct RingRule {
     pub place: Place,
     /// The weight of the vertex, and those of its neighbours in circular order: from the one on the edge; or the two
     /// of the triangle first.
@@ -44,7 +44,7 @@ type Half = [f64; WALKED / 2 + 2];
 pub(super) struct Rings<'a> {
     mesh: &'a Mesh,
     topology: &'a Topology,
-    rule: Rule,
+    rule: RingRule,
     /// Of every vertex, or the greatest number where that does not fit. A byte each, so that they stay in a cache.
     valences: Vec<u8>,
     /// By valence, up to [`WALKED`].
@@ -54,7 +54,7 @@ pub(super) struct Rings<'a> {
 }
 
 impl<'a> Rings<'a> {
-    pub(super) fn new(surface: &'a Surface, rule: Rule) -> Self {
+    pub(super) fn new(surface: &'a Surface, rule: RingRule) -> Self {
         let (mesh, topology) = (surface.mesh(), surface.topology());
         let valence = |v: usize| topology.incidence.face_count(v);
         let half = |n: usize| {
@@ -160,7 +160,7 @@ struct Wide {
 }
 
 impl Wide {
-    fn new(surface: &Surface, v: usize, rule: &Rule) -> Self {
+    fn new(surface: &Surface, v: usize, rule: &RingRule) -> Self {
         let (mesh, topology) = (surface.mesh(), surface.topology());
         let mut star = Vec::new();
         topology.star(&mesh.faces, v, &mut star);

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt;
 use std::str::FromStr;
 
-use super::doo_sabin::Rule;
+use super::doo_sabin::CornerRule;
 use super::local_limit::StarRule;
 use super::{Refinement, catmull_clark, loop_scheme, mid_edge, nasri, sqrt3, zheng_cai};
 use crate::error::Error;
@@ -86,7 +86,7 @@ pub(super) struct Definition {
     /// The refinement whose limit points A V are.
     pub(super) refinement: Refinement,
     /// The rule of the first step, where that is a Doo-Sabin step.
-    pub(super) first_rule: Option<Rule>,
+    pub(super) first_rule: Option<CornerRule>,
     /// w: on a curve of sharp edges the limit point is `w a + (1 − 2w) v + w b`, a and b the neighbours along it.
     pub(super) curve_weight: f64,
     /// How stars with darts and semi-sharp edges are refined; `None` if the scheme has no rule for these.
@@ -218,7 +218,7 @@ impl Scheme {
     }
 
     /// The rule of the first step, where the [`refinement`](Self::refinement) is Doo-Sabin's.
-    pub fn first_rule(self) -> Option<Rule> {
+    pub fn first_rule(self) -> Option<CornerRule> {
         self.definition().first_rule
     }
 }

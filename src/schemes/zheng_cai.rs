@@ -2,7 +2,7 @@
 //! & Cai 2005, Eq. 4 and 6), on any closed polygon mesh.
 
 use super::Refinement;
-use super::doo_sabin::Rule;
+use super::doo_sabin::CornerRule;
 use super::scheme::{Circulant, Definition, PaperNames, QUADRATIC, SingularSet};
 
 /// h(n) = 1/(2n), d(n) = n; a face of m corners adds 1/m between all of them.
@@ -21,7 +21,7 @@ pub(super) const DEFINITION: Definition = Definition {
     singular: SingularSet::Never,
     regular_symbol: (0.5, 0.625),
     refinement: Refinement::DooSabin,
-    first_rule: Some(Rule::ZhengCai),
+    first_rule: Some(CornerRule::ZhengCai),
     curve_weight: QUADRATIC,
     star_rule: None,
 };

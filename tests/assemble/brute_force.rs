@@ -5,7 +5,7 @@ use glam::DVec3;
 use limitlab::assemble::LimitSystem;
 use limitlab::mesh::random::{random_polygons, random_triangulation};
 use limitlab::mesh::{Mesh, Surface};
-use limitlab::schemes::doo_sabin::{self, Rule};
+use limitlab::schemes::doo_sabin::{self, CornerRule};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark, loop_scheme, mid_edge, sqrt3};
 use rayon::prelude::*;
 
@@ -18,8 +18,8 @@ fn limits(scheme: Scheme, surface: &Surface) -> Vec<DVec3> {
         Scheme::CatmullClark => catmull_clark::limit_positions(surface),
         Scheme::Loop => loop_scheme::limit_positions(surface),
         Scheme::Sqrt3 => sqrt3::limit_positions(surface),
-        Scheme::Nasri => doo_sabin::limit_positions(Rule::DooSabin, surface),
-        Scheme::ZhengCai => doo_sabin::limit_positions(Rule::ZhengCai, surface),
+        Scheme::Nasri => doo_sabin::limit_positions(CornerRule::DooSabin, surface),
+        Scheme::ZhengCai => doo_sabin::limit_positions(CornerRule::ZhengCai, surface),
         Scheme::MidEdge => mid_edge::limit_positions(surface),
     }
     .unwrap()
@@ -138,7 +138,7 @@ fn plain_refinement_ends_where_the_rows_say() {
 /// Under Doo-Sabin the face of a vertex shrinks to the limit point, and its centroid stays where the first step put it.
 #[test]
 fn the_faces_of_vertices_shrink_to_where_the_rows_say() {
-    for (scheme, rule) in [(Scheme::Nasri, Rule::DooSabin), (Scheme::ZhengCai, Rule::ZhengCai)] {
+    for (scheme, rule) in [(Scheme::Nasri, CornerRule::DooSabin), (Scheme::ZhengCai, CornerRule::ZhengCai)] {
         for seed in 0..8 {
             let surface = Surface::new(scattered(&small_polygons(seed), seed)).unwrap();
             let system = LimitSystem::new(&surface, scheme).unwrap();

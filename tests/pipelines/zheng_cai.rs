@@ -8,7 +8,7 @@ use limitlab::interpolate::zheng_cai::*;
 use limitlab::interpolate::{nasri, staged};
 use limitlab::mesh::{Mesh, Surface, builtin, io};
 use limitlab::schemes::Scheme;
-use limitlab::schemes::doo_sabin::{self, Rule};
+use limitlab::schemes::doo_sabin::{self, CornerRule};
 use limitlab::solvers::{Method, Outcome, Stop, run, run_watched};
 
 use crate::common::pipelines::{ROUNDING, centroid, distance, noisy_surface};
@@ -91,7 +91,7 @@ fn is_planar(mesh: &Mesh, f: usize, normal: DVec3, center: DVec3) -> bool {
 
 /// Directions that lean away from the mean direction of the faces, at some interpolated vertices.
 fn leaning(surface: &Surface, interpolated: &[bool]) -> Vec<Option<DVec3>> {
-    let outward = doo_sabin::limit_normals(Rule::ZhengCai, surface).unwrap();
+    let outward = doo_sabin::limit_normals(CornerRule::ZhengCai, surface).unwrap();
     let lean = |v: usize| DVec3::new((v as f64).sin(), (3.0 * v as f64).cos(), (v as f64).cos());
     (0..surface.len()).map(|v| (interpolated[v] && v % 3 == 0).then(|| 2.0 * outward[v] + 0.4 * lean(v))).collect()
 }
@@ -241,7 +241,7 @@ fn nasri_s_faces_have_the_given_centroids() {
             let solution = nasri::control_points(&surface, marks, Method::Cholesky, &stop).unwrap();
             assert_eq!(solution.report.outcome, Outcome::Converged);
             let control = surface.with_positions(solution.points);
-            let limits = doo_sabin::limit_positions(Rule::DooSabin, &control).unwrap();
+            let limits = doo_sabin::limit_positions(CornerRule::DooSabin, &control).unwrap();
             for v in 0..surface.len() {
                 let expected = if marks.is_none_or(|m| m[v]) { limits[v] } else { control.positions()[v] };
                 assert!(expected.distance(surface.positions()[v]) < ROUNDING, "{name} {v}");

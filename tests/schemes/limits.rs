@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 use limitlab::mesh::{Mesh, Surface};
-use limitlab::schemes::doo_sabin::{self, Rule};
+use limitlab::schemes::doo_sabin::{self, CornerRule};
 use limitlab::schemes::{Refinement, catmull_clark, loop_scheme, mid_edge, sqrt3};
 
 use super::ROUNDING;
@@ -147,7 +147,7 @@ fn face_centroid(surface: &Surface, f: usize) -> DVec3 {
 /// ever: its centroid stays, and its corners come as near as the circulant's eigenvalue ½ says.
 #[test]
 fn doo_sabin_limits_are_the_centroids_that_stay() {
-    for rule in [Rule::DooSabin, Rule::ZhengCai] {
+    for rule in [CornerRule::DooSabin, CornerRule::ZhengCai] {
         for surface in polygon_meshes() {
             let first = surface.faces().len() + surface.topology().edges();
             let limits = doo_sabin::limit_positions(rule, &surface).unwrap();
@@ -199,8 +199,8 @@ fn mid_edge_limits_are_the_centroids_that_stay() {
 #[test]
 fn doo_sabin_limits_of_triangles_do_not_depend_on_the_first_rule() {
     for surface in triangle_meshes() {
-        let [nasri, zheng_cai] =
-            [Rule::DooSabin, Rule::ZhengCai].map(|rule| doo_sabin::limit_positions(rule, &surface).unwrap());
+        let [nasri, zheng_cai] = [CornerRule::DooSabin, CornerRule::ZhengCai]
+            .map(|rule| doo_sabin::limit_positions(rule, &surface).unwrap());
         assert!(distance(&nasri, &zheng_cai) < ROUNDING);
     }
 }
@@ -209,7 +209,7 @@ fn doo_sabin_limits_of_triangles_do_not_depend_on_the_first_rule() {
 #[test]
 fn zheng_cai_limits_satisfy_their_equation() {
     for surface in polygon_meshes() {
-        let limits = doo_sabin::limit_positions(Rule::ZhengCai, &surface).unwrap();
+        let limits = doo_sabin::limit_positions(CornerRule::ZhengCai, &surface).unwrap();
         for (v, &limit) in limits.iter().enumerate() {
             let star = star(&surface, v);
             let n = star.valence as f64;

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec3};
 use limitlab::mesh::Surface;
-use limitlab::schemes::doo_sabin::{self, Rule};
+use limitlab::schemes::doo_sabin::{self, CornerRule};
 use limitlab::schemes::{Refinement, Tangents, catmull_clark, loop_scheme, sqrt3};
 
 use super::ROUNDING;
@@ -31,7 +31,7 @@ fn normals(scheme: Refinement, surface: &Surface) -> Vec<DVec3> {
         Refinement::Loop => loop_scheme::limit_normals(surface),
         Refinement::Sqrt3 => sqrt3::limit_normals(surface),
         Refinement::Butterfly | Refinement::LabsikGreiner | Refinement::MidEdge => scheme.limit_normals(surface),
-        _ => doo_sabin::limit_normals(Rule::DooSabin, surface),
+        _ => doo_sabin::limit_normals(CornerRule::DooSabin, surface),
     }
     .unwrap()
 }
@@ -166,7 +166,7 @@ fn normals_are_those_of_a_finely_refined_mesh() {
 fn doo_sabin_normals_are_those_of_a_finely_refined_mesh() {
     for surface in [prism(3), prism(5), pyramid(6), bipyramid(5), cube()] {
         let first = surface.faces().len() + surface.topology().edges();
-        for rule in [Rule::DooSabin, Rule::ZhengCai] {
+        for rule in [CornerRule::DooSabin, CornerRule::ZhengCai] {
             let normals = doo_sabin::limit_normals(rule, &surface).unwrap();
             let once = Surface::new(doo_sabin::refine_by(rule, &surface).unwrap()).unwrap();
             let fine = Refinement::DooSabin.refine_n(&once, 5).unwrap();

@@ -4,7 +4,7 @@ use glam::DVec3;
 use limitlab::mesh::generate::{permute_vertices, shuffle_faces, union};
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, Surface, Topology, builtin};
-use limitlab::schemes::doo_sabin::{self, Rule};
+use limitlab::schemes::doo_sabin::{self, CornerRule};
 use limitlab::schemes::{Refinement, catmull_clark, loop_scheme, sqrt3, unified_sqrt3};
 
 use super::meshes::*;
@@ -46,7 +46,8 @@ fn the_refined_topology_is_the_one_found_anew() {
     }
     // The faces of a step do not depend on the rule.
     for surface in meshes_for(Refinement::DooSabin) {
-        let [ours, others] = [Rule::DooSabin, Rule::ZhengCai].map(|rule| doo_sabin::refine_by(rule, &surface).unwrap());
+        let [ours, others] =
+            [CornerRule::DooSabin, CornerRule::ZhengCai].map(|rule| doo_sabin::refine_by(rule, &surface).unwrap());
         assert!(ours.faces == others.faces);
     }
     for surface in meshes_for(Refinement::Sqrt3) {

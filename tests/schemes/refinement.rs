@@ -195,7 +195,7 @@ fn steps_equal_their_masks_evaluated_face_by_face() {
             let expected = (n - 2.0) / n * surface.positions()[v] + (star.neighbors + star.centroids) / (n * n);
             assert!((fine.positions[v] - expected).length() < ROUNDING);
         }
-        for rule in [doo_sabin::Rule::DooSabin, doo_sabin::Rule::ZhengCai] {
+        for rule in [doo_sabin::CornerRule::DooSabin, doo_sabin::CornerRule::ZhengCai] {
             let points = doo_sabin::corner_points(surface.mesh(), rule);
             for (f, face) in surface.faces().iter().enumerate() {
                 let m = face.len();
@@ -247,7 +247,7 @@ fn steps_equal_their_masks_evaluated_face_by_face() {
 #[test]
 fn published_weights() {
     let near = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(x, y)| (x - y).abs() < 1e-14);
-    let doo_sabin = doo_sabin::Rule::DooSabin;
+    let doo_sabin = doo_sabin::CornerRule::DooSabin;
     assert!(near(&doo_sabin.circulant(4), &[9. / 16., 3. / 16., 1. / 16., 3. / 16.]));
     assert!(near(&doo_sabin.circulant(3), &[2. / 3., 1. / 6., 1. / 6.]));
     assert!(near(&loop_scheme::vertex_mask(6), &[5. / 8., 1. / 16.]));
@@ -265,7 +265,7 @@ fn published_weights() {
         let [v, e, f] = catmull_clark::limit_mask(n);
         let size = n as f64;
         assert!(near(&[a + size * b, c + size * d, v + size * (e + f)], &[1.0; 3]));
-        let sums = [doo_sabin, doo_sabin::Rule::ZhengCai].map(|r| r.circulant(n).iter().sum());
+        let sums = [doo_sabin, doo_sabin::CornerRule::ZhengCai].map(|r| r.circulant(n).iter().sum());
         assert!(near(&sums, &[1.0; 2]), "{sums:?}");
     }
 }

@@ -12,7 +12,7 @@ use limitlab::assemble::{LimitSystem, Stages};
 use limitlab::interpolate::zheng_cai::{Constraints, PhaseOne, interpolate};
 use limitlab::mesh::Surface;
 use limitlab::mesh::order::Order;
-use limitlab::schemes::doo_sabin::Rule;
+use limitlab::schemes::doo_sabin::CornerRule;
 use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::system::sweep;
 use limitlab::solvers::{Method, Outcome, Stop};
@@ -234,7 +234,7 @@ fn weights(_: &Lab) -> Result<Finding> {
     for m in 3..=50 {
         let size = m as f64;
         let cosine = |k: usize| (TAU * k as f64 / size).cos();
-        for (k, weight) in Rule::DooSabin.circulant(m).into_iter().enumerate() {
+        for (k, weight) in CornerRule::DooSabin.circulant(m).into_iter().enumerate() {
             // Eq. 1 for j ≠ i, (m+5)/(4m) else.
             let first = match k {
                 0 => (size + 5.0) / (4.0 * size),

@@ -8,7 +8,7 @@ use limitlab::interpolate::thall::normal_deviations;
 use limitlab::interpolate::zheng_cai::{Auxiliary, Constraints, FirstRefinement, PhaseOne, auxiliary};
 use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::Refinement;
-use limitlab::schemes::doo_sabin::{Rule, face_normals, refine_by};
+use limitlab::schemes::doo_sabin::{CornerRule, face_normals, refine_by};
 
 use super::finding::{Evidence, Finding};
 use super::lab::{Lab, each, largest, median, random_points};
@@ -32,8 +32,8 @@ fn corrected(subject: &Subject, sweeps: usize, constraints: &Constraints) -> Res
     let phase = PhaseOne { max_iterations: sweeps, eps: 0.0, ..PhaseOne::default() };
     let surface = &subject.surface;
     let auxiliary = auxiliary(surface, constraints.interpolated, &phase)?;
-    let before = refine_by(Rule::ZhengCai, &auxiliary.surface)?;
-    let after = FirstRefinement::new(&auxiliary.surface, Rule::ZhengCai, surface.positions(), constraints)?;
+    let before = refine_by(CornerRule::ZhengCai, &auxiliary.surface)?;
+    let after = FirstRefinement::new(&auxiliary.surface, CornerRule::ZhengCai, surface.positions(), constraints)?;
     Ok(Corrected { auxiliary, before, after })
 }
 
@@ -252,7 +252,7 @@ pub(super) fn tangent_plane(lab: &Lab) -> Result<Finding> {
 
 pub(super) fn separated_faces(lab: &Lab) -> Result<Finding> {
     let rows = each(lab.polygons(), |subject| {
-        let fine = refine_by(Rule::ZhengCai, &subject.surface)?;
+        let fine = refine_by(CornerRule::ZhengCai, &subject.surface)?;
         let first = subject.surface.faces().len() + subject.surface.topology().edges();
         let mut uses = vec![0usize; fine.len()];
         for f in first..fine.faces.len() {

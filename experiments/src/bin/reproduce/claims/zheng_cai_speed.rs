@@ -6,7 +6,7 @@ use limitlab::Result;
 use limitlab::analysis::dense::gaussian_elimination;
 use limitlab::interpolate::zheng_cai::{Constraints, FirstRefinement, PhaseOne, Sweep, auxiliary};
 use limitlab::schemes::Scheme;
-use limitlab::schemes::doo_sabin::Rule;
+use limitlab::schemes::doo_sabin::CornerRule;
 use limitlab::solvers::{Method, Stop, run};
 
 use super::finding::{Evidence, Finding, Value};
@@ -145,7 +145,8 @@ pub fn phases(lab: &Lab) -> Result<Finding> {
         let first = seconds(5, || auxiliary(surface, None, &phase).map(|a| a.updates.len()));
         let plain = Constraints::default();
         let second = seconds(5, || {
-            FirstRefinement::new(&made.surface, Rule::ZhengCai, surface.positions(), &plain).map(|f| f.surface.len())
+            FirstRefinement::new(&made.surface, CornerRule::ZhengCai, surface.positions(), &plain)
+                .map(|f| f.surface.len())
         });
         Ok(Value::Time(second / first))
     };
