@@ -117,7 +117,7 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
 
 /// The topology of `refined`, which is what [`refine`] or [`butterfly`](super::butterfly) made of the surface.
 pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
-    refined::of_fours(surface.topology(), refined)
+    refined::of_fours(surface, refined)
 }
 
 /// Refuses two triangles with the same corners, which a valid mesh has only beside a part with a boundary.

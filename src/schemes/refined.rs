@@ -18,101 +18,6 @@ const CHUNK: usize = 4096;
 
 /// After the split of every face into quads, one a corner: quad c is (vertex, edge of c, face, edge of prev c).
 pub(super) fn of_quads(surface: &Surface, refined: &Mesh) -> Topology {
-    if !surface.is_closed() {
-        return of_quads_with_boundary(surface, refined);
-    }
-    let (mesh, topology) = (surface.mesh(), surface.topology());
-    let (faces, incidence, twin) = (&mesh.faces, &topology.incidence, topology.twins());
-    let count = twin.len();
-    let (next, prev) = (|c| incidence.next(faces, c), |c| incidence.prev(faces, c));
-    let mut twins = large(vec![0; 4 * count]);
-    set_rows(&mut twins, |c| {
-        let before = prev(c);
-        [4 * next(twin[c as usize]) + 3, 4 * next(c) + 2, 4 * before + 1, 4 * twin[before as usize]]
-    });
-
-    let mut corners = large(vec![0; 4 * count]);
-    let (at_vertices, rest) = corners.split_at_mut(count);
-    let (at_edges, at_faces) = rest.split_at_mut(2 * count);
-    scale(at_vertices, incidence.corners(), |c| 4 * c);
-    set_by_edge(at_edges, topology, |c| {
-        let t = twin[c as usize];
-        let mut corners = [4 * c + 1, 4 * next(c) + 3, 4 * t + 1, 4 * next(t) + 3];
-        corners.sort_unstable();
-        corners
-    });
-    set_rows(at_faces, |c| [4 * c + 2]);
-
-    let mut offsets = large(Vec::with_capacity(refined.len() + 1));
-    parallel::append(&mut offsets, incidence.offsets());
-    push_ends(&mut offsets, count, 4, count / 2);
-    let first = 3 * count as u32;
-    parallel::extend(&mut offsets, faces.len(), |_| |f| first + faces.range(f).end as u32);
-    closed(refined, offsets, corners, twins)
-}
-
-/// After the split of every triangle f in four: triangle 4f + i is (vertex, edge of c, edge of prev c) with c = 3f + i,
-/// triangle 4f + 3 has the three edges.
-pub(super) fn of_fours(topology: &Topology, refined: &Mesh) -> Topology {
-    if !topology.is_closed() {
-        return of_fours_with_boundary(topology, refined);
-    }
-    let (incidence, twin) = (&topology.incidence, topology.twins());
-    let count = twin.len();
-    let mut twins = large(vec![0; 4 * count]);
-    set_rows(&mut twins, |f| {
-        let mut twins = [0; 12];
-        let middle = 12 * f + 9;
-        for i in 0..3 {
-            let (next, prev) = ((i + 1) % 3, (i + 2) % 3);
-            let t = twin[(3 * f + i) as usize];
-            let entering = twin[(3 * f + prev) as usize];
-            let at = 3 * i as usize;
-            twins[at] = outer(next_in_triangle(t) as u32) + 2;
-            twins[at + 1] = middle + prev;
-            twins[at + 2] = outer(entering);
-            twins[9 + i as usize] = outer(3 * f + next) + 1;
-        }
-        twins
-    });
-
-    let mut corners = large(vec![0; 4 * count]);
-    let (at_vertices, at_edges) = corners.split_at_mut(count);
-    scale(at_vertices, incidence.corners(), outer);
-    set_by_edge(at_edges, topology, |c| {
-        let ([a, b, m], [d, e, n]) = (at_side(c), at_side(twin[c as usize]));
-        [a, b, m, d, e, n]
-    });
-
-    let mut offsets = large(Vec::with_capacity(refined.len() + 1));
-    parallel::append(&mut offsets, incidence.offsets());
-    push_ends(&mut offsets, count, 6, count / 2);
-    closed(refined, offsets, corners, twins)
-}
-
-/// The half-edges along half-edge c after the split into quads.
-pub(super) fn halves_in_quads(surface: &Surface, c: u32) -> [u32; 2] {
-    [4 * c, 4 * surface.incidence().next(surface.faces(), c) + 3]
-}
-
-/// The half-edges along half-edge c after the split of triangles in four.
-pub(super) fn halves_in_fours(_: &Surface, c: u32) -> [u32; 2] {
-    [outer(c), outer(next_in_triangle(c) as u32) + 2]
-}
-
-/// After the split of triangles in four, the first corner of the triangle at corner c.
-fn outer(c: u32) -> u32 {
-    3 * (c + c / 3)
-}
-
-/// After the split of triangles in four, the corners at the vertex of the edge of c in the face of c, ascending.
-fn at_side(c: u32) -> [u32; 3] {
-    let (here, after) = (outer(c) + 1, outer(next_in_triangle(c) as u32) + 2);
-    [here.min(after), here.max(after), 12 * (c / 3) + 9 + c % 3]
-}
-
-/// As [`of_quads`], of an open mesh.
-fn of_quads_with_boundary(surface: &Surface, refined: &Mesh) -> Topology {
     let (mesh, topology) = (surface.mesh(), surface.topology());
     let (faces, incidence, twin) = (&mesh.faces, &topology.incidence, topology.twins());
     let count = twin.len();
@@ -132,21 +37,26 @@ fn of_quads_with_boundary(surface: &Surface, refined: &Mesh) -> Topology {
     let (at_vertices, rest) = corners.split_at_mut(count);
     let (at_edges, at_faces) = rest.split_at_mut(2 * count);
     scale(at_vertices, incidence.corners(), |c| 4 * c);
-    set_sides_by_edge(at_edges, &offsets[incidence.vertices()..], topology, |c, row: &mut [[u32; 2]]| {
-        for (side, c) in row.iter_mut().zip([c, twin[c as usize]]) {
-            *side = [4 * c + 1, 4 * next(c) + 3];
-        }
-        row.as_flattened_mut().sort_unstable();
+    let at_side = |c| {
+        let (here, after) = (4 * c + 1, 4 * next(c) + 3);
+        [here.min(after), here.max(after)]
+    };
+    set_by_sides(at_edges, &offsets[incidence.vertices()..], topology, at_side, |c, t| {
+        let ([a, b], [d, e]) = (at_side(c), at_side(t));
+        let mut corners = [a, b, d, e];
+        corners.sort_unstable();
+        corners
     });
     set_rows(at_faces, |c| [4 * c + 2]);
     let first = 3 * count as u32;
     parallel::extend(&mut offsets, faces.len(), |_| |f| first + faces.range(f).end as u32);
-    let boundary = halved(topology, |c| halves_in_quads(surface, c));
-    Topology::open(Incidence::from_parts(offsets, corners, &refined.faces), twins, boundary)
+    halved(surface, refined, [offsets, corners, twins], halves_in_quads)
 }
 
-/// As [`of_fours`], of an open mesh.
-fn of_fours_with_boundary(topology: &Topology, refined: &Mesh) -> Topology {
+/// After the split of every triangle f in four: triangle 4f + i is (vertex, edge of c, edge of prev c) with c = 3f + i,
+/// triangle 4f + 3 has the three edges.
+pub(super) fn of_fours(surface: &Surface, refined: &Mesh) -> Topology {
+    let topology = surface.topology();
     let (incidence, twin) = (&topology.incidence, topology.twins());
     let count = twin.len();
     let mut twins = large(vec![0; 4 * count]);
@@ -170,13 +80,32 @@ fn of_fours_with_boundary(topology: &Topology, refined: &Mesh) -> Topology {
     let mut corners = large(vec![0; 4 * count]);
     let (at_vertices, at_edges) = corners.split_at_mut(count);
     scale(at_vertices, incidence.corners(), outer);
-    set_sides_by_edge(at_edges, &offsets[incidence.vertices()..], topology, |c, row: &mut [[u32; 3]]| {
-        for (side, c) in row.iter_mut().zip([c, twin[c as usize]]) {
-            *side = at_side(c);
-        }
+    set_by_sides(at_edges, &offsets[incidence.vertices()..], topology, at_side, |c, t| {
+        let ([a, b, m], [d, e, n]) = (at_side(c), at_side(t));
+        [a, b, m, d, e, n]
     });
-    let boundary = halved(topology, |c| [outer(c), outer(next_in_triangle(c) as u32) + 2]);
-    Topology::open(Incidence::from_parts(offsets, corners, &refined.faces), twins, boundary)
+    halved(surface, refined, [offsets, corners, twins], halves_in_fours)
+}
+
+/// The half-edges along half-edge c after the split into quads.
+pub(super) fn halves_in_quads(surface: &Surface, c: u32) -> [u32; 2] {
+    [4 * c, 4 * surface.incidence().next(surface.faces(), c) + 3]
+}
+
+/// The half-edges along half-edge c after the split of triangles in four.
+pub(super) fn halves_in_fours(_: &Surface, c: u32) -> [u32; 2] {
+    [outer(c), outer(next_in_triangle(c) as u32) + 2]
+}
+
+/// After the split of triangles in four, the first corner of the triangle at corner c.
+fn outer(c: u32) -> u32 {
+    3 * (c + c / 3)
+}
+
+/// After the split of triangles in four, the corners at the vertex of the edge of c in the face of c, ascending.
+fn at_side(c: u32) -> [u32; 3] {
+    let (here, after) = (outer(c) + 1, outer(next_in_triangle(c) as u32) + 2);
+    [here.min(after), here.max(after), 12 * (c / 3) + 9 + c % 3]
 }
 
 /// What becomes of a twin; [`NONE`] of none.
@@ -184,44 +113,56 @@ fn there(twin: u32, map: impl Fn(u32) -> u32) -> u32 {
     if twin == NONE { NONE } else { map(twin) }
 }
 
-/// The halves of the sides without a twin, ascending.
-fn halved(topology: &Topology, halves: impl Fn(u32) -> [u32; 2]) -> Vec<u32> {
-    let mut halved: Vec<u32> = topology.boundary_half_edges().iter().flat_map(|&c| halves(c)).collect();
-    halved.sort_unstable();
-    halved
+/// The topology with these offsets, corners and twins, where every side without a twin became its two `halves`.
+fn halved(
+    surface: &Surface,
+    refined: &Mesh,
+    [offsets, corners, twins]: [Vec<u32>; 3],
+    halves: fn(&Surface, u32) -> [u32; 2],
+) -> Topology {
+    let incidence = Incidence::from_parts(offsets, corners, &refined.faces);
+    let mut boundary: Vec<u32> = surface.boundary_half_edges().iter().flat_map(|&c| halves(surface, c)).collect();
+    boundary.sort_unstable();
+    Topology::open(incidence, twins, boundary)
 }
 
 /// Appends the ends of a row for every edge, of `size` entries a side, that begin after the last end.
 fn push_ends_by_edge(offsets: &mut Vec<u32>, topology: &Topology, size: u32) {
-    let edges = topology.edge_numbers();
     let start = offsets[offsets.len() - 1];
-    let rim: Vec<u32> = topology.boundary_half_edges().iter().map(|&c| edges.of(c)).collect();
+    let edges = topology.edge_numbers();
+    let single: Vec<u32> = topology.boundary_half_edges().iter().map(|&c| edges.of(c)).collect();
     parallel::extend(offsets, topology.edges(), |first| {
-        let rim = &rim;
-        // How many edges up to this one have one side.
-        let mut single = rim.partition_point(|&e| (e as usize) < first);
+        let mut before = single.partition_point(|&e| (e as usize) < first);
+        let single = &single;
         move |e| {
-            single += usize::from(rim.get(single) == Some(&(e as u32)));
-            start + size * (2 * (e + 1) - single) as u32
+            before += usize::from(single.get(before) == Some(&(e as u32)));
+            start + size * (2 * (e + 1) - before) as u32
         }
     });
 }
 
-/// Has `set(c, row)` write the row of every edge, c its first half-edge, of N entries a side; rows end as in `offsets`.
-fn set_sides_by_edge<const N: usize>(
+/// Gives every edge, in order, a row: `one` of its side, or `two` of its first side and the other. Rows end as in `offsets`.
+fn set_by_sides<const ONE: usize, const TWO: usize>(
     values: &mut [u32],
     offsets: &[u32],
     topology: &Topology,
-    set: impl Fn(u32, &mut [[u32; N]]) + Sync,
+    one: impl Fn(u32) -> [u32; ONE] + Sync,
+    two: impl Fn(u32, u32) -> [u32; TWO] + Sync,
 ) {
-    let edges = topology.edge_numbers();
+    let (edges, twin) = (topology.edge_numbers(), topology.twins());
     parallel::parts(split_rows(offsets, CHUNK, values), |rows, mut part| {
-        for (e, c) in rows.clone().zip(edges.firsts_from(rows.start as u32)) {
-            let (row, rest) = part.split_at_mut((offsets[e + 1] - offsets[e]) as usize);
-            set(c, row.as_chunks_mut().0);
-            part = rest;
+        for c in edges.firsts_from(rows.start as u32).take(rows.len()) {
+            let t = twin[c as usize];
+            part = if t == NONE { put(part, one(c)) } else { put(part, two(c, t)) };
         }
     });
+}
+
+/// Writes a row to the beginning of `part`, and gives the rest.
+fn put<const N: usize>(part: &mut [u32], row: [u32; N]) -> &mut [u32] {
+    let (here, rest) = part.split_at_mut(N);
+    here.copy_from_slice(&row);
+    rest
 }
 
 /// After the split of every triangle in three and the flip of every old edge: triangle c is (vertex, face of t, face
