@@ -67,13 +67,16 @@ pub enum Error {
     },
     /// A method that needs A = H·M with a symmetric M, on a mesh with darts or semi-sharp vertices.
     #[error(
-        "vertex {vertex} is a dart or semi-sharp, so that no diagonal makes the matrix symmetric, as {method} needs it; use auto or lu"
+        "vertex {vertex} is a dart or semi-sharp, so that no diagonal makes the matrix symmetric, as {method} needs it; use auto, {}",
+        one_of(others)
     )]
     Unsymmetric {
         /// The first such vertex, from 0.
         vertex: usize,
         /// The method by name.
         method: &'static str,
+        /// Those that need none, by name.
+        others: Vec<&'static str>,
     },
     /// A vertex that is semi-sharp, or at a semi-sharp edge.
     #[error(

@@ -3,10 +3,10 @@
 use glam::DVec3;
 
 use super::spectral_radius::sweep_radius;
-use super::spectrum::{Extremes, Spectrum};
-use crate::assemble::LimitSystem;
+use super::spectrum::{Extremes, Spectra};
+use super::symmetric::SymmetricForm;
 use crate::error::Result;
-use crate::solvers::Method;
+use crate::solvers::{Method, System};
 use crate::solvers::jacobi::THALL_OMEGA;
 use crate::solvers::ssor::symmetric_sweep;
 use crate::solvers::system::sweep;
@@ -14,12 +14,15 @@ use crate::solvers::system::sweep;
 /// The predicted factor per iteration of a method on a system with the given spectra, whose best parameters stand for those
 /// that are open. For relaxation it is the
 /// spectral radius of the error matrix; for the heavy ball, Chebyshev and conjugate gradients (√κ−1)/(√κ+1), which
-/// conjugate gradients may beat. `None` for direct methods, and where no prediction is made (Anderson acceleration, plain
-/// and incomplete-Cholesky conjugate gradients).
+/// conjugate gradients may beat. `None` for direct methods, where no prediction is made (Anderson acceleration, plain
+/// and incomplete-Cholesky conjugate gradients), and where the spectra do not tell: of relaxation if they are not known, of
+/// methods made for real ones if they are complex.
 ///
 /// # Errors
 /// If the spectral radius of a sweep cannot be computed.
-pub fn predicted_rate(system: &LimitSystem, spectrum: &Spectrum, method: Method) -> Result<Option<f64>> {
+pub fn predicted_rate(system: &impl System, spectra: &impl Spectra, method: Method) -> Result<Option<f64>> {
+    let relaxed = |form, omega: Option<f64>| spectra.radius(form, omega.or_else(|| spectra.optimal_omega(form))?);
+    let real = spectra.real();
     let zero = || vec![DVec3::ZERO; system.len()];
     Ok(match method {
         Method::Lu | Method::Cholesky | Method::SecondCholesky | Method::Ldlt | Method::PlainCg | Method::PcgIc0 => {
@@ -27,13 +30,11 @@ pub fn predicted_rate(system: &LimitSystem, spectrum: &Spectrum, method: Method)
         }
         // Between the relaxation's own rate and that of full GMRES.
         Method::Anderson { .. } => None,
-        Method::Jacobi { omega } => {
-            Some(spectrum.jacobi.radius(omega.unwrap_or_else(|| spectrum.jacobi.optimal_omega())))
-        }
-        Method::Thall => Some(spectrum.jacobi.radius(THALL_OMEGA)),
-        Method::Pia => Some(spectrum.a.radius(1.0)),
-        Method::WPia { omega } => Some(spectrum.a.radius(omega.unwrap_or_else(|| spectrum.a.optimal_omega()))),
-        Method::GaussSeidel { order } => return predicted_rate(system, spectrum, Method::Sor { omega: 1.0, order }),
+        Method::Jacobi { omega } => relaxed(SymmetricForm::Jacobi, omega),
+        Method::Thall => relaxed(SymmetricForm::Jacobi, Some(THALL_OMEGA)),
+        Method::Pia => relaxed(SymmetricForm::A, Some(1.0)),
+        Method::WPia { omega } => relaxed(SymmetricForm::A, omega),
+        Method::GaussSeidel { order } => return predicted_rate(system, spectra, Method::Sor { omega: 1.0, order }),
         Method::Sor { omega, order } => {
             let points = zero();
             let natural: Vec<u32>;
@@ -56,10 +57,11 @@ pub fn predicted_rate(system: &LimitSystem, spectrum: &Spectrum, method: Method)
             })?)
         }
         Method::HeavyBall { interval } | Method::Chebyshev { interval } => {
-            Some(interval.map_or(spectrum.a, |(min, max)| Extremes { min, max }).krylov_rate())
+            real.map(|s| interval.map_or(s.a, |(min, max)| Extremes { min, max }).krylov_rate())
         }
-        Method::Cg => Some(spectrum.a.krylov_rate()),
-        Method::PcgJacobi => Some(spectrum.jacobi.krylov_rate()),
+        Method::Cg => real.map(|s| s.a.krylov_rate()),
+        Method::PcgJacobi => real.map(|s| s.jacobi.krylov_rate()),
+        Method::PcgSsor { .. } if real.is_none() => None,
         Method::PcgSsor { omega } => {
             // The preconditioned matrix is I − E with E the error matrix of SSOR, whose spectrum is in [0, ρ].
             let points = zero();

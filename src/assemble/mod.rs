@@ -1,5 +1,5 @@
 //! Assembly of the limit system `A V = P` of a mesh: the schemes as four small functions, one generic assembler into
-//! own compressed sparse rows, the same as a sequence of stages where there are boundaries and creases, proven bounds
+//! own compressed sparse rows, the same as a sequence of stages where there are boundaries and creases, and as a whole, proven bounds
 //! from valences and face sizes, Matrix Market files; systems of other origin.
 //! This room knows no solvers.
 
@@ -10,6 +10,7 @@ pub mod csr;
 pub mod curves;
 pub mod face_sums;
 mod gather;
+pub mod general;
 pub mod kernel;
 pub mod matrix_market;
 mod neighbours;
@@ -21,6 +22,7 @@ pub mod system;
 pub mod weights;
 
 pub use csr::Csr;
+pub use general::GeneralSystem;
 pub use operator::Operator;
 pub use stages::Stages;
 pub use system::LimitSystem;

@@ -195,7 +195,7 @@ fn what_cannot_be_is_refused_by_name() {
     assert!(matches!(LimitSystem::new(&dart, Scheme::CatmullClark), Err(Error::Creased { .. })));
     let cholesky = Options { method: Some(Method::Cholesky), ..Options::default() };
     let refused = interpolate(&dart, Scheme::CatmullClark, &cholesky);
-    assert!(matches!(refused, Err(Error::Unsymmetric { vertex: 0, method: "cholesky" })));
+    assert!(matches!(refused, Err(Error::Unsymmetric { vertex: 0, method: "cholesky", .. })));
     let semi = cube.tagged(&Tags { creases: vec![([0, 1], 2.5)], ..Tags::default() }).unwrap();
     assert_eq!(semi.features().unwrap().count(Rule::SemiSharp), 2);
     assert!(matches!(Stages::new(&semi, Scheme::ZhengCai, None), Err(Error::SemiSharp { vertex: 0, .. })));
