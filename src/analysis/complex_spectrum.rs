@@ -91,10 +91,7 @@ impl Spectra for ComplexSpectrum {
 
     fn ends(&self, form: SymmetricForm) -> Option<Extremes> {
         let parts = || self.eigenvalues(form).map(|all| all.iter().map(|z| z.re));
-        Some(Extremes {
-            min: parts()?.fold(f64::INFINITY, f64::min),
-            max: parts()?.fold(f64::NEG_INFINITY, f64::max),
-        })
+        Some(Extremes { min: parts()?.fold(f64::INFINITY, f64::min), max: parts()?.fold(f64::NEG_INFINITY, f64::max) })
     }
 
     fn real(&self) -> Option<&Spectrum> {

@@ -6,10 +6,10 @@ use super::spectral_radius::sweep_radius;
 use super::spectrum::{Extremes, Spectra};
 use super::symmetric::SymmetricForm;
 use crate::error::Result;
-use crate::solvers::{Method, System};
 use crate::solvers::jacobi::THALL_OMEGA;
 use crate::solvers::ssor::symmetric_sweep;
 use crate::solvers::system::sweep;
+use crate::solvers::{Method, System};
 
 /// The predicted factor per iteration of a method on a system with the given spectra, whose best parameters stand for those
 /// that are open. For relaxation it is the

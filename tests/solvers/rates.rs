@@ -70,7 +70,16 @@ fn torus_sweep(grid: &[f64]) -> OmegaSweep {
     let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 20_000 };
     let floor = rounding_floor(mesh.diagonal());
     let grids = [(JACOBI, grid.to_vec())];
-    sweep((&system, &spectrum(&system).unwrap()), (&mesh.positions, &mesh.positions), &grids, None, &stop, floor, &|_| {}).unwrap()
+    sweep(
+        (&system, &spectrum(&system).unwrap()),
+        (&mesh.positions, &mesh.positions),
+        &grids,
+        None,
+        &stop,
+        floor,
+        &|_| {},
+    )
+    .unwrap()
 }
 
 /// On noisy points the constant vector, which has 9/4, is not excited; its neighbours in frequency are.

@@ -5,11 +5,11 @@ use std::process::ExitCode;
 use clap::Parser;
 use serde_json::json;
 
-use limitlab::{Error, Result};
 use limitlab::analysis::comparison::{self, MethodRow};
 use limitlab::analysis::spectrum::{Spectra, spectrum};
 use limitlab::mesh::order::Order;
 use limitlab::solvers::{Method, System};
+use limitlab::{Error, Result};
 use limitlab_experiments::cli::{
     self, CommonFlags, List, Matrix, MeshFlags, OutputFlags, Problem, Progress, StopFlags,
 };

@@ -17,12 +17,12 @@ use limitlab::analysis::subspace_iteration::End;
 use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::assemble::LimitSystem;
 use limitlab::assemble::bounds::SpectralBounds;
+use limitlab::mesh::features::Features;
 use limitlab::solvers::direct::SINGULAR;
 use limitlab::solvers::{Method, Stop, System};
 use limitlab_experiments::cli::{
     self, CommonFlags, Given, Input, MeshFlags, OutputFlags, Progress, StopFlags, Subject, number,
 };
-use limitlab::mesh::features::Features;
 use limitlab_experiments::report::series::Bars;
 use limitlab_experiments::report::{Column, Columns, Figure, LinePlot, Rule, Table};
 use limitlab_experiments::studies::complex_spectrum::{ComplexFindings, radii_of_sweeps};
@@ -271,7 +271,8 @@ fn analyse_any(
         ));
     }
     progress.step();
-    let sweeps = system.filter(|_| !arguments.no_sweeps).map(radii_of_sweeps::<LimitSystem>).transpose()?.unwrap_or_default();
+    let sweeps =
+        system.filter(|_| !arguments.no_sweeps).map(radii_of_sweeps::<LimitSystem>).transpose()?.unwrap_or_default();
     progress.step();
     let data = if arguments.no_data {
         [None; 2]

@@ -75,7 +75,9 @@ impl Input {
         let Some(features) = self.surface.features() else { return whole };
         if features.has_stars() {
             let [darts, semi_sharp] = [Rule::Dart, Rule::SemiSharp].map(|rule| features.count(rule));
-            return format!("{whole}; the system of all vertices, {darts} darts and {semi_sharp} semi-sharp ones among them");
+            return format!(
+                "{whole}; the system of all vertices, {darts} darts and {semi_sharp} semi-sharp ones among them"
+            );
         }
         let [smooth, curves, corners] = [Rule::Smooth, Rule::Crease, Rule::Corner].map(|rule| features.count(rule));
         format!("{whole}; the system of the {smooth} smooth vertices, after {curves} on curves and {corners} corners")
@@ -165,7 +167,9 @@ impl Problem {
     /// As [`interpolate`].
     pub fn auto(&self) -> Result<Solution> {
         match &self.source {
-            Source::Mesh(surface, scheme, _) | Source::Unsymmetric(surface, scheme, ..) => interpolate(surface, *scheme, &self.stop.into()),
+            Source::Mesh(surface, scheme, _) | Source::Unsymmetric(surface, scheme, ..) => {
+                interpolate(surface, *scheme, &self.stop.into())
+            }
             Source::Folder(system) => Ok(solve_stored(system, &self.points, &self.stop)),
         }
     }
@@ -273,9 +277,7 @@ fn of_mesh(input: Input, stop: &StopFlags, order: Order) -> Result<Problem> {
         order,
         scale: input.frame.scale(),
         source: match stages.stars().map(|stars| stars.vertices()[0] as usize) {
-            Some(vertex) => {
-                Source::Unsymmetric(input.surface, input.scheme, Box::new(stages.whole()), vertex)
-            }
+            Some(vertex) => Source::Unsymmetric(input.surface, input.scheme, Box::new(stages.whole()), vertex),
             None => Source::Mesh(input.surface, input.scheme, Box::new(stages)),
         },
     })

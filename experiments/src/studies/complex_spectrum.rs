@@ -158,7 +158,9 @@ impl ComplexFindings {
                 self.verdict.components,
                 first.first_vertex,
             ),
-            (_, Some(condition)) => format!("no component is singular by theory: none has {condition} with darts alone."),
+            (_, Some(condition)) => {
+                format!("no component is singular by theory: none has {condition} with darts alone.")
+            }
             _ => "no component is singular by theory.".into(),
         }
     }

@@ -7,6 +7,7 @@ mod figures;
 mod line_preconditioner;
 mod methods;
 mod omega;
+mod open_decay;
 mod open_meshes;
 mod orders;
 mod pia;

@@ -86,7 +86,8 @@ fn one(context: &mut Context, subject: &Subject, scheme: Scheme) -> Result<Omega
     let size = subject.surface.diagonal();
     let stop = Stop { tolerance: TOLERANCE * size, max_iterations: LIMIT };
     let points = subject.surface.positions();
-    let found = sweep((&system, &spectrum(&system)?), (points, points), &grids, None, &stop, rounding_floor(size), &|_| {})?;
+    let found =
+        sweep((&system, &spectrum(&system)?), (points, points), &grids, None, &stop, rounding_floor(size), &|_| {})?;
     let stem = format!("{}--{}-{scheme}", SWEEPS.id, subject.name.replace([':', ' '], "-"));
     let title = format!("{} under {scheme}", subject.name);
     let about = format!(
