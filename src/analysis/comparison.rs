@@ -60,7 +60,7 @@ const EXCESS: f64 = 1e-6;
 
 /// The method with its open parameters set by the spectrum: Jacobi and W-PIA to their best ω, the interval of the heavy
 /// ball to the estimated one, that of Chebyshev to the proven one where that is positive, else to the estimated one.
-/// `spectra` are asked for only where they are needed; what they do not tell stays open.
+/// `spectra` are asked for only where they are needed; an interval stays open where they are complex.
 ///
 /// # Errors
 /// Those of `spectra`.
@@ -70,7 +70,7 @@ pub fn with_spectrum<'a, K: Spectra>(
     spectra: &dyn Fn() -> Result<K>,
 ) -> Result<Method<'a>> {
     let bounds = &system.bounds();
-    let optimal = |form| Ok(spectra()?.optimal_omega(form));
+    let optimal = |form| Ok(Some(spectra()?.optimal_omega(form)));
     let estimated = || Ok(spectra()?.real().map(|spectrum| estimated(system, spectrum)));
     Ok(match method {
         Method::Jacobi { omega: None } => Method::Jacobi { omega: optimal(SymmetricForm::Jacobi)? },

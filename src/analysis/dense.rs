@@ -54,18 +54,15 @@ fn both(system: &LimitSystem) -> Result<Eigenvalues> {
     })
 }
 
-/// The eigenvalues of A and of D⁻¹A where these are similar to no symmetric matrix, unsorted; `None` beyond
-/// [`LARGEST_COMPLEX`] unknowns. O(N³) time, O(N²) memory.
+/// The eigenvalues of A and of D⁻¹A where these are similar to no symmetric matrix, unsorted. O(N³) time, O(N²) memory.
 ///
 /// # Errors
-/// If the computation does not converge.
-pub fn complex_eigenvalues(system: &GeneralSystem) -> Result<Option<[Vec<Complex<f64>>; 2]>> {
+/// If N exceeds [`LARGEST_COMPLEX`], or the computation does not converge.
+pub fn complex_eigenvalues(system: &GeneralSystem) -> Result<[Vec<Complex<f64>>; 2]> {
     let a = system.matrix();
-    if a.len() > LARGEST_COMPLEX {
-        return Ok(None);
-    }
+    within_limit(a.len(), LARGEST_COMPLEX)?;
     let inverse: Vec<f64> = system.diagonal().iter().map(|d| 1.0 / d).collect();
-    Ok(Some([unsymmetric_values(&to_dense(a))?, unsymmetric_values(&to_dense(&a.scale_rows(&inverse)))?]))
+    Ok([unsymmetric_values(&to_dense(a))?, unsymmetric_values(&to_dense(&a.scale_rows(&inverse)))?])
 }
 
 fn unsymmetric_values(matrix: &Mat<f64>) -> Result<Vec<Complex<f64>>> {

@@ -73,17 +73,18 @@ pub struct Spectrum {
 
 /// What is computed of the spectra of A and of D⁻¹A: it settles parameters that methods leave open, and predicts rates.
 pub trait Spectra {
-    /// max |1 − ωλ| over the eigenvalues of the matrix of `form`: the rate of relaxation by ω. `None` if it is not known.
+    /// max |1 − ωλ| over the eigenvalues of the matrix of `form`: the rate of relaxation by ω. `None` if too little of them is
+    /// known.
     fn radius(&self, form: SymmetricForm, omega: f64) -> Option<f64>;
 
     /// Where that is least.
-    fn optimal_omega(&self, form: SymmetricForm) -> Option<f64>;
+    fn optimal_omega(&self, form: SymmetricForm) -> f64;
 
     /// Where that is 1, beyond which relaxation diverges.
-    fn critical_omega(&self, form: SymmetricForm) -> Option<f64>;
+    fn critical_omega(&self, form: SymmetricForm) -> f64;
 
     /// The ends of the real parts of the eigenvalues.
-    fn ends(&self, form: SymmetricForm) -> Option<Extremes>;
+    fn ends(&self, form: SymmetricForm) -> Extremes;
 
     /// The spectra themselves, where they are real: what methods need that are made for an interval.
     fn real(&self) -> Option<&Spectrum>;
@@ -100,30 +101,24 @@ pub trait Spectra {
     ) -> Result<Option<Extremes>>;
 }
 
-impl Spectrum {
-    fn of(&self, form: SymmetricForm) -> Extremes {
+impl Spectra for Spectrum {
+    fn radius(&self, form: SymmetricForm, omega: f64) -> Option<f64> {
+        Some(self.ends(form).radius(omega))
+    }
+
+    fn optimal_omega(&self, form: SymmetricForm) -> f64 {
+        self.ends(form).optimal_omega()
+    }
+
+    fn critical_omega(&self, form: SymmetricForm) -> f64 {
+        self.ends(form).critical_omega()
+    }
+
+    fn ends(&self, form: SymmetricForm) -> Extremes {
         match form {
             SymmetricForm::A => self.a,
             SymmetricForm::Jacobi => self.jacobi,
         }
-    }
-}
-
-impl Spectra for Spectrum {
-    fn radius(&self, form: SymmetricForm, omega: f64) -> Option<f64> {
-        Some(self.of(form).radius(omega))
-    }
-
-    fn optimal_omega(&self, form: SymmetricForm) -> Option<f64> {
-        Some(self.of(form).optimal_omega())
-    }
-
-    fn critical_omega(&self, form: SymmetricForm) -> Option<f64> {
-        Some(self.of(form).critical_omega())
-    }
-
-    fn ends(&self, form: SymmetricForm) -> Option<Extremes> {
-        Some(self.of(form))
     }
 
     fn real(&self) -> Option<&Spectrum> {

@@ -24,7 +24,7 @@ pub struct SweepRow {
     pub outcome: Outcome,
     /// Updates of all vertices made.
     pub iterations: usize,
-    /// The spectral radius of the error matrix; NaN where it is not known.
+    /// The spectral radius of the error matrix.
     pub predicted_rho: f64,
     /// The same over the eigenvectors that the data excite; for relaxations whose spectrum is real.
     pub predicted_rho_data: Option<f64>,
@@ -54,7 +54,7 @@ pub struct Thresholds {
 /// A sweep's result on one system.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OmegaSweep {
-    /// In the order of the grids; SOR has none, and none has any where the spectra are not known.
+    /// In the order of the grids; SOR has none.
     pub thresholds: Vec<Thresholds>,
     /// In the order of the grids; fewer than asked for while the sweep runs.
     pub rows: Vec<SweepRow>,
@@ -116,9 +116,9 @@ pub fn sweep(
             | Method::Anderson { .. }
             | Method::HeavyBall { .. } => continue,
         };
-        let (Some(ends), Some(critical_omega)) = (spectra.ends(form), spectra.critical_omega(form)) else { continue };
-        let Some(optimal_omega) = spectra.optimal_omega(form) else { continue };
-        let Some(optimal_rho) = spectra.radius(form, optimal_omega) else { continue };
+        let (ends, critical_omega) = (spectra.ends(form), spectra.critical_omega(form));
+        let optimal_omega = spectra.optimal_omega(form);
+        let optimal_rho = spectra.radius(form, optimal_omega).unwrap_or_else(|| ends.radius(optimal_omega));
         let data = spectra.excited(system, (points, start), form)?;
         thresholds.push(Thresholds { method: *method, ends, critical_omega, optimal_omega, optimal_rho, data });
     }

@@ -119,12 +119,12 @@ fn methods_that_need_no_symmetry_solve_the_whole_in_any_order() {
             }
             // No ω is better than the optimal one, and beyond the critical one errors grow.
             for form in [SymmetricForm::A, SymmetricForm::Jacobi] {
-                let best = spectrum.optimal_omega(form).unwrap();
+                let best = spectrum.optimal_omega(form);
                 let least = spectrum.radius(form, best).unwrap();
                 for k in 1..40 {
                     assert!(spectrum.radius(form, 0.05 * f64::from(k)).unwrap() >= least - 1e-12);
                 }
-                let critical = spectrum.critical_omega(form).unwrap();
+                let critical = spectrum.critical_omega(form);
                 let at = |omega: f64| spectrum.radius(form, omega).unwrap();
                 assert!(at(0.999 * critical) < 1.0 && at(1.001 * critical) > 1.0, "{scheme}, seed {seed}");
             }
@@ -197,7 +197,7 @@ fn some_vertices_with_darts_are_interpolated_by_sweeps() {
 
 fn least_real_part(surface: &Surface) -> f64 {
     let system = Stages::new(surface, Scheme::CatmullClark, None).unwrap().whole();
-    ComplexSpectrum::new(&system).unwrap().ends(SymmetricForm::A).unwrap().min
+    ComplexSpectrum::new(&system).unwrap().ends(SymmetricForm::A).min
 }
 
 /// Theorem: darts cure no singular component; a crease does, a semi-sharp one too.
@@ -238,4 +238,29 @@ fn a_path_of_two_sharp_edges_cures_the_cube() {
     assert_eq!((count(Rule::Dart), count(Rule::Crease)), (2, 1));
     let least = least_real_part(&path);
     assert!((least - 0.0239).abs() < 5e-5, "{least}");
+}
+
+/// Beyond what is computed in full, Arnoldi processes find the ends and the rates.
+#[test]
+fn large_systems_have_the_ends_of_their_spectra() {
+    let torus = Surface::new(built_in("torus:26x24")).unwrap();
+    let creases = vec![([0, 1], 10.0), ([1, 25], 10.0), ([300, 301], 2.5), ([400, 424], 10.0)];
+    let surface = torus.tagged(&Tags { creases, ..Tags::default() }).unwrap();
+    let system = Stages::new(&surface, Scheme::CatmullClark, None).unwrap().whole();
+    let [found, full] = [ComplexSpectrum::new(&system).unwrap(), ComplexSpectrum::full(&system).unwrap()];
+    assert!(found.eigenvalues(SymmetricForm::A).is_none() && full.eigenvalues(SymmetricForm::A).is_some());
+    for form in [SymmetricForm::A, SymmetricForm::Jacobi] {
+        let (a, b) = (found.ends(form), full.ends(form));
+        assert!((a.min - b.min).abs() < 1e-3 * b.min && (a.max - b.max).abs() < 1e-3 * b.max, "{a:?} for {b:?}");
+        let [a, b] = [&found, &full].map(|spectrum| spectrum.optimal_omega(form));
+        assert!((a - b).abs() < 1e-3 * b, "{a} for {b}");
+    }
+    for method in [Method::Pia, Method::Thall, Method::Jacobi { omega: None }] {
+        let [a, b] = [predicted_rate(&system, &found, method), predicted_rate(&system, &full, method)];
+        let [a, b] = [a.unwrap().unwrap(), b.unwrap().unwrap()];
+        assert!((a - b).abs() < 1e-3, "{method}: {a} for {b}");
+        let options = Options { method: Some(method), ..Options::default() };
+        let outcome = interpolate(&surface, Scheme::CatmullClark, &options).unwrap().report.outcome;
+        assert_eq!(outcome, Outcome::Converged, "{method}");
+    }
 }

@@ -6,6 +6,7 @@ use clap::Parser;
 use serde_json::json;
 
 use limitlab::analysis::comparison::{self, MethodRow};
+use limitlab::analysis::complex_spectrum::ComplexSpectrum;
 use limitlab::analysis::spectrum::{Spectra, spectrum};
 use limitlab::mesh::order::Order;
 use limitlab::solvers::{Method, System};
@@ -106,7 +107,7 @@ fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<Method
                     names.join(", ")
                 ));
             }
-            let spectrum = problem.subject.complex_spectrum(system, &arguments.common)?;
+            let spectrum = ComplexSpectrum::new(system)?;
             by_methods(problem, system, &spectrum, &methods, arguments, progress)?
         }
     };

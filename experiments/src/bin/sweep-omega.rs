@@ -9,6 +9,7 @@ use clap::Parser;
 use serde_json::{Map, Value, json};
 
 use limitlab::Result;
+use limitlab::analysis::complex_spectrum::ComplexSpectrum;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::analysis::sweep::{OmegaSweep, rounding_floor, sweep};
 use limitlab::mesh::order::Order;
@@ -146,7 +147,7 @@ fn sweep_one(
     let found = match problem.matrix() {
         Matrix::Symmetric(system) => sweep((system, &spectrum(system)?), data, &grids, order, stop, floor, &done)?,
         Matrix::General(system, _) => {
-            let spectrum = problem.subject.complex_spectrum(system, &arguments.common)?;
+            let spectrum = ComplexSpectrum::new(system)?;
             sweep((system, &spectrum), data, &grids, order, stop, floor, &done)?
         }
     };

@@ -7,10 +7,6 @@ use serde_json::{Value, json};
 
 use super::input::{all_fields, plain};
 use super::{CommonFlags, Input, MeshFlags, StopFlags};
-use limitlab::analysis::complex_spectrum::ComplexSpectrum;
-use limitlab::analysis::dense::LARGEST_COMPLEX;
-use limitlab::analysis::spectrum::Spectra;
-use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::assemble::matrix_market::{self, is_missing};
 use limitlab::assemble::{GeneralSystem, LimitSystem, Stages};
 use limitlab::error::{Error, Result};
@@ -41,22 +37,6 @@ impl Subject {
     /// A stem for file names, after the program's `prefix`.
     pub fn stem(&self, prefix: &str) -> String {
         format!("{prefix}{}", self.stem)
-    }
-
-    /// The spectra of a system without symmetry, and a remark where they are not known.
-    ///
-    /// # Errors
-    /// As [`ComplexSpectrum::new`].
-    pub fn complex_spectrum(&self, system: &GeneralSystem, common: &CommonFlags) -> Result<ComplexSpectrum> {
-        let spectrum = ComplexSpectrum::new(system)?;
-        if spectrum.ends(SymmetricForm::A).is_none() {
-            common.remark(format_args!(
-                "{}: no rates of jacobi and pia are predicted, and open ω are those of Gershgorin's bounds: eigenvalues that may \
-                 be complex are computed up to {LARGEST_COMPLEX} vertices",
-                self.name
-            ));
-        }
-        Ok(spectrum)
     }
 
     /// The JSON object of the program: what every program tells of a mesh or a system, and `fields`.

@@ -40,8 +40,9 @@ struct Relaxation {
 }
 
 impl Relaxation {
+    /// Of a spectrum that is known in full.
     fn new(spectrum: &ComplexSpectrum, form: SymmetricForm) -> Option<Self> {
-        let optimal_omega = spectrum.optimal_omega(form)?;
+        let optimal_omega = spectrum.optimal_omega(form);
         let at = |omega| spectrum.radius(form, omega);
         let eigenvalues = spectrum.eigenvalues(form)?;
         Some(Relaxation {
@@ -49,9 +50,9 @@ impl Relaxation {
                 SymmetricForm::A => "A",
                 SymmetricForm::Jacobi => "D⁻¹A",
             },
-            ends: spectrum.ends(form)?,
+            ends: spectrum.ends(form),
             imaginary: eigenvalues.iter().map(|z| z.im.abs()).fold(0.0, f64::max),
-            critical_omega: spectrum.critical_omega(form)?,
+            critical_omega: spectrum.critical_omega(form),
             optimal_omega,
             radii: [at(THALL_OMEGA)?, at(1.0)?, at(optimal_omega)?],
             eigenvalues: {
@@ -87,15 +88,19 @@ impl ComplexFindings {
     /// More than [`LARGEST_COMPLEX`] vertices; if a computation does not converge.
     pub fn new(input: &Input, sweeps: bool) -> Result<Self> {
         let system = input.stages()?.whole();
-        let spectrum = ComplexSpectrum::new(&system)?;
-        let relaxations = [SymmetricForm::A, SymmetricForm::Jacobi].map(|form| Relaxation::new(&spectrum, form));
-        let [Some(a), Some(jacobi)] = relaxations else {
-            return Err(Error::Computation(format!(
+        let too_many = || {
+            Error::Computation(format!(
                 "it has {} vertices with darts or semi-sharp ones among them, so that eigenvalues may be complex: all are \
                  computed up to {LARGEST_COMPLEX}; use a coarser mesh, or make darts corners",
                 System::len(&system)
-            )));
+            ))
         };
+        if System::len(&system) > LARGEST_COMPLEX {
+            return Err(too_many());
+        }
+        let spectrum = ComplexSpectrum::full(&system)?;
+        let relaxations = [SymmetricForm::A, SymmetricForm::Jacobi].map(|form| Relaxation::new(&spectrum, form));
+        let [Some(a), Some(jacobi)] = relaxations else { return Err(too_many()) };
         Ok(ComplexFindings {
             relaxations: [a, jacobi],
             sweeps: if sweeps { radii_of_sweeps(&system)? } else { Vec::new() },
