@@ -120,7 +120,8 @@ pub fn sharp_tables(scheme: LocalScheme, vertex: SharpVertex, rows: &[SharpRow])
     let mut masks = columns.table(format!("{stem}-masks"), title, &weights);
     masks.note(
         "Positions: v the vertex, e_j the ends of its edges counter-clockwise from the sharp one e0, f_j the opposite corner of the \
-         quad between e_j and e_{j+1}. Limit masks have sum 1, tangent masks 1 as their largest weight.",
+         quad between e_j and e_{j+1}. Limit masks have sum 1, tangent masks ±1 as their \
+         largest weight.",
     );
     [summary, eigenvalues, masks]
 }

@@ -105,23 +105,27 @@ fn sweeps_over_omega_know_their_thresholds() {
 #[test]
 fn spectra_have_imaginary_parts_and_no_bounds() {
     let folder = folder();
-    let output = run(SPECTRUM, folder.path(), on_torus(&["--json", "--out", "result", "--full"]));
+    // The largest imaginary part that hill climbing finds on this torus.
+    let edges = [[1, 2], [1, 4], [2, 0], [3, 6], [4, 7], [6, 0]];
+    fs::write(folder.path().join("small.txt"), edges.map(|[a, b]| format!("{a} {b} 10\n")).concat()).unwrap();
+    let small = ["torus:3x3", "--creases", "small.txt", "--json", "--out", "result", "--full", "--quiet"];
+    let output = run(SPECTRUM, folder.path(), small);
     assert_done(&output, "spectrum");
     let found = json(&output);
     let number = |field: &str| found[field].as_f64().unwrap();
     let eigenvalues = found["eigenvalues"]["a"].as_array().unwrap();
-    assert_eq!(eigenvalues.len(), 36);
+    assert_eq!(eigenvalues.len(), 9);
     let parts = |k: usize| eigenvalues.iter().map(move |z| z[k].as_f64().unwrap());
     assert_eq!(number("lambda_min"), parts(0).fold(f64::INFINITY, f64::min));
     assert_eq!(number("imaginary_max"), parts(1).fold(0.0, |m, x| x.abs().max(m)));
-    assert!(number("imaginary_max") > 1e-4 && (number("lambda_max") - 1.0).abs() < 1e-12);
+    assert!((number("imaginary_max") - 0.0737).abs() < 5e-5 && (number("lambda_max") - 1.0).abs() < 1e-12);
     let radius = eigenvalues.iter().map(|z| (1.0 - z[0].as_f64().unwrap()).hypot(z[1].as_f64().unwrap()));
     assert!((found["rho"]["pia"].as_f64().unwrap() - radius.fold(0.0, f64::max)).abs() < 1e-14);
     assert!(found["rho"]["gauss-seidel"].as_f64().unwrap() < found["rho"]["pia"].as_f64().unwrap());
     assert!(found["lambda_min_bound"].is_null() && found["singular"] == false);
-    let table = fs::read_to_string(folder.path().join("result/spectrum-torus-6x6-catmull-clark.md")).unwrap();
-    assert!(table.contains("2 darts and 2 semi-sharp ones") && table.contains("is left out: bounds"), "{table}");
-    assert!(folder.path().join("result/spectrum-eigenvalues-torus-6x6-catmull-clark.png").exists());
+    let table = fs::read_to_string(folder.path().join("result/spectrum-torus-3x3-catmull-clark.md")).unwrap();
+    assert!(table.contains("2 darts and 0 semi-sharp ones") && table.contains("is left out: bounds"), "{table}");
+    assert!(folder.path().join("result/spectrum-eigenvalues-torus-3x3-catmull-clark.png").exists());
     // Darts alone do not cure a cube.
     let cube = ["cube", "--creases", "cube.txt", "--json", "--out", "result", "--quiet"];
     let output = run(SPECTRUM, folder.path(), cube);

@@ -113,7 +113,7 @@ pub struct SharpMask {
     pub name: &'static str,
     /// Its eigenvalue λ.
     pub eigenvalue: f64,
-    /// One weight a position: of the limit with sum 1, of tangents with 1 as the largest.
+    /// One weight a position: of the limit with sum 1, of tangents with ±1 as the largest.
     pub weights: Vec<f64>,
     /// The largest entry of Sᵀw − λw.
     pub residual: f64,
@@ -367,10 +367,12 @@ impl LocalStar {
         SharpMask { name, eigenvalue, weights: w.as_slice().to_vec(), residual }
     }
 
-    /// Scaled so that the largest weight is 1.
+    /// Scaled so that the largest weight is ±1, and that of v is negative, which is into the sector; where that is 0, so that the
+    /// first of the largest is 1.
     fn tangent(&self, name: &'static str, eigenvalue: f64, weights: Vec<f64>) -> SharpMask {
         let largest = weights.iter().fold(0.0f64, |m, &w| if w.abs() > m.abs() + LEAD { w } else { m });
-        self.mask(name, eigenvalue, weights.iter().map(|w| w / largest).collect())
+        let scale = if weights[0].abs() > LEAD { -largest.abs() * weights[0].signum() } else { largest };
+        self.mask(name, eigenvalue, weights.iter().map(|w| w / scale).collect())
     }
 
     fn limit_mask(&self) -> Result<SharpMask> {
