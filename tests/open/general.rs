@@ -141,7 +141,9 @@ fn methods_that_need_no_symmetry_solve_the_whole_in_any_order() {
 #[test]
 fn over_relaxation_that_diverges_is_an_outcome() {
     let stop = Stop { tolerance: 1e-11, max_iterations: 20_000 };
-    let found: [(&str, Scheme, &[[u32; 2]], &[u32], f64); 3] = [
+    /// A mesh, its scheme, its sharp edges, the order of the sweep, its spectral radius.
+    type Found = (&'static str, Scheme, &'static [[u32; 2]], &'static [u32], f64);
+    let found: [Found; 3] = [
         ("prism:3", Scheme::CatmullClark, &[[0, 1], [0, 3], [3, 5], [4, 5]], &[5, 1, 4, 3, 0, 2], 1.186_428_9),
         (
             "torus:3x3",
