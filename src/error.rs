@@ -151,6 +151,12 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
+    /// An [`Error::Dart`] with the ways out that every mesh has.
+    pub(crate) fn dart(vertex: usize, scheme: &'static str) -> Self {
+        let advice = "make it a corner, or lead the crease on to a boundary, a corner or another crease";
+        Error::Dart { vertex, scheme, advice }
+    }
+
     /// An [`Error::Io`] about `path`.
     pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
         Error::Io { path: path.to_path_buf(), action, source }

@@ -1,15 +1,20 @@
-//! Doo-Sabin subdivision (Doo & Sabin 1978) of any closed polygon mesh, and the modified first step of Zheng &
-//! Cai, after which Doo-Sabin goes on. A vertex's limit point is the centroid of its type-V face after the first
-//! step: the point that Nasri's system, or Zheng and Cai's, puts on the given one.
+//! Doo-Sabin subdivision (Doo & Sabin 1978) of any polygon mesh, and the modified first step of Zheng & Cai, after
+//! which Doo-Sabin goes on. A vertex's limit point is the centroid of its type-V face after the first step: the point
+//! that Nasri's system, or Zheng and Cai's, puts on the given one. Sharp edges, those of a boundary too, are cut by
+//! Chaikin's rule, so that their curves are quadratic B-splines.
 
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use super::chaikin;
 use super::refined::{self, push_ends, set_by_edge, set_rows};
 use super::refinement::{Class, RefinementRules, Size};
-use super::star::{CHUNK, Circle, Tangents, centroid, for_each_star, put_stars, require_closed, require_room, twin};
+use super::scheme::QUADRATIC;
+use super::sharp;
+use super::star::{CHUNK, Circle, Tangents, centroid, for_each_star, put_stars, require_curves, require_room, twin};
 use crate::Result;
+use crate::mesh::features::Features;
 use crate::mesh::incidence::split_by_face;
 use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::filled;
@@ -57,7 +62,8 @@ pub fn corner_points(mesh: &Mesh, rule: CornerRule) -> Vec<DVec3> {
     points
 }
 
-fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: CornerRule, points: &mut [DVec3]) {
+/// The new points of the corners of a face, `circle` having as many.
+pub(super) fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: CornerRule, points: &mut [DVec3]) {
     let size = face.len() as f64;
     let (mut sum, mut cosine, mut sine) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
     for (&v, unit) in face.iter().zip(circle) {
@@ -75,14 +81,17 @@ fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: Corner
     }
 }
 
+const NAME: &str = "doo-sabin";
+
 /// All that defines the refinement.
 pub(super) const RULES: RefinementRules = RefinementRules {
-    name: "doo-sabin",
+    name: NAME,
     class: Class::Dual,
     needs_triangles: false,
+    check: |surface| require_curves(surface, NAME),
     refine,
     refined_topology,
-    halves: None,
+    refined_features: Some(chaikin::refined_features),
     size: |c| Size { vertices: c.corners, faces: c.faces + c.edges() + c.vertices, corners: 4 * c.corners },
     limit_positions: |surface| limit_positions(CornerRule::DooSabin, surface),
     limit_normals: |surface| limit_normals(CornerRule::DooSabin, surface),
@@ -102,12 +111,24 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
 /// old face, its corners in order; type E, a quad for each edge (in order of its first half-edge); type V, one
 /// for each old vertex, so that the face of vertex v has index F + E + v.
 ///
+/// On an open or creased mesh the vertices of old corners are followed by two of every sharp edge (a, b), ¾a + ¼b and ¼a + ¾b, in
+/// the order of [`sharp_half_edges`](crate::mesh::features::Features::sharp_half_edges), and then by the old vertices that are
+/// corners, which stay. A sharp edge has a quad in each of its faces, between its two points and the corners there: that in the
+/// face of its first half-edge in the edge's own place, the second ones, X for as many creased edges, after the quads of all
+/// edges. A vertex has a face of type V between each two of its sharp edges, the first of which has index F + E + X + v; all
+/// further ones come last. Inside the surface a corner with less than three sharp edges has a triangle for each two points about
+/// it.
+///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or the
-/// result is too large for 32-bit indices.
+/// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
+/// [`Error::Dart`](crate::Error::Dart), [`Error::SemiSharp`](crate::Error::SemiSharp);
+/// [`Error::TooLarge`](crate::Error::TooLarge) if 32-bit indices do not reach the result.
 pub fn refine_by(rule: CornerRule, surface: &Surface) -> Result<Mesh> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_closed(surface)?;
+    require_curves(surface, NAME)?;
+    if let Some(features) = surface.features() {
+        return chaikin::refine(rule, surface, features);
+    }
     require_room(mesh, 4)?;
     let count = mesh.faces.corners().len();
     let incidence = &topology.incidence;
@@ -132,19 +153,30 @@ pub fn refine_by(rule: CornerRule, surface: &Surface) -> Result<Mesh> {
     Ok(Mesh::new(corner_points(mesh, rule), Faces::from_parts(offsets, corners)))
 }
 
-/// The topology of `refined`, which is what [`refine_by`] made of the surface.
+/// The index of the type-V face of vertex 0 after a step; the first one of every vertex follows in order.
+pub fn first_vertex_face(surface: &Surface) -> usize {
+    let creased = surface.features().map_or(0, Features::creased_edges);
+    surface.faces().len() + surface.topology().edges() + creased
+}
+
+/// The topology of `refined`, which is what [`refine_by`] made of the surface: with sharp edges, where faces of type V have
+/// sizes of their own, from its faces.
 pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
-    refined::of_corners(surface, refined)
+    match surface.features() {
+        None => refined::of_corners(surface, refined),
+        Some(_) => Topology::new(&refined.faces, refined.len()),
+    }
 }
 
 /// The limit points of all vertices when the first step is by `rule` and all others are Doo-Sabin: the
-/// centroids of the type-V faces, (1/n) Σ of the vertex's corner points.
+/// centroids of the type-V faces, (1/n) Σ of the vertex's corner points. On curves (a + 6v + b)/8 with the neighbours a
+/// and b along the curve; corners rest.
 ///
 /// # Errors
-/// [`Error::Open`](crate::Error::Open).
+/// [`Error::Open`](crate::Error::Open), [`Error::Dart`](crate::Error::Dart), [`Error::SemiSharp`](crate::Error::SemiSharp).
 pub fn limit_positions(rule: CornerRule, surface: &Surface) -> Result<Vec<DVec3>> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_closed(surface)?;
+    require_curves(surface, NAME)?;
     let mut limits = vec![DVec3::ZERO; mesh.len()];
     for (&v, point) in mesh.faces.corners().iter().zip(corner_points(mesh, rule)) {
         limits[v as usize] += point;
@@ -152,13 +184,17 @@ pub fn limit_positions(rule: CornerRule, surface: &Surface) -> Result<Vec<DVec3>
     for (v, limit) in limits.iter_mut().enumerate() {
         *limit /= topology.incidence.face_count(v) as f64;
     }
+    if let Some(features) = surface.features() {
+        sharp::set_vertices(&mut limits, surface.positions(), features, QUADRATIC);
+    }
     Ok(limits)
 }
 
-/// The unit normals of the limit surface at the [`limit_positions`]; zero where [`Tangents::normal`] is.
+/// The unit normals of the limit surface at the [`limit_positions`]; zero where [`Tangents::normal`] is, and where the surface
+/// has several: on creases, and at corners that are inside or have sharp edges between the two of a boundary.
 ///
 /// # Errors
-/// [`Error::Open`](crate::Error::Open).
+/// As [`limit_positions`].
 pub fn limit_normals(rule: CornerRule, surface: &Surface) -> Result<Vec<DVec3>> {
     let mesh = surface.mesh();
     let limits = limit_positions(rule, surface)?;
@@ -169,6 +205,10 @@ pub fn limit_normals(rule: CornerRule, surface: &Surface) -> Result<Vec<DVec3>> 
         let ring = star.iter().map(|&c| points[c as usize]);
         normals.push(ring_normal(limits[v], ring, circle.of(star.len())));
     });
+    if let Some(features) = surface.features() {
+        let rules = (rule, CornerRule::DooSabin);
+        chaikin::for_each_tangents(surface, features, rules, |v, pair| normals[v] = pair.normal());
+    }
     Ok(normals)
 }
 

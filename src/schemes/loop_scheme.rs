@@ -11,12 +11,11 @@ use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Definition, PaperNames, SingularSet, from_limit_weight};
 use super::sharp::{self, Across};
 use super::star::{
-    Tangents, across, blend_with_neighbors, next_in_triangle, prev_in_triangle, push_blends, refuse, require_room,
+    Tangents, across, blend_with_neighbors, prev_in_triangle, push_blends, refuse, require_room,
     require_triangles_alone, ring_tangents,
 };
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
-use crate::mesh::features::Rule;
 use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
 use crate::parallel::find_first;
@@ -71,9 +70,12 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     name: "loop",
     class: Class::Primal,
     needs_triangles: true,
+    check,
     refine,
     refined_topology,
-    halves: Some(refined::halves_in_fours),
+    refined_features: Some(|surface, refined, topology| {
+        Ok(refined::features_of_halves(surface, refined, topology, refined::halves_in_fours))
+    }),
     size: Size::in_four,
     limit_positions,
     limit_normals,
@@ -86,7 +88,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// it), then the middle one.
 ///
 /// The points of sharp edges are their midpoints, of crease vertices (a + 6v + b)/8 with the neighbours a and b along the
-/// curve; corners rest; darts follow the rule of smooth vertices.
+/// curve; corners rest; darts follow the rule of smooth vertices; what is semi-sharp blends these with the smooth points.
 ///
 /// # Errors
 /// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
@@ -96,9 +98,8 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// triangles would share all corners too.
 pub fn refine(surface: &Surface) -> Result<Mesh> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_triangles_alone(surface, "loop")?;
+    check(surface)?;
     require_room(mesh, 4)?;
-    require_no_pillow(surface)?;
     let (old, corners) = (&mesh.positions, mesh.faces.corners());
     let edges = topology.edge_numbers();
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
@@ -120,8 +121,10 @@ pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
     refined::of_fours(surface.topology(), refined)
 }
 
-/// Refuses two triangles with the same corners, which a valid mesh has only beside a part with a boundary.
-fn require_no_pillow(surface: &Surface) -> Result<()> {
+/// Refuses other faces than triangles, and two of them with the same corners, which a valid mesh has only beside a part with
+/// a boundary.
+fn check(surface: &Surface) -> Result<()> {
+    require_triangles_alone(surface, "loop")?;
     if surface.is_closed() {
         return Ok(());
     }
@@ -149,7 +152,7 @@ pub(super) fn split_in_four(mesh: &Mesh, edges: &EdgeNumbers) -> Faces {
 }
 
 /// The limit points of all vertices: [`limit_mask`]; on curves (a + 4v + b)/6 with the neighbours a and b along the curve;
-/// corners rest; at darts [`dart_mask`].
+/// corners rest; at darts [`dart_mask`]; what is semi-sharp has the rows of its steps.
 ///
 /// # Errors
 /// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
@@ -157,18 +160,7 @@ pub(super) fn split_in_four(mesh: &Mesh, edges: &EdgeNumbers) -> Faces {
 pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
     require_triangles_alone(surface, "loop")?;
     let mut limits = blend_with_neighbors(surface, limit_mask);
-    if let Some(features) = surface.features() {
-        sharp::set_limits(&mut limits, surface, CUBIC);
-        let (old, corners) = (surface.positions(), surface.faces().corners());
-        let mut star = Vec::new();
-        for v in features.with_rule(Rule::Dart) {
-            sharp::dart_star(surface, features, v, &mut star);
-            let mask = dart_mask(star.len());
-            let ring = star.iter().zip(&mask[1..]);
-            let moved = ring.map(|(&c, &weight)| weight * (old[corners[next_in_triangle(c)] as usize] - old[v]));
-            limits[v] = old[v] + moved.sum::<DVec3>();
-        }
-    }
+    sharp::set_limits(&mut limits, surface, CUBIC, StarRule::Loop);
     Ok(limits)
 }
 

@@ -7,6 +7,7 @@
 //! valid too.
 
 use super::star::{next_in_triangle, prev_in_triangle, stars};
+use crate::mesh::features::Features;
 use crate::mesh::incidence::split_rows;
 use crate::mesh::topology::{NONE, Scatter};
 use crate::mesh::{Incidence, Mesh, Surface, Topology};
@@ -98,6 +99,17 @@ pub(super) fn halves_in_quads(surface: &Surface, c: u32) -> [u32; 2] {
 /// The half-edges along half-edge c after the split of triangles in four.
 pub(super) fn halves_in_fours(_: &Surface, c: u32) -> [u32; 2] {
     [outer(c), outer(next_in_triangle(c) as u32) + 2]
+}
+
+/// The features after a step that splits every edge in two, of which these are the halves.
+pub(super) fn features_of_halves(
+    surface: &Surface,
+    refined: &Mesh,
+    topology: &Topology,
+    halves: fn(&Surface, u32) -> [u32; 2],
+) -> Option<Features> {
+    let halves = |c| halves(surface, c);
+    surface.features()?.refined(&refined.faces, topology, surface.topology(), halves)
 }
 
 /// After the split of triangles in four, the first corner of the triangle at corner c.

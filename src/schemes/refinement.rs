@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::{butterfly, catmull_clark, doo_sabin, labsik_greiner, loop_scheme, mid_edge, sqrt3};
 use crate::memory::require;
+use crate::mesh::features::Features;
 use crate::mesh::{Mesh, Surface, Topology};
 use crate::{Error, Result};
 
@@ -50,12 +51,13 @@ pub(super) struct RefinementRules {
     pub(super) name: &'static str,
     pub(super) class: Class,
     pub(super) needs_triangles: bool,
+    /// Refuses what has no rules, before any work.
+    pub(super) check: fn(&Surface) -> Result<()>,
     pub(super) refine: fn(&Surface) -> Result<Mesh>,
     /// Of a mesh and what `refine` made of it.
     pub(super) refined_topology: fn(&Surface, &Mesh) -> Topology,
-    /// The half-edges of the refined mesh along a half-edge, in this order, where a step splits every edge in two and has
-    /// rules for sharp ones.
-    pub(super) halves: Option<fn(&Surface, u32) -> [u32; 2]>,
+    /// What is sharp on a refined mesh with its topology, where there are rules for it.
+    pub(super) refined_features: Option<fn(&Surface, &Mesh, &Topology) -> Result<Option<Features>>>,
     pub(super) size: fn(Size) -> Size,
     pub(super) limit_positions: fn(&Surface) -> Result<Vec<DVec3>>,
     pub(super) limit_normals: fn(&Surface) -> Result<Vec<DVec3>>,
@@ -119,20 +121,30 @@ impl Refinement {
         self.rules().needs_triangles
     }
 
+    /// Refuses, before any work, what a [step](Self::refine) refuses but for its size.
+    ///
+    /// # Errors
+    /// As [`refine`](Self::refine), but for [`Error::TooLarge`].
+    pub fn check(self, surface: &Surface) -> Result<()> {
+        (self.rules().check)(surface)
+    }
+
     /// One step: positions and faces. The scheme's own `refine` says how the result is numbered.
     ///
     /// # Errors
     /// [`Error::Open`] if the mesh has a boundary that is treated as interior; [`Error::NotOffered`] if it has sharp edges or
-    /// vertices, which Catmull-Clark and Loop alone take; [`Error::NotTriangles`] where the scheme needs these;
+    /// vertices, which Catmull-Clark, Loop and Doo-Sabin alone take; [`Error::Dart`] and [`Error::SemiSharp`] under Doo-Sabin; [`Error::NotTriangles`] where the scheme needs these;
     /// [`Error::TooLarge`].
     pub fn refine(self, surface: &Surface) -> Result<Mesh> {
         (self.rules().refine)(surface)
     }
 
     /// One step, with its topology: equal to [`Topology::new`] of its faces, at a fraction of the cost, as index
-    /// arithmetic on the coarse one gives it. The refinement of a valid mesh is valid.
+    /// arithmetic on the coarse one gives it; under Doo-Sabin of a mesh with sharp edges it is found from the faces. The
+    /// refinement of a valid mesh is valid.
     ///
-    /// Rules of vertices stay; both halves of a sharp edge are sharp, and the vertex between them is a crease vertex.
+    /// Under Catmull-Clark and Loop rules of vertices stay; both halves of a sharp edge are sharp, and the vertex between them is a crease vertex. Of what is
+    /// semi-sharp, 1 less is left.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).
@@ -148,14 +160,18 @@ impl Refinement {
     /// ```
     pub fn refined(self, surface: &Surface) -> Result<Surface> {
         let refined = self.refine(surface)?;
+        self.refined_surface(surface, refined)
+    }
+
+    /// `refined`, which is what a step made of the surface, or has the same faces.
+    pub(crate) fn refined_surface(self, surface: &Surface, refined: Mesh) -> Result<Surface> {
         let topology = (self.rules().refined_topology)(surface, &refined);
-        Ok(match (surface.features(), self.rules().halves) {
-            (Some(features), Some(halves)) => {
-                let halves = |c| halves(surface, c);
-                let features = features.refined(&refined.faces, &topology, surface.topology(), halves);
-                Surface::of_parts(refined, topology, surface.boundary(), Some(features))
+        Ok(match (surface.features(), self.rules().refined_features) {
+            (Some(_), Some(refined_features)) => {
+                let features = refined_features(surface, &refined, &topology)?;
+                Surface::of_parts(refined, topology, surface.boundary(), features)
             }
-            // Without features, as others are refused above.
+            // Without features, as others are refused by a step.
             _ => Surface::of_topology(refined, topology),
         })
     }
@@ -220,7 +236,8 @@ impl Refinement {
     }
 
     /// The limit points of all vertices; under dual refinements the centroids of the faces that they become, under the
-    /// interpolatory ones the vertices themselves. On curves of sharp edges (a + 4v + b)/6; corners rest.
+    /// interpolatory ones the vertices themselves. On curves of sharp edges (a + 4v + b)/6, and under Doo-Sabin (a + 6v + b)/8;
+    /// corners rest.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).
@@ -231,7 +248,7 @@ impl Refinement {
     /// The unit normals of the limit surface at the [`limit_positions`](Self::limit_positions); zero where
     /// [`Tangents::normal`](super::Tangents::normal) is, and where the surface has several or they are not computed: on
     /// creases, at darts, at corners but for those with one face, on a boundary beside four faces or more under Catmull-Clark,
-    /// six under Loop.
+    /// six under Loop; under Doo-Sabin on creases, and at corners but for those on a boundary with two sharp edges.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).

@@ -5,6 +5,7 @@
 
 use glam::{DVec2, DVec3};
 
+use super::local_limit::{StarOf, StarRule};
 use super::star::{CHUNK, Tangents};
 use crate::mesh::Surface;
 use crate::mesh::edge_numbers::EdgeNumbers;
@@ -12,34 +13,40 @@ use crate::mesh::features::{Features, Rule};
 use crate::parallel;
 
 /// Sets the points of sharp edges, creases and corners after a step: (v + w)/2 for an edge, (a + 6v + b)/8 for a crease
-/// vertex with the neighbours a and b along its curve; corners rest. `positions` are those of the old vertices, then one for
-/// each edge, then others. O(N), and O(k) by one thread for k vertices on curves.
+/// vertex with the neighbours a and b along its curve; corners rest; what is semi-sharp blends these with the smooth points.
+/// `positions` are those of the old vertices, then one for each edge, then others. O(N), and O(k) by one thread for k
+/// vertices on curves and at semi-sharp edges.
 pub(super) fn set_refined(positions: &mut [DVec3], surface: &Surface, edges: &EdgeNumbers) {
     let Some(features) = surface.features() else { return };
     let (old, faces, topology) = (surface.positions(), surface.faces(), surface.topology());
     let (vertices, others) = positions.split_at_mut(surface.len());
     set_vertices(vertices, old, features, 0.125);
+    for v in features.at_semi_sharp(surface) {
+        let v = v as usize;
+        // On a curve `vertices[v]` is no smooth point any more, and no rule there asks for one.
+        vertices[v] = StarOf::new(surface, features, v).vertex_point(old, vertices[v]);
+    }
     let (corners, sharp) = (faces.corners(), features.sharp_half_edges());
+    let midpoint = |c: u32| {
+        let ends = [c, topology.incidence.next(faces, c)].map(|c| old[corners[c as usize] as usize]);
+        0.5 * (ends[0] + ends[1])
+    };
+    for &(c, sharpness) in features.semi_sharp_edges() {
+        let (point, s) = (&mut others[edges.of(c) as usize], sharpness.min(1.0));
+        *point = (1.0 - s) * *point + s * midpoint(c);
+    }
     parallel::chunks(&mut others[..topology.edges()], CHUNK, |first, part| {
         // Sharp edges are listed by first half-edges, which is the order of their numbers.
         let from = sharp.partition_point(|&c| (edges.of(c) as usize) < first);
         for &c in &sharp[from..] {
             let Some(point) = part.get_mut(edges.of(c) as usize - first) else { break };
-            let ends = [c, topology.incidence.next(faces, c)].map(|c| old[corners[c as usize] as usize]);
-            *point = 0.5 * (ends[0] + ends[1]);
+            *point = midpoint(c);
         }
     });
 }
 
-/// Sets the limit points of creases, (a + 4v + b)/6, and of corners.
-pub(super) fn set_limits(limits: &mut [DVec3], surface: &Surface, weight: f64) {
-    if let Some(features) = surface.features() {
-        set_vertices(limits, surface.positions(), features, weight);
-    }
-}
-
-/// `w a + (1 − 2w) v + w b` on curves, v at corners.
-fn set_vertices(points: &mut [DVec3], old: &[DVec3], features: &Features, w: f64) {
+/// Sets `w a + (1 − 2w) v + w b` on curves, v at corners.
+pub(super) fn set_vertices(points: &mut [DVec3], old: &[DVec3], features: &Features, w: f64) {
     let rules = features.rules();
     parallel::change(points, |v, point| {
         if rules[v] == Rule::Corner {
@@ -49,16 +56,20 @@ fn set_vertices(points: &mut [DVec3], old: &[DVec3], features: &Features, w: f64
     features.for_each_crease(|v, [a, b]| points[v] = (1.0 - 2.0 * w) * old[v] + w * (old[a] + old[b]));
 }
 
-/// The corners at a dart in counter-clockwise order, from that whose side is the sharp edge.
-pub(super) fn dart_star(surface: &Surface, features: &Features, v: usize, star: &mut Vec<u32>) {
-    let topology = surface.topology();
-    topology.star(surface.faces(), v, star);
-    let is_sharp = |&c: &u32| {
-        let first = topology.twin(c).map_or(c, |t| t.min(c));
-        features.sharp_half_edges().binary_search(&first).is_ok()
-    };
-    let place = star.iter().position(is_sharp).unwrap_or(0);
-    star.rotate_left(place);
+/// Sets the limit points of curves, `w a + (1 − 2w) v + w b`, of corners, and under schemes with rules for stars those of
+/// darts and of all that is semi-sharp: by their rows, O(faces of a star) each.
+pub(super) fn set_limits(limits: &mut [DVec3], surface: &Surface, w: f64, rule: StarRule) {
+    let Some(features) = surface.features() else { return };
+    let points = surface.positions();
+    set_vertices(limits, points, features, w);
+    let darts = features.with_rule(Rule::Dart);
+    for v in darts.into_iter().chain(features.at_semi_sharp(surface).into_iter().map(|v| v as usize)) {
+        let star = StarOf::new(surface, features, v);
+        let row = star.star.row(rule);
+        // As seen from the vertex: the row sums to 1.
+        let moved = star.entries(&row).map(|(j, a)| a * (points[j as usize] - points[v]));
+        limits[v] = points[v] + moved.sum::<DVec3>();
+    }
 }
 
 /// The weights of a tangent across the boundary at a vertex of m faces there: of its m + 1 edge neighbours, and of the
@@ -80,6 +91,7 @@ pub(super) fn set_tangents(
     let Some(features) = surface.features() else { return };
     let (faces, topology, points) = (surface.faces(), surface.topology(), surface.positions());
     let mut masks: Vec<Option<Option<Across>>> = Vec::new();
+    let semi_sharp = features.at_semi_sharp(surface);
     let mut star = Vec::new();
     for v in (0..surface.len()).filter(|&v| !features.is_smooth(v)) {
         let mut pair = Tangents::default();
@@ -91,7 +103,8 @@ pub(super) fn set_tangents(
             None => seen(topology.incidence.prev(faces, star[m - 1])),
         };
         match features.rules()[v] {
-            Rule::Crease if is_boundary => {
+            // What is semi-sharp there has part in the tangent across.
+            Rule::Crease if is_boundary && semi_sharp.binary_search(&(v as u32)).is_err() => {
                 if masks.len() <= m {
                     masks.resize_with(m + 1, || None);
                 }

@@ -19,15 +19,24 @@ pub(super) const CHUNK: usize = 1024;
 const DEGENERATE: f64 = 1e-14;
 
 /// Refuses a boundary that is treated as interior: around its vertices there are no whole faces, and it has no rules of its
-/// own; and what is semi-sharp.
+/// own.
 pub(crate) fn require_rules(surface: &Surface) -> Result<()> {
     match surface.features() {
-        Some(features) if features.is_semi_sharp() => {
-            let vertex = features.rules().iter().position(|&rule| rule == Rule::SemiSharp).unwrap_or(0);
-            Err(Error::SemiSharp { vertex, scheme: "subdivision" })
-        }
         None if !surface.is_closed() => Err(Error::Open { edges: surface.boundary_edges(), scheme: "subdivision" }),
         _ => Ok(()),
+    }
+}
+
+/// Refuses what Chaikin's curves have no rule for: a boundary that is treated as interior, darts, and all that is semi-sharp.
+pub(crate) fn require_curves(surface: &Surface, scheme: &'static str) -> Result<()> {
+    require_rules(surface)?;
+    let Some(features) = surface.features() else { return Ok(()) };
+    match features.at_semi_sharp(surface).first() {
+        Some(&v) => Err(Error::SemiSharp { vertex: v as usize, scheme }),
+        None => match features.with_rule(Rule::Dart).first() {
+            Some(&vertex) => Err(Error::dart(vertex, scheme)),
+            None => Ok(()),
+        },
     }
 }
 
@@ -37,7 +46,7 @@ pub(crate) fn require_closed(surface: &Surface) -> Result<()> {
     match surface.features() {
         Some(_) => Err(Error::NotOffered {
             what: "only refinements with rules for sharp edges take boundaries, creases and corners".into(),
-            schemes: &["catmull-clark", "loop"],
+            schemes: &["catmull-clark", "loop", "nasri", "zheng-cai"],
         }),
         None => Ok(()),
     }

@@ -7,7 +7,6 @@ use limitlab::analysis::singularity::Singularity;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::{LimitSystem, Stages};
 use limitlab::interpolate::normals::{Rotation, rotate_rings};
-use limitlab::interpolate::zheng_cai::{self, PhaseOne};
 use limitlab::interpolate::{Interpolator, Options, Tolerance, interpolate, limit_points, staged};
 use limitlab::mesh::features::{Rule, Tags};
 use limitlab::mesh::generate::union;
@@ -214,12 +213,9 @@ fn what_cannot_be_is_refused_by_name() {
     assert!(cube.tagged(&creases([0, 1], 0.0)).unwrap().features().is_none());
 }
 
-/// What has no rules for boundaries says so, and gives no wrong answer.
 #[test]
-fn pipelines_without_rules_for_boundaries_refuse_them() {
+fn rings_on_a_boundary_are_not_turned() {
     let surface = open(super::grid(5, 6, false), Boundary::EdgeAndCorner);
-    let refused = zheng_cai::auxiliary(&surface, None, &PhaseOne::default());
-    assert!(matches!(refused, Err(Error::Creased { .. })));
     let mut normals = vec![None; surface.len()];
     normals[8] = Some(DVec3::Z);
     let turn = |normals: &[Option<DVec3>]| {

@@ -1,6 +1,7 @@
 //! Open and creased meshes: rows against refinement by hand, closed forms, all methods on the stages, the front door.
 
 mod closed_forms;
+mod dual;
 mod methods;
 mod naive;
 mod refinement;

@@ -240,4 +240,116 @@ impl Creased {
         }
         Creased { mesh: Mesh::new(positions, faces), sharp: self.sharp.clone(), corners: self.corners.clone() }
     }
+
+    /// A step of Doo-Sabin's kind: corner k of an m-gon goes to the sum over j of `weight(m, j)` times the corner j further on.
+    /// Sharp edges are cut at their quarters, and corners stay, joined to the faces between each two sharp edges; inside the
+    /// surface with less than three of these, by triangles.
+    pub fn dual(&self, weight: impl Fn(usize, usize) -> f64) -> Self {
+        let (mesh, edges) = (&self.mesh, faces_by_edge(&self.mesh));
+        let at = |v: u32| mesh.positions[v as usize];
+        let is_sharp = |a: u32, b: u32| self.sharp.contains_key(&edge(a, b));
+        let mut positions = Vec::new();
+        let mut number = BTreeMap::new();
+        let mut put = |key: (u8, u32, u32), point: DVec3| {
+            number.insert(key, positions.len() as u32);
+            positions.push(point);
+        };
+        for (f, face) in mesh.faces.iter().enumerate() {
+            let m = face.len();
+            for k in 0..m {
+                let terms = (0..m).map(|j| weight(m, j) * at(face[(k + j) % m]));
+                put((0, f as u32, face[k]), terms.sum());
+            }
+        }
+        for &[a, b] in self.sharp.keys() {
+            put((1, a, b), 0.75 * at(a) + 0.25 * at(b));
+            put((1, b, a), 0.75 * at(b) + 0.25 * at(a));
+        }
+        let sharp_at = |v: u32| self.sharp.keys().filter(|side| side.contains(&v)).count();
+        let is_corner = |v: u32| self.corners.contains_key(&v) || sharp_at(v) > 2;
+        (0..mesh.len() as u32).filter(|&v| is_corner(v)).for_each(|v| put((2, v, v), at(v)));
+        let of_corner = |f: usize, v: u32| number[&(0, f as u32, v)];
+        let on_edge = |a: u32, b: u32| number[&(1, a, b)];
+
+        let mut faces = Faces::default();
+        for (f, face) in mesh.faces.iter().enumerate() {
+            faces.push(&face.iter().map(|&v| of_corner(f, v)).collect::<Vec<_>>());
+        }
+        let mut sharp = BTreeMap::new();
+        for (f, face) in mesh.faces.iter().enumerate() {
+            for k in 0..face.len() {
+                let (a, b) = (face[k], face[(k + 1) % face.len()]);
+                let other = edges[&edge(a, b)].iter().copied().find(|&g| g != f);
+                match other {
+                    _ if is_sharp(a, b) => {
+                        faces.push(&[of_corner(f, b), of_corner(f, a), on_edge(a, b), on_edge(b, a)]);
+                        sharp.insert(edge(on_edge(a, b), on_edge(b, a)), 10.0);
+                    }
+                    Some(g) if f < g => {
+                        faces.push(&[of_corner(f, b), of_corner(f, a), of_corner(g, a), of_corner(g, b)]);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        let mut corners = BTreeMap::new();
+        for v in 0..mesh.len() as u32 {
+            // Faces with the vertices before and after v.
+            let around: Vec<(usize, u32, u32)> = mesh
+                .faces
+                .iter()
+                .enumerate()
+                .filter_map(|(f, face)| {
+                    let k = face.iter().position(|&w| w == v)?;
+                    Some((f, face[(k + face.len() - 1) % face.len()], face[(k + 1) % face.len()]))
+                })
+                .collect();
+            let inside = around.iter().all(|&(_, before, _)| edges[&edge(v, before)].len() == 2);
+            let own = is_corner(v).then(|| number[&(2, v, v)]);
+            corners.extend(own.map(|own| (own, 10.0)));
+            let mut starts: Vec<_> = around.iter().filter(|face| is_sharp(v, face.2)).collect();
+            if starts.is_empty() {
+                starts.push(&around[0]);
+            }
+            for &start in starts {
+                let mut ring = Vec::new();
+                if is_sharp(v, start.2) {
+                    ring.push(on_edge(v, start.2));
+                }
+                let mut here = start;
+                loop {
+                    ring.push(of_corner(here.0, v));
+                    if is_sharp(v, here.1) {
+                        ring.push(on_edge(v, here.1));
+                        break;
+                    }
+                    here = *around.iter().find(|face| face.2 == here.1).unwrap();
+                    if here == start {
+                        break;
+                    }
+                }
+                let ends = [ring[0], ring[ring.len() - 1]];
+                let Some(own) = own else {
+                    if sharp_at(v) > 0 {
+                        sharp.insert(edge(ends[0], ends[1]), 10.0);
+                    }
+                    faces.push(&ring);
+                    continue;
+                };
+                if inside && sharp_at(v) < 3 {
+                    if sharp_at(v) == 0 {
+                        ring.push(ring[0]);
+                    }
+                    ring.windows(2).for_each(|pair| faces.push(&[pair[0], pair[1], own]));
+                } else {
+                    ring.push(own);
+                    faces.push(&ring);
+                }
+                if sharp_at(v) > 0 {
+                    sharp.extend(ends.map(|end| (edge(end, own), 10.0)));
+                }
+            }
+        }
+        Creased { mesh: Mesh::new(positions, faces), sharp, corners }
+    }
 }

@@ -13,7 +13,7 @@ use limitlab::mesh::{Faces, Mesh, Surface, Topology};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark, loop_scheme};
 
 use super::naive::{Creased, edge, faces_by_edge};
-use super::{grid, open, random_creased, random_points};
+use super::{grid, open, random_creased, random_points, random_semi_sharp};
 
 type Step = fn(&Creased) -> Creased;
 const SCHEMES: [(Scheme, Refinement, Step); 2] = [
@@ -21,23 +21,22 @@ const SCHEMES: [(Scheme, Refinement, Step); 2] = [
     (Scheme::Loop, Refinement::Loop, Creased::loop_step),
 ];
 
-/// As [`random_creased`], every second one with the darts that its corners hide.
-fn random_with_darts(scheme: Scheme, seed: u64) -> Option<(Surface, Tags)> {
+/// As [`random_creased`], every third one with the darts that its corners hide, every third one with semi-sharp tags.
+fn random_tagged(scheme: Scheme, seed: u64) -> Option<(Surface, Tags)> {
+    if seed % 3 == 2 {
+        return random_semi_sharp(scheme, seed);
+    }
     let (surface, mut tags) = random_creased(scheme, seed)?;
-    if seed % 2 == 1 {
+    if seed % 3 == 1 {
         return Some((surface, tags));
     }
     tags.corners.clear();
     Some((surface.tagged(&tags).unwrap(), tags))
 }
 
-/// The refined surface with all that is sharp tagged anew; `sharp` by its ends there.
-fn tagged_anew(fine: &Surface, sharp: impl Iterator<Item = [u32; 2]>, corners: impl Iterator<Item = u32>) -> Surface {
-    let tags = Tags {
-        boundary: fine.boundary(),
-        creases: sharp.map(|ends| (ends, 10.0)).collect(),
-        corners: corners.map(|v| (v, 10.0)).collect(),
-    };
+/// The refined surface with these tags.
+fn tagged_anew(fine: &Surface, creases: Vec<([u32; 2], f64)>, corners: Vec<(u32, f64)>) -> Surface {
+    let tags = Tags { boundary: fine.boundary(), creases, corners };
     Surface::examined(fine.mesh().clone(), None, fine.boundary()).unwrap().tagged(&tags).unwrap()
 }
 
@@ -54,25 +53,31 @@ fn hold_against_tags(coarse: &Surface, fine: &Surface) {
     let topology = coarse.topology();
     let numbers: BTreeMap<u32, u32> = topology.edge_sides().zip(coarse.len() as u32..).collect();
     let corners = coarse.faces().corners();
-    let halves = features.sharp_half_edges().iter().flat_map(|&c| {
+    let halves = |(c, s): (u32, f64)| {
         let face = coarse.faces().range(topology.incidence.face_of(c));
         let next = if c as usize + 1 == face.end { face.start } else { c as usize + 1 };
-        [[corners[c as usize], numbers[&c]], [numbers[&c], corners[next]]]
-    });
+        [([corners[c as usize], numbers[&c]], s), ([numbers[&c], corners[next]], s)]
+    };
+    let lowered = |list: &[(u32, f64)]| list.iter().map(|&(k, s)| (k, (s - 1.0).max(0.0))).collect::<Vec<_>>();
+    let sharp = features.sharp_half_edges().iter().map(|&c| (c, 10.0));
+    let creases = sharp.chain(lowered(features.semi_sharp_edges())).flat_map(halves).collect();
     let resting = (0..coarse.len() as u32).filter(|&v| features.rules()[v as usize] == Rule::Corner);
-    let anew = tagged_anew(fine, halves, resting);
+    let resting = resting.map(|v| (v, 10.0)).chain(lowered(features.semi_sharp_vertices())).collect();
+    let anew = tagged_anew(fine, creases, resting);
     assert!(fine.features() == anew.features());
-    let found = fine.features().unwrap();
-    assert_eq!(found.rules()[..coarse.len()], *features.rules());
+    let Some(found) = fine.features() else { return };
+    for (v, (before, after)) in features.rules().iter().zip(found.rules()).enumerate() {
+        assert!(before == after || (*before, *after) == (Rule::SemiSharp, Rule::Smooth), "vertex {v}");
+    }
     assert_eq!(found.creased_edges(), 2 * features.creased_edges());
 }
 
 #[test]
 fn a_step_is_the_one_by_hand_and_carries_features_over() {
     for (scheme, refinement, step) in SCHEMES {
-        let (mut open, mut darts) = (0, 0);
-        for seed in 0..200 {
-            let Some((coarse, tags)) = random_with_darts(scheme, seed) else { continue };
+        let (mut open, mut darts, mut semi_sharp) = (0, 0, 0);
+        for seed in 0..300 {
+            let Some((coarse, tags)) = random_tagged(scheme, seed) else { continue };
             let by_hand = step(&Creased::of(&coarse, &tags));
             let fine = refinement.refined(&coarse).unwrap();
             assert_eq!(fine.mesh().faces, refinement.refine(&coarse).unwrap().faces);
@@ -97,8 +102,9 @@ fn a_step_is_the_one_by_hand_and_carries_features_over() {
             hold_against_tags(&fine, &refinement.refined(&fine).unwrap());
             open += usize::from(!coarse.is_closed());
             darts += coarse.features().map_or(0, |f| f.count(Rule::Dart));
+            semi_sharp += coarse.features().map_or(0, |f| f.semi_sharp_edges().len());
         }
-        assert!(open > 100 && darts > 50, "{scheme}: {open}, {darts}");
+        assert!(open > 150 && darts > 70 && semi_sharp > 100, "{scheme}: {open}, {darts}, {semi_sharp}");
     }
 }
 
@@ -140,24 +146,29 @@ fn large_meshes_are_refined_as_small_ones() {
 #[test]
 fn limit_points_are_those_of_the_rows_and_stay_under_refinement() {
     for (scheme, refinement, _) in SCHEMES {
-        let mut darts = 0;
-        for seed in 0..200 {
-            let Some((coarse, _)) = random_with_darts(scheme, seed) else { continue };
+        let (mut darts, mut semi_sharp) = (0, 0);
+        for seed in 0..300 {
+            let Some((coarse, _)) = random_tagged(scheme, seed) else { continue };
             let limits = refinement.limit_positions(&coarse).unwrap();
-            let dart = coarse.features().map_or(0, |f| f.count(Rule::Dart));
-            if dart == 0 {
-                for (a, b) in limits.iter().zip(limit_points(&coarse, scheme).unwrap()) {
-                    assert!(a.distance(b) <= 1e-14, "{scheme}, seed {seed}");
+            for (a, b) in limits.iter().zip(limit_points(&coarse, scheme).unwrap()) {
+                assert!(a.distance(b) <= 1e-14, "{scheme}, seed {seed}");
+            }
+            darts += coarse.features().map_or(0, |f| f.count(Rule::Dart));
+            semi_sharp += coarse.features().map_or(0, |f| f.count(Rule::SemiSharp));
+            let mut finer = coarse;
+            // What is semi-sharp lives for three levels there.
+            for level in 1..4 {
+                if level > 1 && !finer.features().is_some_and(|f| f.is_semi_sharp()) {
+                    break;
+                }
+                finer = refinement.refined(&finer).unwrap();
+                for (v, (a, b)) in limits.iter().zip(refinement.limit_positions(&finer).unwrap()).enumerate() {
+                    let off = a.distance(b);
+                    assert!(off <= 1e-14, "{scheme}, seed {seed}, vertex {v}, level {level}: {off:e}");
                 }
             }
-            darts += dart;
-            let finer = refinement.limit_positions(&refinement.refined(&coarse).unwrap()).unwrap();
-            for (v, (a, b)) in limits.iter().zip(finer).enumerate() {
-                let off = a.distance(b);
-                assert!(off <= 1e-14, "{scheme}, seed {seed}, vertex {v}: {off:e}");
-            }
         }
-        assert!(darts > 50, "{darts}");
+        assert!(darts > 70 && semi_sharp > 150, "{darts}, {semi_sharp}");
     }
 }
 
@@ -269,17 +280,35 @@ fn normals_on_a_boundary_are_the_limits_of_those_of_the_faces() {
     of(Refinement::Loop, true, 5);
 }
 
+/// The vertices that are semi-sharp themselves, or at semi-sharp edges.
+fn at_semi_sharp(surface: &Surface) -> Vec<u32> {
+    let Some(features) = surface.features() else { return Vec::new() };
+    let (faces, corners) = (surface.faces(), surface.faces().corners());
+    let ends = features.semi_sharp_edges().iter().flat_map(|&(c, _)| {
+        let face = faces.range(surface.incidence().face_of(c));
+        let next = if c as usize + 1 == face.end { face.start } else { c as usize + 1 };
+        [corners[c as usize], corners[next]]
+    });
+    ends.chain(features.semi_sharp_vertices().iter().map(|s| s.0)).collect()
+}
+
 #[test]
 fn normals_stay_under_refinement_and_are_none_where_there_are_several() {
     for (scheme, refinement, _) in SCHEMES {
         let mut held = [0; 4];
         for seed in 0..200 {
-            let Some((coarse, _)) = random_with_darts(scheme, seed) else { continue };
+            let Some((coarse, _)) = random_tagged(scheme, seed) else { continue };
             let before = refinement.limit_normals(&coarse).unwrap();
             let after = refinement.limit_normals(&refinement.refined(&coarse).unwrap()).unwrap();
             let mut star = Vec::new();
+            let semi_sharp = at_semi_sharp(&coarse);
             for (v, (a, b)) in before.iter().zip(after).enumerate() {
                 let rule = coarse.features().map_or(Rule::Smooth, |f| f.rules()[v]);
+                if rule != Rule::Corner && semi_sharp.contains(&(v as u32)) {
+                    // One after, where nothing semi-sharp is left.
+                    assert_eq!(*a, DVec3::ZERO);
+                    continue;
+                }
                 let is_boundary = !coarse.topology().star(coarse.faces(), v, &mut star);
                 let most = if scheme == Scheme::Loop { 5 } else { 3 };
                 let has_one = match rule {
@@ -333,11 +362,13 @@ fn what_has_no_rules_is_refused() {
     let mesh = grid(4, 4, true);
     let surface = open(mesh.clone(), Boundary::EdgeOnly);
     for refinement in Refinement::ALL {
-        if matches!(refinement, Refinement::CatmullClark | Refinement::Loop) {
+        if matches!(refinement, Refinement::CatmullClark | Refinement::Loop | Refinement::DooSabin) {
+            assert!(refinement.check(&surface).is_ok());
             continue;
         }
         let message = refinement.refined(&surface).unwrap_err().to_string();
-        assert!(message.ends_with("use catmull-clark or loop"), "{message}");
+        assert!(message.ends_with("use catmull-clark, loop, nasri or zheng-cai"), "{message}");
+        assert_eq!(refinement.check(&surface).unwrap_err().to_string(), message);
     }
     // A boundary of vertices of valence 3 and more, without rules.
     let cube = limitlab::mesh::builtin::icosahedron();
