@@ -87,7 +87,7 @@ pub fn rotate_rings(
     assert!(rotation.levels > 0, "at least one level");
     let wanted = unit_normals(normals)?;
     Constraints { normals: Some(normals), ..Constraints::default() }.check_smooth(control)?;
-    scheme.check_size(control.mesh(), rotation.levels + 1)?;
+    scheme.check_size(control, rotation.levels + 1)?;
     let mut surface = scheme.refined(control)?;
     let mut turned: Vec<(u32, f64)> = Vec::new();
     for level in 0..rotation.levels {

@@ -57,7 +57,12 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     refined_features: Some(|surface, refined, topology| {
         Ok(refined::features_of_halves(surface, refined, topology, refined::halves_in_quads))
     }),
-    size: |c| Size { vertices: c.vertices + c.edges() + c.faces, faces: c.corners, corners: 4 * c.corners },
+    size: |c| Size {
+        vertices: c.vertices + c.edges() + c.faces,
+        faces: c.corners,
+        corners: 4 * c.corners,
+        has_features: c.has_features,
+    },
     limit_positions,
     limit_normals,
 };

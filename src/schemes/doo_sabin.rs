@@ -28,11 +28,21 @@ pub enum CornerRule {
     DooSabin,
     /// V'_i = (V_i + centroid)/2 (Zheng-Cai Eq. 4), meant for the first step only.
     ZhengCai,
+    /// V'_i = ½V_i + ¼(V_{i−1} + V_{i+1}): two steps of [mid-edge](super::mid_edge) at once.
+    MidEdge,
 }
 
 impl CornerRule {
+    /// The rule of all steps after one by this.
+    pub(super) fn further(self) -> Self {
+        match self {
+            CornerRule::DooSabin | CornerRule::ZhengCai => CornerRule::DooSabin,
+            CornerRule::MidEdge => CornerRule::MidEdge,
+        }
+    }
+
     /// The weights of the corners of an `m`-gon in its corner 0, in order. Doo-Sabin: (m+5)/(4m), then
-    /// (3 + 2cos(2πj/m))/(4m); Zheng-Cai: ½ + 1/(2m), then 1/(2m).
+    /// (3 + 2cos(2πj/m))/(4m); Zheng-Cai: ½ + 1/(2m), then 1/(2m); mid-edge: ½, and ¼ on both sides.
     pub fn circulant(self, m: usize) -> Vec<f64> {
         let size = m as f64;
         let weight = |j: usize| match (self, j) {
@@ -40,6 +50,9 @@ impl CornerRule {
             (CornerRule::DooSabin, _) => (3.0 + 2.0 * (TAU * j as f64 / size).cos()) / (4.0 * size),
             (CornerRule::ZhengCai, 0) => 0.5 + 0.5 / size,
             (CornerRule::ZhengCai, _) => 0.5 / size,
+            (CornerRule::MidEdge, 0) => 0.5,
+            (CornerRule::MidEdge, j) if j == 1 || j + 1 == m => 0.25,
+            (CornerRule::MidEdge, _) => 0.0,
         };
         (0..m).map(weight).collect()
     }
@@ -64,6 +77,7 @@ pub fn corner_points(mesh: &Mesh, rule: CornerRule) -> Vec<DVec3> {
 
 /// The new points of the corners of a face, `circle` having as many.
 pub(super) fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: CornerRule, points: &mut [DVec3]) {
+    let corner = |k: usize| positions[face[k % face.len()] as usize];
     let size = face.len() as f64;
     let (mut sum, mut cosine, mut sine) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
     for (&v, unit) in face.iter().zip(circle) {
@@ -72,11 +86,12 @@ pub(super) fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], r
         cosine += unit.x * point;
         sine += unit.y * point;
     }
-    for ((&v, unit), new) in face.iter().zip(circle).zip(points) {
+    for (k, ((&v, unit), new)) in face.iter().zip(circle).zip(points).enumerate() {
         let point = positions[v as usize];
         *new = match rule {
             CornerRule::DooSabin => 0.25 * point + (0.75 * sum + 0.5 * (unit.x * cosine + unit.y * sine)) / size,
             CornerRule::ZhengCai => 0.5 * (point + sum / size),
+            CornerRule::MidEdge => 0.5 * point + 0.25 * (corner(k + 1) + corner(k + face.len() - 1)),
         };
     }
 }
@@ -92,7 +107,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     refine,
     refined_topology,
     refined_features: Some(chaikin::refined_features),
-    size: |c| Size { vertices: c.corners, faces: c.faces + c.edges() + c.vertices, corners: 4 * c.corners },
+    size: Size::dual,
     limit_positions: |surface| limit_positions(CornerRule::DooSabin, surface),
     limit_normals: |surface| limit_normals(CornerRule::DooSabin, surface),
 };
@@ -105,7 +120,7 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
     refine_by(CornerRule::DooSabin, surface)
 }
 
-/// One step by either rule.
+/// One step by a rule.
 ///
 /// Vertices of the result: one for each old corner, in corner order. Faces of the result: type F, one for each
 /// old face, its corners in order; type E, a quad for each edge (in order of its first half-edge); type V, one
@@ -168,7 +183,7 @@ pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
     }
 }
 
-/// The limit points of all vertices when the first step is by `rule` and all others are Doo-Sabin: the
+/// The limit points of all vertices when the first step is by `rule` and all others are Doo-Sabin, or mid-edge too: the
 /// centroids of the type-V faces, (1/n) Σ of the vertex's corner points. On curves (a + 6v + b)/8 with the neighbours a
 /// and b along the curve; corners rest.
 ///
@@ -206,7 +221,7 @@ pub fn limit_normals(rule: CornerRule, surface: &Surface) -> Result<Vec<DVec3>> 
         normals.push(ring_normal(limits[v], ring, circle.of(star.len())));
     });
     if let Some(features) = surface.features() {
-        let rules = (rule, CornerRule::DooSabin);
+        let rules = (rule, rule.further());
         chaikin::for_each_tangents(surface, features, rules, |v, pair| normals[v] = pair.normal());
     }
     Ok(normals)

@@ -13,9 +13,9 @@
 //! | [`butterfly`] | modified Butterfly, Zorin, Schröder & Sweldens 1996 | triangles | yes |
 //! | [`labsik_greiner`] | interpolatory √3, Labsik & Greiner 2000 | triangles | yes |
 //!
-//! Catmull-Clark, Loop and Doo-Sabin take open and creased meshes too: edges with one face and tagged ones are
-//! [sharp](crate::mesh::features), their curves cubic B-splines, and quadratic ones under Doo-Sabin. All others refuse them
-//! with an [`Error::NotOffered`](crate::Error::NotOffered), and all of them refuse a boundary that is treated as interior with an
+//! Catmull-Clark, Loop, Doo-Sabin and mid-edge take open and creased meshes too: edges with one face and tagged ones are
+//! [sharp](crate::mesh::features), their curves cubic B-splines, and quadratic ones under the dual schemes. All others refuse
+//! them with an [`Error::NotOffered`](crate::Error::NotOffered), and all of them refuse a boundary that is treated as interior with an
 //! [`Error::Open`](crate::Error::Open). A step takes time and memory
 //! proportional to the mesh, with flat arrays only, in parallel: every new point is gathered from the old ones, with
 //! the same result for any number of threads; new faces, and their topology, come from index arithmetic on half-edges.

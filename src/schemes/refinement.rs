@@ -28,6 +28,8 @@ pub(super) struct Size {
     pub(super) vertices: u64,
     pub(super) faces: u64,
     pub(super) corners: u64,
+    /// Whether there are sharp edges or vertices.
+    pub(super) has_features: bool,
 }
 
 impl Size {
@@ -37,12 +39,20 @@ impl Size {
 
     /// After the split of every triangle in four.
     pub(super) fn in_four(self) -> Self {
-        Size { vertices: self.vertices + self.edges(), faces: 4 * self.faces, corners: 4 * self.corners }
+        let (vertices, faces, corners) = (self.vertices + self.edges(), 4 * self.faces, 4 * self.corners);
+        Size { vertices, faces, corners, ..self }
     }
 
     /// After the split of every triangle in three.
     pub(super) fn in_three(self) -> Self {
-        Size { vertices: self.vertices + self.faces, faces: 3 * self.faces, corners: 3 * self.corners }
+        let (vertices, faces, corners) = (self.vertices + self.faces, 3 * self.faces, 3 * self.corners);
+        Size { vertices, faces, corners, ..self }
+    }
+
+    /// After a step that makes a vertex of every corner, and a face of every face, edge and vertex.
+    pub(super) fn dual(self) -> Self {
+        let faces = self.faces + self.edges() + self.vertices;
+        Size { vertices: self.corners, faces, corners: 4 * self.corners, ..self }
     }
 }
 
@@ -78,7 +88,7 @@ pub enum Refinement {
     Butterfly,
     /// Interpolatory √3, Labsik & Greiner 2000, on triangles.
     LabsikGreiner,
-    /// Mid-edge, Peters & Reif 1997, on polygons of any size.
+    /// Mid-edge, Peters & Reif 1997, on polygons of any size. With sharp edges a step is two at once.
     MidEdge,
 }
 
@@ -133,14 +143,14 @@ impl Refinement {
     ///
     /// # Errors
     /// [`Error::Open`] if the mesh has a boundary that is treated as interior; [`Error::NotOffered`] if it has sharp edges or
-    /// vertices, which Catmull-Clark, Loop and Doo-Sabin alone take; [`Error::Dart`] and [`Error::SemiSharp`] under Doo-Sabin; [`Error::NotTriangles`] where the scheme needs these;
+    /// vertices, which Catmull-Clark, Loop, Doo-Sabin and mid-edge alone take; [`Error::Dart`] and [`Error::SemiSharp`] under the two last; [`Error::NotTriangles`] where the scheme needs these;
     /// [`Error::TooLarge`].
     pub fn refine(self, surface: &Surface) -> Result<Mesh> {
         (self.rules().refine)(surface)
     }
 
     /// One step, with its topology: equal to [`Topology::new`] of its faces, at a fraction of the cost, as index
-    /// arithmetic on the coarse one gives it; under Doo-Sabin of a mesh with sharp edges it is found from the faces. The
+    /// arithmetic on the coarse one gives it; under Doo-Sabin and mid-edge of a mesh with sharp edges it is found from the faces. The
     /// refinement of a valid mesh is valid.
     ///
     /// Under Catmull-Clark and Loop rules of vertices stay; both halves of a sharp edge are sharp, and the vertex between them is a crease vertex. Of what is
@@ -181,12 +191,14 @@ impl Refinement {
     ///
     /// # Errors
     /// [`Error::TooLarge`] or [`Error::Memory`] with the numbers of faces and vertices.
-    pub fn check_size(self, mesh: &Mesh, levels: usize) -> Result<()> {
+    pub fn check_size(self, surface: &Surface, levels: usize) -> Result<()> {
+        let mesh = surface.mesh();
         let count = |n: usize| n as u64;
         let mut size = Size {
             vertices: count(mesh.len()),
             faces: count(mesh.faces.len()),
             corners: count(mesh.faces.corners().len()),
+            has_features: surface.features().is_some(),
         };
         let mut bytes = 0u64;
         for _ in 0..levels {
@@ -198,7 +210,7 @@ impl Refinement {
                 break;
             }
         }
-        let Size { vertices, faces, corners } = size;
+        let Size { vertices, faces, corners, .. } = size;
         let what = || format!("the surface after {levels} refinements with {faces} faces and {vertices} vertices");
         if corners > u64::from(u32::MAX) {
             return Err(Error::TooLarge {
@@ -215,7 +227,7 @@ impl Refinement {
     /// # Errors
     /// As [`check_size`](Self::check_size) and [`refine`](Self::refine).
     pub fn refine_n(self, surface: &Surface, levels: usize) -> Result<Mesh> {
-        self.check_size(surface.mesh(), levels)?;
+        self.check_size(surface, levels)?;
         let Some(last) = levels.checked_sub(1) else {
             return Ok(surface.mesh().clone());
         };
@@ -231,12 +243,12 @@ impl Refinement {
     /// # Errors
     /// As [`refine_n`](Self::refine_n).
     pub fn refined_n(self, surface: &Surface, levels: usize) -> Result<Surface> {
-        self.check_size(surface.mesh(), levels)?;
+        self.check_size(surface, levels)?;
         (0..levels).try_fold(surface.clone(), |coarse, _| self.refined(&coarse))
     }
 
     /// The limit points of all vertices; under dual refinements the centroids of the faces that they become, under the
-    /// interpolatory ones the vertices themselves. On curves of sharp edges (a + 4v + b)/6, and under Doo-Sabin (a + 6v + b)/8;
+    /// interpolatory ones the vertices themselves. On curves of sharp edges (a + 4v + b)/6, and under dual ones (a + 6v + b)/8;
     /// corners rest.
     ///
     /// # Errors
@@ -248,7 +260,7 @@ impl Refinement {
     /// The unit normals of the limit surface at the [`limit_positions`](Self::limit_positions); zero where
     /// [`Tangents::normal`](super::Tangents::normal) is, and where the surface has several or they are not computed: on
     /// creases, at darts, at corners but for those with one face, on a boundary beside four faces or more under Catmull-Clark,
-    /// six under Loop; under Doo-Sabin on creases, and at corners but for those on a boundary with two sharp edges.
+    /// six under Loop; under dual ones on creases, and at corners but for those on a boundary with two sharp edges.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).

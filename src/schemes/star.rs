@@ -46,7 +46,7 @@ pub(crate) fn require_closed(surface: &Surface) -> Result<()> {
     match surface.features() {
         Some(_) => Err(Error::NotOffered {
             what: "only refinements with rules for sharp edges take boundaries, creases and corners".into(),
-            schemes: &["catmull-clark", "loop", "nasri", "zheng-cai"],
+            schemes: &["catmull-clark", "loop", "nasri", "zheng-cai", "mid-edge"],
         }),
         None => Ok(()),
     }

@@ -1,4 +1,4 @@
-//! Doo-Sabin's refinement of open and creased meshes: against a step by hand, the surface against the points that it
+//! Dual refinement of open and creased meshes: against a step by hand, the surface against the points that it
 //! interpolates, normals on a boundary against those of ever smaller faces.
 
 use std::collections::BTreeSet;
@@ -6,19 +6,32 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 use limitlab::Error;
-use limitlab::interpolate::surface::{SurfaceOptions, surface};
+use limitlab::interpolate::surface::{SurfaceOptions, check, surface};
+use limitlab::interpolate::zheng_cai::{self, Constraints, PhaseOne, Sweep, auxiliary};
 use limitlab::interpolate::{Options, Tolerance, interpolate, limit_points};
 use limitlab::mesh::features::{Rule, Tags};
 use limitlab::mesh::validate::Boundary;
-use limitlab::mesh::{Faces, Surface, builtin};
+use limitlab::mesh::{Faces, Mesh, Surface, builtin};
 use limitlab::schemes::doo_sabin::{self, CornerRule};
 use limitlab::schemes::{Refinement, Scheme};
 
 use super::naive::Creased;
-use super::{grid, open, random_creased};
+use super::{grid, open, random_creased, random_points};
+use crate::common::meshes::small_mesh;
 
-const SCHEMES: [(Scheme, CornerRule); 2] =
-    [(Scheme::Nasri, CornerRule::DooSabin), (Scheme::ZhengCai, CornerRule::ZhengCai)];
+const SCHEMES: [(Scheme, CornerRule); 3] = [
+    (Scheme::Nasri, CornerRule::DooSabin),
+    (Scheme::ZhengCai, CornerRule::ZhengCai),
+    (Scheme::MidEdge, CornerRule::MidEdge),
+];
+
+/// The rule of all steps but the first.
+fn further(rule: CornerRule) -> CornerRule {
+    match rule {
+        CornerRule::DooSabin | CornerRule::ZhengCai => CornerRule::DooSabin,
+        CornerRule::MidEdge => CornerRule::MidEdge,
+    }
+}
 
 /// The weight in corner 0 of an m-gon of the corner j further on.
 fn weight(rule: CornerRule, m: usize, j: usize) -> f64 {
@@ -26,13 +39,15 @@ fn weight(rule: CornerRule, m: usize, j: usize) -> f64 {
     match rule {
         CornerRule::DooSabin => 0.25 * own + (3.0 + 2.0 * (TAU * j as f64 / size).cos()) / (4.0 * size),
         CornerRule::ZhengCai => 0.5 * own + 0.5 / size,
+        CornerRule::MidEdge => 0.5 * own + if j == 1 || j == m - 1 { 0.25 } else { 0.0 },
     }
 }
 
 /// A step by a rule, with topology and features.
 fn refined(rule: CornerRule, coarse: &Surface) -> Surface {
     let fine = doo_sabin::refine_by(rule, coarse).unwrap();
-    let plain = Refinement::DooSabin.refined(coarse).unwrap();
+    let scheme = if rule == CornerRule::MidEdge { Refinement::MidEdge } else { Refinement::DooSabin };
+    let plain = if coarse.features().is_none() { Refinement::DooSabin } else { scheme }.refined(coarse).unwrap();
     assert_eq!(fine.faces, plain.mesh().faces);
     plain.with_positions(fine.positions)
 }
@@ -55,7 +70,7 @@ fn a_step_is_the_one_by_hand_and_carries_features_over() {
         for seed in 0..150 {
             let Some((coarse, tags)) = random_creased(scheme, seed) else { continue };
             let (mut fine, mut by_hand) = (coarse.clone(), Creased::of(&coarse, &tags));
-            for (level, rule) in [rule, CornerRule::DooSabin].into_iter().enumerate() {
+            for (level, rule) in [rule, further(rule)].into_iter().enumerate() {
                 if level == 1 && fine.len() > 300 {
                     continue;
                 }
@@ -135,7 +150,7 @@ fn limit_points_are_those_of_the_rows_and_stay_under_refinement() {
                     };
                     assert!(near.distance(*limit) <= 1e-14, "{scheme}, seed {seed}, vertex {v}, level {level}");
                 }
-                fine = refined(CornerRule::DooSabin, &fine);
+                fine = refined(further(rule), &fine);
             }
         }
     }
@@ -166,12 +181,61 @@ fn the_surface_of_an_open_mesh_comes_to_its_points() {
                     assert!(off <= 1e-11, "{scheme}, seed {seed}: {off:e}");
                     continue;
                 }
-                assert!(off < 0.75 * before, "{scheme}, seed {seed}, {levels} levels: {off} after {before}");
+                // About a vertex of valence n mid-edge shrinks by cos²(π/n).
+                let factor = if scheme == Scheme::MidEdge { 0.97 } else { 0.75 };
+                assert!(off < factor * before, "{scheme}, seed {seed}, {levels} levels: {off} after {before}");
                 before = off;
             }
             held += 1;
         }
         assert!(held > 8, "{scheme}: {held}");
+    }
+}
+
+/// A vertex inside the surface with two faces only: its face of type V has four corners, whose centroid is the limit point, and
+/// all vertices of the refined mesh have three faces or more.
+#[test]
+fn vertices_with_two_faces_are_refined() {
+    // One, two and three of them on the edge 5–9 of a grid, and the first one smooth or at rest.
+    for count in 1..4 {
+        for tags in [Vec::new(), vec![(16, 10.0)]] {
+            let grid = grid(4, 4, false);
+            let faces = grid.faces.iter().map(|face| {
+                let mut face = face.to_vec();
+                if let Some(k) = (0..4).find(|&k| [face[k], face[(k + 1) % 4]] == [5, 9]) {
+                    face.splice(k + 1..k + 1, 16..16 + count);
+                } else if let Some(k) = (0..4).find(|&k| [face[k], face[(k + 1) % 4]] == [9, 5]) {
+                    face.splice(k + 1..k + 1, (16..16 + count).rev());
+                }
+                face
+            });
+            let faces = Faces::from_lists(faces);
+            let mesh = Mesh::new(random_points(16 + count as usize, 3), faces);
+            let tags = Tags { boundary: Boundary::EdgeAndCorner, corners: tags, ..Tags::default() };
+            let coarse = open(mesh, Boundary::EdgeAndCorner).tagged(&tags).unwrap();
+            assert_eq!((16..16 + count).map(|v| coarse.incidence().face_count(v as usize)).max(), Some(2));
+            for (_, rule) in SCHEMES {
+                let limits = doo_sabin::limit_positions(rule, &coarse).unwrap();
+                let first = doo_sabin::first_vertex_face(&coarse);
+                let mut fine = refined(rule, &coarse);
+                for _ in 0..3 {
+                    let anew = Surface::examined(fine.mesh().clone(), None, Boundary::EdgeAndCorner).unwrap();
+                    assert_eq!(fine.topology(), anew.topology());
+                    assert_eq!(fine.topology().euler_characteristic(fine.faces()), 1);
+                    let inside = |&v: &usize| fine.features().unwrap().is_smooth(v);
+                    let least = (0..fine.len()).filter(inside).map(|v| fine.incidence().face_count(v)).min();
+                    assert!(least >= Some(3), "{least:?}");
+                    for v in (0..coarse.len()).filter(|&v| coarse.features().unwrap().is_smooth(v)) {
+                        let face = fine.faces().face(first + v);
+                        assert!(face.len() > 3 || face.len() == coarse.incidence().face_count(v));
+                        let center =
+                            face.iter().map(|&w| fine.positions()[w as usize]).sum::<DVec3>() / face.len() as f64;
+                        assert!(center.distance(limits[v]) < 1e-14, "{count}, {rule:?}, vertex {v}");
+                    }
+                    fine = refined(further(rule), &fine);
+                }
+            }
+        }
     }
 }
 
@@ -189,7 +253,7 @@ fn normals_on_a_boundary_are_the_limits_of_those_of_the_faces() {
                 (doo_sabin::limit_positions(rule, &coarse).unwrap(), doo_sabin::limit_normals(rule, &coarse).unwrap());
             let mut fine = refined(rule, &coarse);
             for _ in 0..4 {
-                fine = refined(CornerRule::DooSabin, &fine);
+                fine = refined(further(rule), &fine);
             }
             let sharp: Vec<usize> = (0..coarse.len()).filter(|&v| !coarse.features().unwrap().is_smooth(v)).collect();
             let mut off = vec![Vec::new(); coarse.len()];
@@ -198,7 +262,7 @@ fn normals_on_a_boundary_are_the_limits_of_those_of_the_faces() {
                     off[v].push(spread(&fine, limits[v], normals[v]));
                 }
                 if level < 6 {
-                    fine = refined(CornerRule::DooSabin, &fine);
+                    fine = refined(further(rule), &fine);
                 }
             }
             for (v, off) in off.iter().enumerate().filter(|(_, off)| !off.is_empty()) {
@@ -232,6 +296,93 @@ fn spread(fine: &Surface, point: DVec3, normal: DVec3) -> f64 {
     faces.iter().filter(near).map(angle).fold(0.0, f64::max)
 }
 
+/// On a closed mesh the rule is two steps of mid-edge: their vertices are the corners, in the order of the edges between the
+/// edges of the first step.
+#[test]
+fn the_rule_of_mid_edge_is_two_of_its_steps() {
+    for seed in 0..20 {
+        let surface = Surface::new(small_mesh(Scheme::MidEdge, seed)).unwrap();
+        // Points at random tell the vertices apart.
+        let surface = surface.with_positions(random_points(surface.len(), seed));
+        let once = doo_sabin::refine_by(CornerRule::MidEdge, &surface).unwrap();
+        let twice = Refinement::MidEdge.refine_n(&surface, 2).unwrap();
+        assert_eq!((once.len(), once.faces.len()), (twice.len(), twice.faces.len()));
+        let nearest = |p: &DVec3| {
+            let off = |v: &usize| twice.positions[*v].distance(*p);
+            let v = (0..twice.len()).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
+            assert!(off(&v) <= 1e-14 * surface.diagonal());
+            v as u32
+        };
+        let place: Vec<u32> = once.positions.iter().map(nearest).collect();
+        assert_eq!(place.iter().collect::<BTreeSet<_>>().len(), place.len());
+        assert_eq!(turned(&once.faces, |v| place[v as usize]), turned(&twice.faces, |v| v), "seed {seed}");
+    }
+}
+
+/// Phase one is Gauss-Seidel on the smooth vertices after exact curves, so that it comes to the solution of the system, and
+/// phase two puts the limit points on the given ones from any start.
+#[test]
+fn two_phases_meet_the_points_of_open_and_creased_meshes() {
+    let mut held = 0;
+    for seed in 0..60 {
+        let Some((given, _)) = random_creased(Scheme::ZhengCai, seed) else { continue };
+        let Some(features) = given.features() else { continue };
+        let marks: Vec<bool> = (0..given.len()).map(|v| (v + seed as usize) % 5 > 0).collect();
+        for interpolated in [None, Some(&marks[..])] {
+            let is_asked = |v: usize| interpolated.is_none_or(|marks| marks[v]);
+            let options = Options { interpolated, tolerance: Tolerance::Absolute(1e-13), ..Options::default() };
+            let solved = interpolate(&given, Scheme::ZhengCai, &options).unwrap().points;
+            for sweep in [Sweep::GaussSeidel(None), Sweep::Jacobi] {
+                let phase = PhaseOne { sweep, max_iterations: 200, eps: 1e-13 };
+                let found = auxiliary(&given, interpolated, &phase).unwrap();
+                assert!(found.passed);
+                let off = found.surface.positions().iter().zip(&solved).map(|(a, b)| a.distance(*b));
+                assert!(off.fold(0.0, f64::max) < 1e-11, "seed {seed}, {sweep:?}");
+            }
+            // A single sweep: curves are exact, and phase two does the rest.
+            let handles: Vec<f64> = (0..given.len())
+                .map(|v| if features.is_smooth(v) && is_asked(v) { 0.5 + (v % 3) as f64 } else { 1.0 })
+                .collect();
+            let mut normals = vec![None; given.len()];
+            let smooth = (0..given.len()).find(|&v| features.is_smooth(v) && is_asked(v));
+            smooth.into_iter().for_each(|v| normals[v] = Some(DVec3::new(0.3, -0.5, 0.8)));
+            let constraints = Constraints { interpolated, handles: Some(&handles), normals: Some(&normals) };
+            let phase = PhaseOne { max_iterations: 1, ..PhaseOne::default() };
+            let made = zheng_cai::interpolate(&given, &constraints, &phase).unwrap();
+            let auxiliary = &made.auxiliary.surface;
+            let fine = Refinement::DooSabin.refined_n(&made.first.surface, 2).unwrap();
+            assert_eq!(made.first.at_level(3).unwrap().positions, fine.positions());
+            let by_rows = doo_sabin::limit_positions(CornerRule::ZhengCai, auxiliary).unwrap();
+            for (v, point) in given.positions().iter().enumerate().filter(|(v, _)| is_asked(*v)) {
+                let reached = match features.is_smooth(v) {
+                    true => {
+                        let face = fine.faces().face(made.first.first_vertex_face + v);
+                        face.iter().map(|&w| fine.positions()[w as usize]).sum::<DVec3>() / face.len() as f64
+                    }
+                    false => by_rows[v],
+                };
+                assert!(reached.distance(*point) < 1e-14, "seed {seed}, vertex {v}");
+            }
+            if let Some(v) = smooth {
+                let normal = doo_sabin::face_normals(fine.mesh())[made.first.first_vertex_face + v];
+                assert!(normal.cross(normals[v].unwrap().normalize()).length() < 1e-9, "seed {seed}: {normal}");
+            }
+        }
+        held += 1;
+    }
+    assert!(held > 30, "{held}");
+    let message = |normals: &[Option<DVec3>], handles: &[f64]| {
+        let sheet = open(grid(3, 3, false), Boundary::EdgeAndCorner);
+        let constraints = Constraints { normals: Some(normals), handles: Some(handles), ..Constraints::default() };
+        zheng_cai::interpolate(&sheet, &constraints, &PhaseOne::default()).unwrap_err().to_string()
+    };
+    let (mut normals, mut handles) = (vec![None; 9], vec![1.0; 9]);
+    handles[3] = 2.0;
+    assert!(message(&normals, &handles).contains("vertex 3 is sharp"));
+    normals[0] = Some(DVec3::Z);
+    assert!(message(&normals, &handles).contains("vertex 0 is sharp"));
+}
+
 #[test]
 fn what_has_no_rule_is_refused_before_any_work() {
     let cube = Surface::new(builtin::cube()).unwrap();
@@ -242,14 +393,13 @@ fn what_has_no_rule_is_refused_before_any_work() {
     assert!(matches!(Refinement::DooSabin.check(&semi), Err(Error::SemiSharp { vertex: 0, .. })));
     let sheet = open(grid(4, 4, false), Boundary::EdgeAndCorner);
     let wanted = |levels, normals| SurfaceOptions { levels, normals, ..SurfaceOptions::default() };
-    let check =
-        |scheme, levels, normals| limitlab::interpolate::surface::check(&sheet, scheme, &wanted(levels, normals));
-    assert!(check(Scheme::ZhengCai, 2, true).is_ok() && check(Scheme::Nasri, 2, true).is_ok());
-    assert!(check(Scheme::Sqrt3, 0, false).is_ok() && check(Scheme::Sqrt3, 1, false).is_err());
+    let refused = |scheme, levels, normals| check(&sheet, scheme, &wanted(levels, normals)).is_err();
+    assert!(SCHEMES.iter().all(|&(scheme, _)| !refused(scheme, 2, true)));
+    assert!(!refused(Scheme::Sqrt3, 0, false) && refused(Scheme::Sqrt3, 1, false));
     let mut normals = vec![None; sheet.len()];
     normals[1] = Some(DVec3::Z);
-    let constraints = limitlab::interpolate::zheng_cai::Constraints { normals: Some(&normals), ..Default::default() };
+    let constraints = Constraints { normals: Some(&normals), ..Constraints::default() };
     let request = SurfaceOptions { levels: 2, constraints, ..SurfaceOptions::default() };
-    let message = limitlab::interpolate::surface::check(&sheet, Scheme::ZhengCai, &request).unwrap_err().to_string();
+    let message = check(&sheet, Scheme::ZhengCai, &request).unwrap_err().to_string();
     assert!(message.contains("vertex 1 is sharp"), "{message}");
 }

@@ -362,12 +362,15 @@ fn what_has_no_rules_is_refused() {
     let mesh = grid(4, 4, true);
     let surface = open(mesh.clone(), Boundary::EdgeOnly);
     for refinement in Refinement::ALL {
-        if matches!(refinement, Refinement::CatmullClark | Refinement::Loop | Refinement::DooSabin) {
+        if matches!(
+            refinement,
+            Refinement::CatmullClark | Refinement::Loop | Refinement::DooSabin | Refinement::MidEdge
+        ) {
             assert!(refinement.check(&surface).is_ok());
             continue;
         }
         let message = refinement.refined(&surface).unwrap_err().to_string();
-        assert!(message.ends_with("use catmull-clark, loop, nasri or zheng-cai"), "{message}");
+        assert!(message.ends_with("use catmull-clark, loop, nasri, zheng-cai or mid-edge"), "{message}");
         assert_eq!(refinement.check(&surface).unwrap_err().to_string(), message);
     }
     // A boundary of vertices of valence 3 and more, without rules.

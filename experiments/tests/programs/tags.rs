@@ -136,3 +136,57 @@ fn tags_go_through_welding() {
     let line = assert_refused(&run_on(INTERPOLATE, folder.path(), "a.obj", &["--weld"]), "no edge");
     assert!(line.contains("a.obj, line 11: edge 6–4 is not in the mesh"), "{line}");
 }
+
+/// Surfaces of open and creased meshes; what a refinement has no rule for is refused before a system is solved.
+#[test]
+fn surfaces_of_sharp_meshes_are_written_or_refused_before_the_work() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("a.usda"), open_scene("catmullClark", "")).unwrap();
+    fs::write(folder.path().join("top.txt"), top_of_cube()).unwrap();
+    let torus = limitlab::mesh::builtin::builtin("torus:8x6").unwrap();
+    let face = torus.faces.face(0);
+    let semi_sharp: String = (0..3).map(|k| format!("{} {} 1.5\n", face[k], face[k + 1])).collect();
+    fs::write(folder.path().join("semi.txt"), semi_sharp).unwrap();
+    fs::write(folder.path().join("dart.txt"), top_of_cube().lines().next().unwrap()).unwrap();
+    let surface = |mesh: &str, flags: &[&str]| {
+        let output =
+            run_on(INTERPOLATE, folder.path(), mesh, &[&["--limit", "--write-normals", "--json"], flags].concat());
+        assert_done(&output, mesh);
+        let made = io::read(&folder.path().join("result.obj")).unwrap().mesh;
+        assert_eq!(json(&output)["surface"]["vertices"], made.len());
+        made
+    };
+    for scheme in ["nasri", "zheng-cai", "mid-edge"] {
+        // Eight corners, two points of each of six sides, four corners that rest; two faces, seven quads, six at vertices.
+        let made = surface("a.usda", &["--scheme", scheme, "--subdivide", "1"]);
+        assert_eq!((made.len(), made.faces.len()), (8 + 12 + 4, 2 + 7 + 6), "{scheme}");
+        let top = surface("cube", &["--scheme", scheme, "--subdivide", "2", "--creases", "top.txt"]);
+        assert!(top.positions.iter().all(|p| p.is_finite()));
+    }
+    let two_phase = ["--method", "two-phase", "--shape-handle", "0.7", "--subdivide", "1"];
+    assert_eq!(surface("a.usda", &two_phase).len(), 24);
+    // Sharpness 1.5 is gone after two levels; vertices keep their numbers.
+    for levels in ["0", "1", "2", "3"] {
+        let flags = ["--scheme", "catmull-clark", "--subdivide", levels, "--creases", "semi.txt"];
+        let made = surface("torus:8x6", &flags);
+        for (p, q) in torus.positions.iter().zip(&made.positions) {
+            assert!(p.distance(*q) < 1e-9, "{levels} levels: {p} {q}");
+        }
+    }
+    // No iteration is made.
+    let refused = |mesh: &str, flags: &[&str]| {
+        let flags = [&["--method", "pia", "--max-iter", "1"], flags].concat();
+        assert_refused(&run_on(INTERPOLATE, folder.path(), mesh, &flags), mesh)
+    };
+    let line = refused("cube", &["--scheme", "nasri", "--creases", "dart.txt", "--subdivide", "1"]);
+    assert!(line.contains("is a dart") && line.contains("make it a corner"), "{line}");
+    let line = refused("torus:8x6", &["--scheme", "mid-edge", "--creases", "semi.txt", "--subdivide", "1"]);
+    assert!(line.contains("is semi-sharp"), "{line}");
+    let triangles = "v 0 0 0\nv 1 0 0\nv 1 1 1\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
+    fs::write(folder.path().join("t.obj"), triangles).unwrap();
+    let line = refused("t.obj", &["--scheme", "sqrt3", "--subdivide", "1"]);
+    assert!(line.ends_with("use --scheme catmull-clark, loop, nasri, zheng-cai or mid-edge"), "{line}");
+    fs::write(folder.path().join("n.txt"), "1 0 0 1\n").unwrap();
+    let line = refused("a.usda", &["--scheme", "zheng-cai", "--normals", "n.txt", "--subdivide", "1"]);
+    assert!(line.contains("vertex 1 is sharp"), "{line}");
+}

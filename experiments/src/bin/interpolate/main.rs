@@ -99,7 +99,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         Choice::Keeping(scheme) => scheme,
         _ => input.scheme.refinement(),
     };
-    refinement.check_size(input.surface.mesh(), arguments.shape.subdivide.into()).map_err(|e| input.named(e))?;
+    refinement.check_size(&input.surface, arguments.shape.subdivide.into()).map_err(|e| input.named(e))?;
     let per_vertex = VertexOptions::read(&arguments.shape, &input)?;
     let named = |e: Error| match e {
         Error::Io { .. } | Error::Parse { .. } | Error::Memory { .. } => e,
