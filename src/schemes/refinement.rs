@@ -56,6 +56,9 @@ impl Size {
     }
 }
 
+/// What is sharp on the refined mesh of a surface, with its topology; `None` if nothing is.
+type RefinedFeatures = fn(&Surface, &Mesh, &Topology) -> Result<Option<Features>>;
+
 /// All that defines a refinement.
 pub(super) struct RefinementRules {
     pub(super) name: &'static str,
@@ -66,8 +69,8 @@ pub(super) struct RefinementRules {
     pub(super) refine: fn(&Surface) -> Result<Mesh>,
     /// Of a mesh and what `refine` made of it.
     pub(super) refined_topology: fn(&Surface, &Mesh) -> Topology,
-    /// What is sharp on a refined mesh with its topology, where there are rules for it.
-    pub(super) refined_features: Option<fn(&Surface, &Mesh, &Topology) -> Result<Option<Features>>>,
+    /// Where there are rules for what is sharp.
+    pub(super) refined_features: Option<RefinedFeatures>,
     pub(super) size: fn(Size) -> Size,
     pub(super) limit_positions: fn(&Surface) -> Result<Vec<DVec3>>,
     pub(super) limit_normals: fn(&Surface) -> Result<Vec<DVec3>>,

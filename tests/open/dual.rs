@@ -327,7 +327,7 @@ fn two_phases_meet_the_points_of_open_and_creased_meshes() {
     for seed in 0..60 {
         let Some((given, _)) = random_creased(Scheme::ZhengCai, seed) else { continue };
         let Some(features) = given.features() else { continue };
-        let marks: Vec<bool> = (0..given.len()).map(|v| (v + seed as usize) % 5 > 0).collect();
+        let marks: Vec<bool> = (0..given.len()).map(|v| (v + seed as usize) % 5 < 4).collect();
         for interpolated in [None, Some(&marks[..])] {
             let is_asked = |v: usize| interpolated.is_none_or(|marks| marks[v]);
             let options = Options { interpolated, tolerance: Tolerance::Absolute(1e-13), ..Options::default() };
