@@ -134,7 +134,7 @@ pub struct Auxiliary {
 /// Phase one: curves by elimination, then sweeps of Eq. 7 over the smooth vertices from V = I, without a matrix. With S_F the sum of a face's corners, kept up to date
 /// as vertices move, an update is V += (2mI − mV − Σ_F S_F/|F|)/(m + Σ_F 1/|F|): O(1) a corner whatever the face
 /// sizes. Vertices that are not interpolated keep V = I. The system is strictly diagonally dominant, so both sweeps
-/// converge on every mesh; [`Scheme::ZhengCai`](crate::schemes::Scheme::ZhengCai) is the same system for all
+/// converge on every mesh; [`Scheme::ZhengCai`] is the same system for all
 /// other solvers.
 ///
 /// # Errors
