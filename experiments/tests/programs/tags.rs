@@ -173,7 +173,7 @@ fn surfaces_of_sharp_meshes_are_written_or_refused_before_the_work() {
             assert!(p.distance(*q) < 1e-9, "{levels} levels: {p} {q}");
         }
     }
-    // No iteration is made.
+    // One iteration would not do, and be told instead.
     let refused = |mesh: &str, flags: &[&str]| {
         let flags = [&["--method", "pia", "--max-iter", "1"], flags].concat();
         assert_refused(&run_on(INTERPOLATE, folder.path(), mesh, &flags), mesh)
@@ -182,11 +182,14 @@ fn surfaces_of_sharp_meshes_are_written_or_refused_before_the_work() {
     assert!(line.contains("is a dart") && line.contains("make it a corner"), "{line}");
     let line = refused("torus:8x6", &["--scheme", "mid-edge", "--creases", "semi.txt", "--subdivide", "1"]);
     assert!(line.contains("is semi-sharp"), "{line}");
-    let triangles = "v 0 0 0\nv 1 0 0\nv 1 1 1\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
+    let points: String = (0..16).map(|k| format!("v {} {} {}\n", k / 4, k % 4, k * k % 7)).collect();
+    let corner = |k: usize| k + k / 3 + 1;
+    let pairs = (0..9).map(corner).map(|v| format!("f {v} {} {}\nf {v} {} {}\n", v + 4, v + 5, v + 5, v + 1));
+    let triangles = points + &pairs.collect::<String>();
     fs::write(folder.path().join("t.obj"), triangles).unwrap();
     let line = refused("t.obj", &["--scheme", "sqrt3", "--subdivide", "1"]);
     assert!(line.ends_with("use --scheme catmull-clark, loop, nasri, zheng-cai or mid-edge"), "{line}");
     fs::write(folder.path().join("n.txt"), "1 0 0 1\n").unwrap();
-    let line = refused("a.usda", &["--scheme", "zheng-cai", "--normals", "n.txt", "--subdivide", "1"]);
+    let line = refused("t.obj", &["--scheme", "zheng-cai", "--normals", "n.txt", "--subdivide", "1"]);
     assert!(line.contains("vertex 1 is sharp"), "{line}");
 }
