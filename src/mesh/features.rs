@@ -227,6 +227,12 @@ impl Features {
         &self.sharp
     }
 
+    /// Whether the edge of half-edge `c` is sharp. O(log k) for k sharp edges.
+    pub(crate) fn is_sharp(&self, topology: &Topology, c: u32) -> bool {
+        let first = topology.twin(c).map_or(c, |t| t.min(c));
+        self.sharp.binary_search(&first).is_ok()
+    }
+
     /// The semi-sharp edges, as [`sharp_half_edges`](Self::sharp_half_edges), with their sharpness.
     pub fn semi_sharp_edges(&self) -> &[(u32, f64)] {
         &self.semi_sharp

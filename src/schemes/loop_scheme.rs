@@ -11,15 +11,14 @@ use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Definition, PaperNames, SingularSet, from_limit_weight};
 use super::sharp::{self, Across};
 use super::star::{
-    Tangents, across, blend_with_neighbors, next_in_triangle, prev_in_triangle, push_blends, refuse, require_room,
-    require_triangles_alone, ring_tangents,
+    Tangents, across, blend_with_neighbors, next_in_triangle, prev_in_triangle, push_blends, require_no_pillow,
+    require_room, require_triangles_alone, ring_tangents,
 };
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
 use crate::mesh::features::Rule;
 use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
-use crate::parallel::find_first;
 
 /// The mask of the vertex point at valence `n`: the weight of the vertex, 3/8 + (3/8 + ¼cos(2π/n))², and of
 /// each neighbour, the rest over n.
@@ -118,20 +117,6 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
 /// The topology of `refined`, which is what [`refine`] or [`butterfly`](super::butterfly) made of the surface.
 pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
     refined::of_fours(surface.topology(), refined)
-}
-
-/// Refuses two triangles with the same corners, which a valid mesh has only beside a part with a boundary.
-fn require_no_pillow(surface: &Surface) -> Result<()> {
-    if surface.is_closed() {
-        return Ok(());
-    }
-    let (topology, incidence) = (surface.topology(), surface.incidence());
-    let is_inside = |&c: &u32| topology.twin(c).is_some() && topology.twin(prev_in_triangle(c) as u32).is_some();
-    let has_two = |v: usize| incidence.face_count(v) == 2 && incidence.corners_at(v).iter().all(is_inside);
-    match find_first(surface.len(), has_two) {
-        Some(v) => refuse(format!("vertex {v} has two triangles with the same corners; remove them")),
-        None => Ok(()),
-    }
 }
 
 /// The faces of a 1-to-4 split of triangles.

@@ -4,6 +4,7 @@
 //! finite and mean nothing.
 
 use glam::{DVec2, DVec3};
+use rayon::slice::ParallelSliceMut;
 
 use super::star::{CHUNK, Tangents};
 use crate::mesh::Surface;
@@ -49,15 +50,44 @@ fn set_vertices(points: &mut [DVec3], old: &[DVec3], features: &Features, w: f64
     features.for_each_crease(|v, [a, b]| points[v] = (1.0 - 2.0 * w) * old[v] + w * (old[a] + old[b]));
 }
 
+/// The polygons of sharp edges, each with one point more beyond an end that is no crease vertex: mirrored at it.
+pub(super) struct Polygons<'a> {
+    points: &'a [DVec3],
+    /// Crease vertices, ascending, with their neighbours along the curve.
+    creases: Vec<(usize, [usize; 2])>,
+}
+
+impl<'a> Polygons<'a> {
+    /// O(k log k) for k crease vertices.
+    pub(super) fn new(points: &'a [DVec3], features: &Features) -> Self {
+        let mut creases = Vec::new();
+        features.for_each_crease(|v, ends| creases.push((v, ends)));
+        creases.par_sort_unstable();
+        Polygons { points, creases }
+    }
+
+    /// The four points about the sharp edge from `a` to `b`, in order.
+    pub(super) fn about(&self, [a, b]: [usize; 2]) -> [DVec3; 4] {
+        [self.beyond(b, a), self.points[a], self.points[b], self.beyond(a, b)]
+    }
+
+    /// The point that follows on `v`, coming from `from`.
+    fn beyond(&self, from: usize, v: usize) -> DVec3 {
+        match self.creases.binary_search_by_key(&v, |crease| crease.0) {
+            Ok(place) => {
+                let [a, b] = self.creases[place].1;
+                self.points[if a == from { b } else { a }]
+            }
+            Err(_) => 2.0 * self.points[v] - self.points[from],
+        }
+    }
+}
+
 /// The corners at a dart in counter-clockwise order, from that whose side is the sharp edge.
 pub(super) fn dart_star(surface: &Surface, features: &Features, v: usize, star: &mut Vec<u32>) {
     let topology = surface.topology();
     topology.star(surface.faces(), v, star);
-    let is_sharp = |&c: &u32| {
-        let first = topology.twin(c).map_or(c, |t| t.min(c));
-        features.sharp_half_edges().binary_search(&first).is_ok()
-    };
-    let place = star.iter().position(is_sharp).unwrap_or(0);
+    let place = star.iter().position(|&c| features.is_sharp(topology, c)).unwrap_or(0);
     star.rotate_left(place);
 }
 

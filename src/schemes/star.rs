@@ -59,6 +59,20 @@ pub(crate) fn require_triangles_alone(surface: &Surface, scheme: &'static str) -
     }
 }
 
+/// Refuses two triangles with the same corners, which a valid mesh has only beside a part with a boundary.
+pub(crate) fn require_no_pillow(surface: &Surface) -> Result<()> {
+    if surface.is_closed() {
+        return Ok(());
+    }
+    let (topology, incidence) = (surface.topology(), surface.incidence());
+    let is_inside = |&c: &u32| topology.twin(c).is_some() && topology.twin(prev_in_triangle(c) as u32).is_some();
+    let has_two = |v: usize| incidence.face_count(v) == 2 && incidence.corners_at(v).iter().all(is_inside);
+    match find_first(surface.len(), has_two) {
+        Some(v) => refuse(format!("vertex {v} has two triangles with the same corners; remove them")),
+        None => Ok(()),
+    }
+}
+
 /// Refuses a result of `factor` corners per old corner that 32-bit indices cannot number. A result has
 /// fewer vertices than corners.
 pub(crate) fn require_room(mesh: &Mesh, factor: usize) -> Result<()> {

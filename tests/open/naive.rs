@@ -193,14 +193,102 @@ impl Creased {
                 _ => middle,
             });
         }
+        self.in_four(positions, &midpoints)
+    }
+
+    /// Every triangle in four, by the numbers of the new vertices on its sides.
+    fn in_four(&self, positions: Vec<DVec3>, midpoints: &BTreeMap<[u32; 2], u32>) -> Self {
         let mut faces = Faces::default();
-        for face in mesh.faces.iter() {
+        for face in self.mesh.faces.iter() {
             let [a, b, c] = face.try_into().unwrap();
             let [ab, bc, ca] = [edge(a, b), edge(b, c), edge(c, a)].map(|side| midpoints[&side]);
             [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]].iter().for_each(|face| faces.push(face));
         }
-        let sharp = self.children(&midpoints);
+        let sharp = self.children(midpoints);
         Creased { mesh: Mesh::new(positions, faces), sharp, corners: self.lowered_corners() }
+    }
+
+    /// The vertices about a smooth vertex, in order, from one on.
+    fn ring(&self, v: u32, first: u32) -> Vec<u32> {
+        let faces: Vec<[u32; 3]> = self.mesh.faces.iter().map(|face| face.try_into().unwrap()).collect();
+        let after = |w: u32| {
+            let found = faces.iter().find(|f| (0..3).any(|k| f[k] == v && f[(k + 1) % 3] == w)).unwrap();
+            found.iter().copied().find(|&x| x != v && x != w).unwrap()
+        };
+        std::iter::successors(Some(first), |&w| Some(after(w)).filter(|&x| x != first)).collect()
+    }
+
+    /// The four points of a curve about its edge from `a` to `b`, mirrored beyond its ends.
+    fn along(&self, [a, b]: [u32; 2]) -> [DVec3; 4] {
+        let at = |v: u32| self.mesh.positions[v as usize];
+        let beyond = |from: u32, v: u32| {
+            let ends: Vec<u32> = self.sharp_at(v, false).into_iter().map(|e| e.0).collect();
+            match ends[..] {
+                [a, b] if !self.corners.contains_key(&v) => at(if a == from { b } else { a }),
+                _ => 2.0 * at(v) - at(from),
+            }
+        };
+        [beyond(b, a), at(a), at(b), beyond(a, b)]
+    }
+
+    fn is_smooth(&self, v: u32) -> bool {
+        !self.corners.contains_key(&v) && self.sharp_at(v, false).is_empty()
+    }
+
+    /// A modified Butterfly step, by the published masks.
+    pub fn butterfly(&self) -> Self {
+        let (mesh, edges) = (&self.mesh, faces_by_edge(&self.mesh));
+        let at = |v: u32| mesh.positions[v as usize];
+        let opposite = |f: usize, side: [u32; 2]| {
+            let third = mesh.faces.face(f).iter().copied().find(|v| !side.contains(v));
+            at(third.unwrap())
+        };
+        let mut positions = mesh.positions.clone();
+        let mut midpoints = BTreeMap::new();
+        for (&side, faces) in &edges {
+            midpoints.insert(side, positions.len() as u32);
+            if self.sharp.contains_key(&side) {
+                let [before, a, b, after] = self.along(side);
+                positions.push((9.0 * (a + b) - before - after) / 16.0);
+                continue;
+            }
+            let by_ring: Vec<DVec3> = (0..2)
+                .filter_map(|k| {
+                    let (v, w) = (side[k], side[1 - k]);
+                    let ring = if self.is_smooth(v) { self.ring(v, w) } else { return None };
+                    let n = ring.len();
+                    let weight = |j: usize| {
+                        let angle = std::f64::consts::TAU * j as f64 / n as f64;
+                        match n {
+                            3 => [5.0, -1.0, -1.0][j] / 12.0,
+                            4 => [3.0, 0.0, -1.0, 0.0][j] / 8.0,
+                            _ => (0.25 + angle.cos() + 0.5 * (2.0 * angle).cos()) / n as f64,
+                        }
+                    };
+                    let sum: DVec3 = ring.iter().enumerate().map(|(j, &w)| weight(j) * at(w)).sum();
+                    (n != 6).then_some(0.75 * at(v) + sum)
+                })
+                .collect();
+            if !by_ring.is_empty() {
+                positions.push(by_ring.iter().sum::<DVec3>() / by_ring.len() as f64);
+                continue;
+            }
+            let mut point = 0.5 * (at(side[0]) + at(side[1]));
+            for &f in faces {
+                let tip = mesh.faces.face(f).iter().copied().find(|v| !side.contains(v)).unwrap();
+                point += at(tip) / 8.0;
+                for (v, w) in [(side[0], side[1]), (side[1], side[0])] {
+                    let rim = edge(v, tip);
+                    let wing = match edges[&rim][..] {
+                        [g, h] if !self.sharp.contains_key(&rim) => opposite(if g == f { h } else { g }, rim),
+                        _ => at(v) + at(tip) - at(w),
+                    };
+                    point -= wing / 16.0;
+                }
+            }
+            positions.push(point);
+        }
+        self.in_four(positions, &midpoints)
     }
 
     /// A √3 step: centroids, smooth vertices relaxed, edges flipped that are not sharp; all that is sharp rests.

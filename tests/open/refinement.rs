@@ -69,7 +69,8 @@ fn hold_against_tags(coarse: &Surface, fine: &Surface) {
 
 #[test]
 fn a_step_is_the_one_by_hand_and_carries_features_over() {
-    for (scheme, refinement, step) in SCHEMES {
+    let butterfly: (Scheme, Refinement, Step) = (Scheme::Loop, Refinement::Butterfly, Creased::butterfly);
+    for (scheme, refinement, step) in SCHEMES.into_iter().chain([butterfly]) {
         let (mut open, mut darts) = (0, 0);
         for seed in 0..200 {
             let Some((coarse, tags)) = random_with_darts(scheme, seed) else { continue };
@@ -328,12 +329,82 @@ fn the_surface_of_an_open_mesh_interpolates_it() {
     }
 }
 
+/// A grid of triangles over the unit lattice, its height that of a cubic.
+fn cubic_grid(p: usize, q: usize) -> (Surface, impl Fn(DVec3) -> f64) {
+    let cubic = |at: DVec3| {
+        let [x, y] = [at.x / 4.0, at.y / 4.0];
+        0.7 * x.powi(3) - 1.3 * x * x * y + 0.4 * x * y * y + 0.9 * y.powi(3) - 0.6 * x * x + 0.8 * x * y + y - 0.3
+    };
+    let mut mesh = grid(p, q, true);
+    for point in &mut mesh.positions {
+        point.z = cubic(*point);
+    }
+    let corners = [0, q - 1, (p - 1) * q, p * q - 1].map(|v| (v as u32, 10.0));
+    let tags = Tags { boundary: Boundary::EdgeOnly, corners: corners.to_vec(), ..Tags::default() };
+    (open(mesh, Boundary::EdgeOnly).tagged(&tags).unwrap(), cubic)
+}
+
+/// Along curves cubics are reproduced but next to corners, and inside where no stencil is cut; the lattice everywhere.
+#[test]
+fn butterfly_reproduces_cubics_along_the_boundary_and_lines_everywhere() {
+    let (p, q) = (9, 7);
+    let (coarse, cubic) = cubic_grid(p, q);
+    let fine = Refinement::Butterfly.refined(&coarse).unwrap();
+    let (mut curve, mut inside) = (0, 0);
+    for (e, c) in coarse.topology().edge_sides().enumerate() {
+        let face = coarse.faces().face(c as usize / 3);
+        let ends = [face[c as usize % 3], face[(c as usize + 1) % 3]].map(|v| coarse.positions()[v as usize]);
+        let point = fine.positions()[coarse.len() + e];
+        let middle = 0.5 * (ends[0] + ends[1]);
+        assert!((point - middle).truncate().length() < 1e-14, "{point}");
+        let [x, y] = [point.x, point.y];
+        let from_ends = |at: f64, count: usize| at.min(count as f64 - 1.0 - at);
+        let [dx, dy] = [from_ends(x, p), from_ends(y, q)];
+        let off = (point.z - cubic(point)).abs();
+        if dx == 0.0 || dy == 0.0 {
+            if dx.max(dy) > 1.0 {
+                assert!(off < 1e-14, "{point}: {off:e}");
+                curve += 1;
+            }
+        } else if dx.min(dy) >= 1.5 {
+            assert!(off < 1e-14, "{point}: {off:e}");
+            inside += 1;
+        }
+    }
+    assert_eq!(curve, 2 * (p - 3) + 2 * (q - 3));
+    assert!(inside > 50, "{inside}");
+}
+
+/// At smooth vertices, beside the boundary too, those of the faces in the limit; none at sharp ones.
+#[test]
+fn normals_of_interpolatory_schemes_are_limits_up_to_the_boundary() {
+    for refinement in [Refinement::Butterfly] {
+        let mut held = 0;
+        for seed in 0..60 {
+            let Some((coarse, _)) = random_creased(Scheme::Loop, seed) else { continue };
+            let Some(features) = coarse.features() else { continue };
+            if coarse.len() > 40 {
+                continue;
+            }
+            let before = refinement.limit_normals(&coarse).unwrap();
+            let fine = refinement.refined(&coarse).unwrap();
+            let after = refinement.limit_normals(&fine).unwrap();
+            for (v, a) in before.iter().enumerate() {
+                assert_eq!(*a != DVec3::ZERO, features.is_smooth(v), "{refinement}, seed {seed}, vertex {v}");
+                assert!(a.distance(after[v]) < 1e-9, "{refinement}, seed {seed}, vertex {v}");
+                held += usize::from(features.is_smooth(v));
+            }
+        }
+        assert!(held > 50, "{refinement}: {held}");
+    }
+}
+
 #[test]
 fn what_has_no_rules_is_refused() {
     let mesh = grid(4, 4, true);
     let surface = open(mesh.clone(), Boundary::EdgeOnly);
     for refinement in Refinement::ALL {
-        if matches!(refinement, Refinement::CatmullClark | Refinement::Loop) {
+        if matches!(refinement, Refinement::CatmullClark | Refinement::Loop | Refinement::Butterfly) {
             continue;
         }
         let message = refinement.refined(&surface).unwrap_err().to_string();
