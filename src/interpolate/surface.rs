@@ -96,7 +96,7 @@ pub fn surface(control: Surface, scheme: Scheme, points: &[DVec3], request: &Sur
         }
         if request.limit {
             let limits = match rule {
-                _ if fine.features().is_some() => limit_points(fine, system)?,
+                _ if fine.features().is_some_and(|f| !f.is_midway()) => limit_points(fine, system)?,
                 Some(rule) => doo_sabin::limit_positions(rule, fine)?,
                 None => scheme.limit_positions(fine)?,
             };

@@ -64,6 +64,7 @@ pub struct Features {
     sharp: Vec<u32>,
     creased: usize,
     curves: Vec<Curve>,
+    is_midway: bool,
     /// By half-edge, as in `sharp`, and by vertex.
     semi_sharp: Vec<(u32, f64)>,
     semi_sharp_vertices: Vec<(u32, f64)>,
@@ -159,29 +160,33 @@ impl Features {
         }
         let curves = curves(&pairs, &rules);
         let creased = sharp.len() - boundary.len();
-        Ok(Some(Features { rules, sharp, creased, curves, semi_sharp, semi_sharp_vertices }))
+        Ok(Some(Features { rules, sharp, creased, curves, is_midway: false, semi_sharp, semi_sharp_vertices }))
     }
 
-    /// Those of the mesh after a step that splits every edge in two by a vertex of its own, from its faces and topology: old
-    /// vertices come first and keep their rules, new ones on sharp edges are creases, all others smooth. `halves(c)` are the
-    /// half-edges of the finer mesh along half-edge `c`, in this order. O(N), and O(k log k) for k sharp edges.
+    /// Those of the mesh after a step that splits every sharp edge in as many parts, from its faces and topology: old
+    /// vertices come first and keep their rules, new ones on sharp edges are creases, all others smooth. `pieces(c, put)` puts
+    /// the half-edges of the finer mesh along half-edge `c`, in this order. O(N), and O(k log k) for k sharp edges.
     pub(crate) fn refined(
         &self,
         faces: &Faces,
         topology: &Topology,
         coarse: &Topology,
-        halves: impl Fn(u32) -> [u32; 2],
+        pieces: impl Fn(u32, &mut Vec<u32>),
     ) -> Self {
         let mut sharp: Vec<u32> = Vec::with_capacity(2 * self.sharp.len());
+        let (mut along, mut back) = (Vec::new(), Vec::new());
         for &c in &self.sharp {
-            let along = halves(c);
-            // The twin's halves, in the order of this side.
-            let back = coarse.twin(c).map_or(along, |t| {
-                let [first, second] = halves(t);
-                [second, first]
-            });
-            sharp.extend([along[0].min(back[0]), along[1].min(back[1])]);
+            along.clear();
+            back.clear();
+            pieces(c, &mut along);
+            match coarse.twin(c) {
+                Some(t) => pieces(t, &mut back),
+                None => back.extend(along.iter().rev()),
+            }
+            // The twin's, in the order of this side.
+            sharp.extend(along.iter().zip(back.iter().rev()).map(|(&a, &b)| a.min(b)));
         }
+        let parts = sharp.len() / self.sharp.len().max(1);
         sharp.par_sort_unstable();
         let incidence = &topology.incidence;
         let pairs = pairs(faces, incidence, &sharp);
@@ -192,7 +197,16 @@ impl Features {
         }
         let curves = curves(&pairs, &rules);
         let (semi_sharp, semi_sharp_vertices) = (Vec::new(), Vec::new());
-        Features { rules, sharp, creased: 2 * self.creased, curves, semi_sharp, semi_sharp_vertices }
+        Features {
+            rules,
+            sharp,
+            creased: parts * self.creased,
+            curves,
+            // Of two steps that split edges in three, the first leaves sharp ones whole.
+            is_midway: parts == 1,
+            semi_sharp,
+            semi_sharp_vertices,
+        }
     }
 
     /// Calls `visit(v, [a, b])` for every crease vertex and its two neighbours along the curve.
@@ -225,6 +239,11 @@ impl Features {
     /// One half-edge of each sharp edge, ascending: the only one, or that of the smaller index.
     pub fn sharp_half_edges(&self) -> &[u32] {
         &self.sharp
+    }
+
+    /// Both half-edges of each sharp edge, or the one that it has.
+    pub(crate) fn sharp_sides<'a>(&'a self, topology: &'a Topology) -> impl Iterator<Item = u32> + 'a {
+        self.sharp.iter().flat_map(|&c| std::iter::once(c).chain(topology.twin(c)))
     }
 
     /// Whether the edge of half-edge `c` is sharp. O(log k) for k sharp edges.
@@ -292,6 +311,12 @@ impl Features {
     /// Whether there are darts, or semi-sharp vertices beside curves.
     pub fn has_stars(&self) -> bool {
         self.is_semi_sharp() || !parallel::all(self.rules.len(), |v| self.rules[v] != Rule::Dart)
+    }
+
+    /// Whether the mesh comes of the first of two steps of a √3 refinement, of which the second splits the sharp edges in
+    /// three. Systems take every mesh as one that is given, which is not.
+    pub fn is_midway(&self) -> bool {
+        self.is_midway
     }
 
     /// How many vertices follow a rule.

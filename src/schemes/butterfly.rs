@@ -18,9 +18,9 @@ use super::loop_scheme::{refined_topology, split_in_four};
 use super::refined;
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::ring::{Place, RingRule, Rings};
-use super::sharp::Polygons;
+use super::sharp::{Polygons, mirrored};
 use super::star::{
-    Tangents, across, next_in_triangle, prev_in_triangle, require_no_pillow, require_room, require_triangles_alone,
+    Tangents, across, next_in_triangle, prev_in_triangle, require_no_pillow, require_room, require_triangles,
 };
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
@@ -81,7 +81,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     needs_triangles: true,
     refine,
     refined_topology,
-    halves: Some(refined::halves_in_fours),
+    pieces: Some(|_, c, put| put.extend(refined::halves_in_fours(c))),
     size: Size::in_four,
     limit_positions: |surface| vertices(NAME, surface),
     limit_normals,
@@ -98,7 +98,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// As [`loop_scheme::refine`](super::loop_scheme::refine).
 pub fn refine(surface: &Surface) -> Result<Mesh> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_triangles_alone(surface, NAME)?;
+    require_triangles(surface, NAME)?;
     require_room(mesh, 4)?;
     require_no_pillow(surface)?;
     let rule = RingRule { place: Place::Edge, mask: |n| (CENTER, extraordinary_mask(n)), amplitudes };
@@ -141,7 +141,7 @@ fn set_at_sharp_edges(points: &mut [DVec3], surface: &Surface, rings: &Rings, ed
     let (old, topology, corners) = (surface.positions(), surface.topology(), surface.faces().corners());
     let at = |c: usize| old[corners[c] as usize];
     let beyond = |side: usize| match features.is_sharp(topology, side as u32) {
-        true => at(side) + at(next_in_triangle(side as u32)) - at(prev_in_triangle(side as u32)),
+        true => mirrored(surface, side as u32),
         false => at(prev_in_triangle(across(topology, side as u32))),
     };
     let polygons = Polygons::new(old, features);
@@ -149,11 +149,11 @@ fn set_at_sharp_edges(points: &mut [DVec3], surface: &Surface, rings: &Rings, ed
         let ends = [sharp as usize, next_in_triangle(sharp)].map(|c| corners[c] as usize);
         let [before, a, b, after] = polygons.about(ends);
         points[edges.of(sharp) as usize] = 0.5625 * (a + b) - 0.0625 * (before + after);
-        for side in std::iter::once(sharp).chain(topology.twin(sharp)) {
-            for c in [next_in_triangle(side) as u32, prev_in_triangle(side) as u32] {
-                if !features.is_sharp(topology, c) {
-                    points[edges.of(c) as usize] = point(surface, rings, c, beyond);
-                }
+    }
+    for side in features.sharp_sides(topology) {
+        for c in [next_in_triangle(side) as u32, prev_in_triangle(side) as u32] {
+            if !features.is_sharp(topology, c) {
+                points[edges.of(c) as usize] = point(surface, rings, c, beyond);
             }
         }
     }

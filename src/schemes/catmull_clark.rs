@@ -54,7 +54,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     needs_triangles: false,
     refine,
     refined_topology,
-    halves: Some(refined::halves_in_quads),
+    pieces: Some(|surface, c, put| put.extend(refined::halves_in_quads(surface, c))),
     size: |c| Size { vertices: c.vertices + c.edges() + c.faces, faces: c.corners, corners: 4 * c.corners },
     limit_positions,
     limit_normals,

@@ -82,7 +82,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     needs_triangles: false,
     refine,
     refined_topology,
-    halves: None,
+    pieces: None,
     size: |c| Size { vertices: c.corners, faces: c.faces + c.edges() + c.vertices, corners: 4 * c.corners },
     limit_positions: |surface| limit_positions(CornerRule::DooSabin, surface),
     limit_normals: |surface| limit_normals(CornerRule::DooSabin, surface),

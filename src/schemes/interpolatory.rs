@@ -3,7 +3,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::star::{Tangents, next_in_triangle, require_triangles_alone, twin};
+use super::star::{Tangents, next_in_triangle, require_triangles, twin};
 use crate::Result;
 use crate::mesh::Surface;
 
@@ -21,7 +21,7 @@ pub(super) struct RegularMask {
 /// The limit points of all vertices: the vertices themselves.
 pub(super) fn vertices(name: &'static str, surface: &Surface) -> Result<Vec<DVec3>> {
     let mesh = surface.mesh();
-    require_triangles_alone(surface, name)?;
+    require_triangles(surface, name)?;
     Ok(mesh.positions.clone())
 }
 

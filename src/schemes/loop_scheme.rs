@@ -1,7 +1,7 @@
 //! Loop subdivision (Loop 1987) of triangle meshes, with Loop's own weights at extraordinary vertices; sharp edges after Hoppe et al.
 //! 1994, with a rule for creases alone that does not depend on what lies beside them.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use glam::DVec3;
 
@@ -9,10 +9,10 @@ use super::local_limit::{Star, StarRule};
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Definition, PaperNames, SingularSet, from_limit_weight};
-use super::sharp::{self, Across};
+use super::sharp::{self, across_boundary_of_triangles};
 use super::star::{
     Tangents, across, blend_with_neighbors, next_in_triangle, prev_in_triangle, push_blends, require_no_pillow,
-    require_room, require_triangles_alone, ring_tangents,
+    require_room, require_triangles, ring_tangents,
 };
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
@@ -72,7 +72,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     needs_triangles: true,
     refine,
     refined_topology,
-    halves: Some(refined::halves_in_fours),
+    pieces: Some(|_, c, put| put.extend(refined::halves_in_fours(c))),
     size: Size::in_four,
     limit_positions,
     limit_normals,
@@ -95,7 +95,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// triangles would share all corners too.
 pub fn refine(surface: &Surface) -> Result<Mesh> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_triangles_alone(surface, "loop")?;
+    require_triangles(surface, "loop")?;
     require_room(mesh, 4)?;
     require_no_pillow(surface)?;
     let (old, corners) = (&mesh.positions, mesh.faces.corners());
@@ -140,7 +140,7 @@ pub(super) fn split_in_four(mesh: &Mesh, edges: &EdgeNumbers) -> Faces {
 /// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
 /// [`Error::NotTriangles`](crate::Error::NotTriangles) with the first face that is none.
 pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
-    require_triangles_alone(surface, "loop")?;
+    require_triangles(surface, "loop")?;
     let mut limits = blend_with_neighbors(surface, limit_mask);
     if let Some(features) = surface.features() {
         sharp::set_limits(&mut limits, surface, CUBIC);
@@ -171,25 +171,6 @@ pub fn dart_mask(n: usize) -> Vec<f64> {
     std::iter::once(row.own).chain(row.edges).collect()
 }
 
-/// The weights of the tangent across the boundary at a vertex of `m` triangles there. `None` from six on: the limit normals of
-/// its faces differ.
-///
-/// With θ = π/m and λ = 3/8 + ¼cos θ, the left eigenvector for λ of a step on the star is sin jθ on the inner neighbours
-/// e_1 … e_{m−1}; its sum is 0; and the column of e_0 leaves its weight there, (sin θ − Σ sin jθ)/8 over λ − 1/4. With one
-/// triangle it is e_0 + e_1 − 2v, for 1/4.
-fn across_boundary(m: usize) -> Option<Across> {
-    match m {
-        1 => return Some(Across { edges: vec![1.0; 2], faces: Vec::new() }),
-        2..=5 => {}
-        _ => return None,
-    }
-    let theta = PI / m as f64;
-    let mut edges: Vec<f64> = (0..=m).map(|j| (theta * j as f64).sin()).collect();
-    let end = (edges[1] - edges[1..m].iter().sum::<f64>()) / (1.0 + 2.0 * theta.cos());
-    (edges[0], edges[m]) = (end, end);
-    Some(Across { edges, faces: Vec::new() })
-}
-
 /// The tangents of the limit surface at all vertices: cos(2πj/n) and sin(2πj/n) on the neighbours in
 /// counter-clockwise order. At a boundary vertex with up to five triangles and no sharp edge between them one goes along the
 /// boundary and one across it; at a corner with one triangle they go along its sides. All others that are not smooth have none:
@@ -199,9 +180,11 @@ fn across_boundary(m: usize) -> Option<Across> {
 /// # Errors
 /// As [`limit_positions`].
 pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
-    require_triangles_alone(surface, "loop")?;
+    require_triangles(surface, "loop")?;
     let mut tangents = ring_tangents(surface);
-    sharp::set_tangents(&mut tangents, surface, across_boundary, |_, _| DVec3::ZERO);
+    // The column of e_0 leaves its weight there, (sin θ − Σ sin jθ)/8, over λ − 1/4 with λ = 3/8 + ¼cos θ.
+    let end = |theta: f64, sum: f64| (theta.sin() - sum) / (1.0 + 2.0 * theta.cos());
+    sharp::set_tangents(&mut tangents, surface, |m| across_boundary_of_triangles(m, end), |_, _| DVec3::ZERO);
     Ok(tangents)
 }
 

@@ -49,7 +49,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     needs_triangles: false,
     refine,
     refined_topology,
-    halves: None,
+    pieces: None,
     size: |c| Size { vertices: c.edges(), faces: c.faces + c.vertices, corners: 2 * c.corners },
     limit_positions,
     limit_normals,

@@ -96,7 +96,7 @@ pub(super) fn halves_in_quads(surface: &Surface, c: u32) -> [u32; 2] {
 }
 
 /// The half-edges along half-edge c after the split of triangles in four.
-pub(super) fn halves_in_fours(_: &Surface, c: u32) -> [u32; 2] {
+pub(super) fn halves_in_fours(c: u32) -> [u32; 2] {
     [outer(c), outer(next_in_triangle(c) as u32) + 2]
 }
 
@@ -175,7 +175,7 @@ fn of_fours_with_boundary(topology: &Topology, refined: &Mesh) -> Topology {
             *side = at_side(c);
         }
     });
-    let boundary = halved(topology, |c| [outer(c), outer(next_in_triangle(c) as u32) + 2]);
+    let boundary = halved(topology, halves_in_fours);
     Topology::open(Incidence::from_parts(offsets, corners, &refined.faces), twins, boundary)
 }
 
@@ -225,8 +225,11 @@ fn set_sides_by_edge<const N: usize>(
 }
 
 /// After the split of every triangle in three and the flip of every old edge: triangle c is (vertex, face of t, face
-/// of c).
+/// of c). With sharp edges, which rest or are split in three, it is found anew.
 pub(super) fn of_flips(surface: &Surface, refined: &Mesh) -> Topology {
+    if surface.features().is_some() {
+        return Topology::new(&refined.faces, refined.len());
+    }
     let (mesh, topology) = (surface.mesh(), surface.topology());
     let (incidence, twin) = (&topology.incidence, topology.twins());
     let count = twin.len();

@@ -53,9 +53,8 @@ pub(super) struct RefinementRules {
     pub(super) refine: fn(&Surface) -> Result<Mesh>,
     /// Of a mesh and what `refine` made of it.
     pub(super) refined_topology: fn(&Surface, &Mesh) -> Topology,
-    /// The half-edges of the refined mesh along a half-edge, in this order, where a step splits every edge in two and has
-    /// rules for sharp ones.
-    pub(super) halves: Option<fn(&Surface, u32) -> [u32; 2]>,
+    /// Puts the half-edges of the refined mesh along a sharp half-edge, in this order, if the scheme has rules for these.
+    pub(super) pieces: Option<fn(&Surface, u32, &mut Vec<u32>)>,
     pub(super) size: fn(Size) -> Size,
     pub(super) limit_positions: fn(&Surface) -> Result<Vec<DVec3>>,
     pub(super) limit_normals: fn(&Surface) -> Result<Vec<DVec3>>,
@@ -123,8 +122,8 @@ impl Refinement {
     ///
     /// # Errors
     /// [`Error::Open`] if the mesh has a boundary that is treated as interior; [`Error::NotOffered`] if it has sharp edges or
-    /// vertices, which Catmull-Clark and Loop alone take; [`Error::NotTriangles`] where the scheme needs these;
-    /// [`Error::TooLarge`].
+    /// vertices and the scheme has no rules for them; [`Error::SemiSharp`]; [`Error::Dart`] under √3 and Labsik-Greiner;
+    /// [`Error::NotTriangles`] where the scheme needs these; [`Error::TooLarge`].
     pub fn refine(self, surface: &Surface) -> Result<Mesh> {
         (self.rules().refine)(surface)
     }
@@ -132,7 +131,7 @@ impl Refinement {
     /// One step, with its topology: equal to [`Topology::new`] of its faces, at a fraction of the cost, as index
     /// arithmetic on the coarse one gives it. The refinement of a valid mesh is valid.
     ///
-    /// Rules of vertices stay; both halves of a sharp edge are sharp, and the vertex between them is a crease vertex.
+    /// Rules of vertices stay; the parts of a sharp edge are sharp, and the vertices between them are crease vertices.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).
@@ -147,17 +146,21 @@ impl Refinement {
     /// # Ok::<(), limitlab::Error>(())
     /// ```
     pub fn refined(self, surface: &Surface) -> Result<Surface> {
-        let refined = self.refine(surface)?;
+        Ok(self.carried_over(surface, self.refine(surface)?))
+    }
+
+    /// What a step made of a surface, with its topology and features.
+    pub(super) fn carried_over(self, surface: &Surface, refined: Mesh) -> Surface {
         let topology = (self.rules().refined_topology)(surface, &refined);
-        Ok(match (surface.features(), self.rules().halves) {
-            (Some(features), Some(halves)) => {
-                let halves = |c| halves(surface, c);
-                let features = features.refined(&refined.faces, &topology, surface.topology(), halves);
+        match (surface.features(), self.rules().pieces) {
+            (Some(features), Some(pieces)) => {
+                let pieces = |c, put: &mut Vec<u32>| pieces(surface, c, put);
+                let features = features.refined(&refined.faces, &topology, surface.topology(), pieces);
                 Surface::of_parts(refined, topology, surface.boundary(), Some(features))
             }
-            // Without features, as others are refused above.
+            // Without features, as others are refused before.
             _ => Surface::of_topology(refined, topology),
-        })
+        }
     }
 
     /// Refuses, before the work, `levels` steps whose meshes have more corners than 32-bit indices name, or for which
@@ -231,7 +234,7 @@ impl Refinement {
     /// The unit normals of the limit surface at the [`limit_positions`](Self::limit_positions); zero where
     /// [`Tangents::normal`](super::Tangents::normal) is, and where the surface has several or they are not computed: on
     /// creases, at darts, at corners but for those with one face, on a boundary beside four faces or more under Catmull-Clark,
-    /// six under Loop.
+    /// six under Loop and √3; at all sharp vertices under the interpolatory ones.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).

@@ -62,6 +62,11 @@ impl<'a> Rings<'a> {
             true => topology.incidence.face_count(v),
             false => REGULAR.into(),
         };
+        let mut valences = parallel::collect(mesh.len(), |v| valence(v).min(u8::MAX.into()) as u8);
+        for c in features.filter(|f| f.is_midway()).into_iter().flat_map(|f| f.sharp_sides(topology)) {
+            // With what is put beyond the sharp edges, a ring of six: a vertex of the step before.
+            valences[mesh.faces.corners()[prev_in_triangle(c)] as usize] = REGULAR;
+        }
         let half = |n: usize| {
             let mut half = Half::default();
             if n >= 3 {
@@ -82,7 +87,7 @@ impl<'a> Rings<'a> {
         Rings {
             mesh,
             topology,
-            valences: parallel::collect(mesh.len(), |v| valence(v).min(u8::MAX.into()) as u8),
+            valences,
             masks: (0..=WALKED).map(half).collect(),
             wide: parallel::flat_map(mesh.len(), CHUNK, |range| {
                 range.filter(|&v| valence(v) > WALKED).map(|v| Wide::new(surface, v, &rule)).collect()

@@ -1,12 +1,14 @@
 //! Sharp edges and vertices under Catmull-Clark and Loop, whose curves are cubic B-splines: what a step, limit points and
-//! tangents are there. A smooth vertex has all of its faces, so that everything is computed as on a closed mesh first, and
+//! tangents are there; and what other schemes share. A smooth vertex has all of its faces, so that everything is computed as on a closed mesh first, and
 //! then set anew at the few places that are sharp. Values that the first pass gives to the ends of incomplete stars are
 //! finite and mean nothing.
+
+use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 use rayon::slice::ParallelSliceMut;
 
-use super::star::{CHUNK, Tangents};
+use super::star::{CHUNK, Tangents, next_in_triangle, prev_in_triangle};
 use crate::mesh::Surface;
 use crate::mesh::edge_numbers::EdgeNumbers;
 use crate::mesh::features::{Features, Rule};
@@ -72,7 +74,7 @@ impl<'a> Polygons<'a> {
     }
 
     /// The point that follows on `v`, coming from `from`.
-    fn beyond(&self, from: usize, v: usize) -> DVec3 {
+    pub(super) fn beyond(&self, from: usize, v: usize) -> DVec3 {
         match self.creases.binary_search_by_key(&v, |crease| crease.0) {
             Ok(place) => {
                 let [a, b] = self.creases[place].1;
@@ -81,6 +83,13 @@ impl<'a> Polygons<'a> {
             Err(_) => 2.0 * self.points[v] - self.points[from],
         }
     }
+}
+
+/// The vertex that is put across sharp side xy of a triangle xyz, where there is nothing, or another surface: x + y − z.
+pub(super) fn mirrored(surface: &Surface, c: u32) -> DVec3 {
+    let corners = surface.faces().corners();
+    let at = |c: usize| surface.positions()[corners[c] as usize];
+    at(c as usize) + at(next_in_triangle(c)) - at(prev_in_triangle(c))
 }
 
 /// The corners at a dart in counter-clockwise order, from that whose side is the sharp edge.
@@ -96,6 +105,22 @@ pub(super) fn dart_star(surface: &Surface, features: &Features, v: usize, star: 
 pub(super) struct Across {
     pub(super) edges: Vec<f64>,
     pub(super) faces: Vec<f64>,
+}
+
+/// The weights of the tangent across the boundary at a vertex of `m` triangles there, under a scheme of triangles whose step (or
+/// two of them) has the left eigenvector sin jθ on the inner neighbours e_1 … e_{m−1}, θ = π/m, and `end(θ, Σ sin jθ)` on e_0
+/// and e_m. With one triangle it is e_0 + e_1 − 2v. `None` from six on: the limit normals of its faces differ.
+pub(super) fn across_boundary_of_triangles(m: usize, end: impl Fn(f64, f64) -> f64) -> Option<Across> {
+    match m {
+        1 => return Some(Across { edges: vec![1.0; 2], faces: Vec::new() }),
+        2..=5 => {}
+        _ => return None,
+    }
+    let theta = PI / m as f64;
+    let mut edges: Vec<f64> = (0..=m).map(|j| (theta * j as f64).sin()).collect();
+    let end = end(theta, edges[1..m].iter().sum());
+    (edges[0], edges[m]) = (end, end);
+    Some(Across { edges, faces: Vec::new() })
 }
 
 /// Sets the tangents of all vertices that are not smooth: of boundary vertices with one sector of m faces along the boundary,

@@ -43,14 +43,8 @@ pub(crate) fn require_closed(surface: &Surface) -> Result<()> {
     }
 }
 
-/// Refuses a mesh that is not closed or has a face that is no triangle, naming the first such face.
-pub(crate) fn require_triangles(surface: &Surface, scheme: &'static str) -> Result<()> {
-    require_closed(surface)?;
-    require_triangles_alone(surface, scheme)
-}
-
 /// Refuses a mesh with a face that is no triangle, naming the first such face, and a boundary without rules.
-pub(crate) fn require_triangles_alone(surface: &Surface, scheme: &'static str) -> Result<()> {
+pub(crate) fn require_triangles(surface: &Surface, scheme: &'static str) -> Result<()> {
     require_rules(surface)?;
     let faces = surface.faces();
     match find_first(faces.len(), |f| faces.range(f).len() != 3) {

@@ -5,6 +5,7 @@ mod methods;
 mod naive;
 mod refinement;
 mod rows;
+mod thirds;
 
 use glam::DVec3;
 use limitlab::mesh::features::{Rule, Tags};

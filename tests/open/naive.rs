@@ -74,7 +74,7 @@ impl Creased {
     }
 
     /// The sharp edges at a vertex, by their other ends, after so many lowerings.
-    fn sharp_at(&self, v: u32, later: bool) -> Vec<(u32, f64)> {
+    pub fn sharp_at(&self, v: u32, later: bool) -> Vec<(u32, f64)> {
         let left = |s: f64| if later { lowered(s) } else { s };
         let at = self.sharp.iter().filter(|(side, _)| side.contains(&v));
         at.map(|(&[a, b], &s)| (if a == v { b } else { a }, left(s))).filter(|e| e.1 > 0.0).collect()
@@ -209,7 +209,7 @@ impl Creased {
     }
 
     /// The vertices about a smooth vertex, in order, from one on.
-    fn ring(&self, v: u32, first: u32) -> Vec<u32> {
+    pub fn ring(&self, v: u32, first: u32) -> Vec<u32> {
         let faces: Vec<[u32; 3]> = self.mesh.faces.iter().map(|face| face.try_into().unwrap()).collect();
         let after = |w: u32| {
             let found = faces.iter().find(|f| (0..3).any(|k| f[k] == v && f[(k + 1) % 3] == w)).unwrap();
@@ -219,7 +219,7 @@ impl Creased {
     }
 
     /// The four points of a curve about its edge from `a` to `b`, mirrored beyond its ends.
-    fn along(&self, [a, b]: [u32; 2]) -> [DVec3; 4] {
+    pub fn along(&self, [a, b]: [u32; 2]) -> [DVec3; 4] {
         let at = |v: u32| self.mesh.positions[v as usize];
         let beyond = |from: u32, v: u32| {
             let ends: Vec<u32> = self.sharp_at(v, false).into_iter().map(|e| e.0).collect();
@@ -231,7 +231,7 @@ impl Creased {
         [beyond(b, a), at(a), at(b), beyond(a, b)]
     }
 
-    fn is_smooth(&self, v: u32) -> bool {
+    pub fn is_smooth(&self, v: u32) -> bool {
         !self.corners.contains_key(&v) && self.sharp_at(v, false).is_empty()
     }
 

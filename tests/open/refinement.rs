@@ -190,10 +190,11 @@ fn fan(m: usize, triangles: bool, seed: u64) -> Mesh {
     Mesh::new(positions, Faces::from_lists((0..m as u32).map(face)))
 }
 
-/// The faces at vertex 0 after a step, twice as large: all that the next step there needs.
+/// The faces at vertex 0 after a step, twice as large, or after two of √3, three times: all that the next step there needs.
 fn next_star(refinement: Refinement, star: &Surface) -> Surface {
     let limit = refinement.limit_positions(star).unwrap()[0];
-    let fine = refinement.refine(star).unwrap();
+    let (steps, scale) = if refinement == Refinement::Sqrt3 { (2, 3.0) } else { (1, 2.0) };
+    let fine = refinement.refine_n(star, steps).unwrap();
     let mut number = vec![u32::MAX; fine.len()];
     let mut positions = Vec::new();
     let mut faces = Faces::default();
@@ -205,7 +206,7 @@ fn next_star(refinement: Refinement, star: &Surface) -> Surface {
             let old = *v as usize;
             if number[old] == u32::MAX {
                 number[old] = positions.len() as u32;
-                positions.push(2.0 * (fine.positions[old] - limit));
+                positions.push(scale * (fine.positions[old] - limit));
             }
             *v = number[old];
         }
@@ -268,6 +269,7 @@ fn normals_on_a_boundary_are_the_limits_of_those_of_the_faces() {
     };
     of(Refinement::CatmullClark, false, 3);
     of(Refinement::Loop, true, 5);
+    of(Refinement::Sqrt3, true, 5);
 }
 
 #[test]
@@ -378,7 +380,7 @@ fn butterfly_reproduces_cubics_along_the_boundary_and_lines_everywhere() {
 /// At smooth vertices, beside the boundary too, those of the faces in the limit; none at sharp ones.
 #[test]
 fn normals_of_interpolatory_schemes_are_limits_up_to_the_boundary() {
-    for refinement in [Refinement::Butterfly] {
+    for refinement in [Refinement::Butterfly, Refinement::LabsikGreiner] {
         let mut held = 0;
         for seed in 0..60 {
             let Some((coarse, _)) = random_creased(Scheme::Loop, seed) else { continue };
@@ -404,7 +406,7 @@ fn what_has_no_rules_is_refused() {
     let mesh = grid(4, 4, true);
     let surface = open(mesh.clone(), Boundary::EdgeOnly);
     for refinement in Refinement::ALL {
-        if matches!(refinement, Refinement::CatmullClark | Refinement::Loop | Refinement::Butterfly) {
+        if !matches!(refinement, Refinement::DooSabin | Refinement::MidEdge) {
             continue;
         }
         let message = refinement.refined(&surface).unwrap_err().to_string();
