@@ -15,6 +15,7 @@ pub mod matrix_market;
 mod neighbours;
 pub mod operator;
 mod parts;
+pub mod staged_operator;
 pub mod stages;
 pub mod stars;
 pub mod system;
@@ -22,5 +23,6 @@ pub mod weights;
 
 pub use csr::Csr;
 pub use operator::Operator;
+pub use staged_operator::StagedOperator;
 pub use stages::Stages;
 pub use system::LimitSystem;
