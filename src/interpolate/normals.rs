@@ -65,6 +65,27 @@ pub fn unit_normals(normals: &[Option<DVec3>]) -> Result<Vec<Option<DVec3>>> {
     normals.iter().enumerate().map(unit).collect()
 }
 
+/// Refuses normals at vertices that are not smooth, as [`rotate_rings`] does: before a control mesh is computed.
+///
+/// # Errors
+/// The first such vertex.
+///
+/// # Panics
+/// If `normals` has not one entry a vertex.
+pub fn require_smooth(surface: &Surface, normals: &[Option<DVec3>]) -> Result<()> {
+    assert_eq!(normals.len(), surface.len(), "one entry a vertex");
+    let sharp = |v: &usize| normals[*v].is_some() && surface.features().is_some_and(|f| !f.is_smooth(*v));
+    match (0..surface.len()).find(sharp) {
+        None => Ok(()),
+        Some(v) => {
+            let what = format!(
+                "vertex {v} is sharp, and has no ring that could be turned about its point: leave its normal out"
+            );
+            Err(Error::mesh("normals", what))
+        }
+    }
+}
+
 /// Refines `control` until the rings of its vertices are disjoint and turns those whose normal is off. `normals`
 /// gives one normal a vertex of `control`, any length, or none. Time and memory are those of the refinements.
 ///
@@ -85,13 +106,7 @@ pub fn rotate_rings(
     assert_eq!(normals.len(), control.len(), "one entry a vertex");
     assert!(rotation.levels > 0, "at least one level");
     let wanted = unit_normals(normals)?;
-    if let Some(features) = control.features()
-        && let Some(v) = (0..control.len()).find(|&v| wanted[v].is_some() && !features.is_smooth(v))
-    {
-        let what =
-            format!("vertex {v} is sharp, and has no ring that could be turned about its point: leave its normal out");
-        return Err(Error::mesh("normals", what));
-    }
+    require_smooth(control, normals)?;
     scheme.check_size(control.mesh(), rotation.levels + 1)?;
     let mut surface = scheme.refined(control)?;
     let mut turned: Vec<(u32, f64)> = Vec::new();

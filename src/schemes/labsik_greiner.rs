@@ -202,7 +202,7 @@ fn regular(surface: &Surface, own: [u32; 3], beyond: impl Fn(u32) -> Option<DVec
 /// # Errors
 /// As [`refine`].
 pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
-    if let Some(found) = thirds::of_next(surface, Refinement::LabsikGreiner, limit_tangents)? {
+    if let Some(found) = thirds::of_next(surface, |s| Refinement::LabsikGreiner.refined(s), limit_tangents)? {
         return Ok(found);
     }
     let twice = Refinement::LabsikGreiner.refined_n(surface, 2)?;

@@ -136,7 +136,7 @@ pub(super) fn flip(surface: &Surface) -> Faces {
 /// As [`refine`].
 pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
     thirds::require(surface, "sqrt3")?;
-    if let Some(found) = thirds::of_next(surface, Refinement::Sqrt3, limit_positions)? {
+    if let Some(found) = thirds::of_next(surface, |s| Refinement::Sqrt3.refined(s), limit_positions)? {
         return Ok(found);
     }
     let mut limits = blend_with_neighbors(surface, limit_mask);
@@ -155,7 +155,7 @@ pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
 /// As [`refine`].
 pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
     thirds::require(surface, "sqrt3")?;
-    if let Some(found) = thirds::of_next(surface, Refinement::Sqrt3, limit_tangents)? {
+    if let Some(found) = thirds::of_next(surface, |s| Refinement::Sqrt3.refined(s), limit_tangents)? {
         return Ok(found);
     }
     let mut tangents = ring_tangents(surface);

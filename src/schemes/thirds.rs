@@ -18,7 +18,6 @@
 
 use glam::DVec3;
 
-use super::refinement::Refinement;
 use super::sharp::{Polygons, mirrored};
 use super::star::{
     CHUNK, neighbor_sum, next_in_triangle, prev_in_triangle, require_no_pillow, require_triangles, twin,
@@ -193,13 +192,13 @@ pub(super) fn splits(surface: &Surface) -> Option<&Features> {
 /// `None`.
 pub(super) fn of_next<T>(
     surface: &Surface,
-    scheme: Refinement,
+    refined: impl Fn(&Surface) -> Result<Surface>,
     of: impl Fn(&Surface) -> Result<Vec<T>>,
 ) -> Result<Option<Vec<T>>> {
     if splits(surface).is_none() {
         return Ok(None);
     }
-    let mut found = of(&scheme.refined(surface)?)?;
+    let mut found = of(&refined(surface)?)?;
     found.truncate(surface.len());
     Ok(Some(found))
 }

@@ -17,11 +17,12 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::error::Error;
+use limitlab::interpolate::normals::require_smooth;
 use limitlab::mesh::features::Tags;
 use limitlab::mesh::file_tags::Subdivision;
 use limitlab::mesh::{Mesh, io};
 use limitlab::output::{allow_replacing, check_target};
-use limitlab::schemes::Scheme;
+use limitlab::schemes::{Class, Scheme};
 use limitlab_experiments::cli::{self, subdivision_of};
 
 use arguments::{Arguments, Choice, conflict};
@@ -109,6 +110,9 @@ fn run(arguments: &Arguments) -> Result<()> {
         (None, Choice::Halstead) => fairest(arguments, &input, &per_vertex).map_err(named)?,
         (None, Choice::Keeping(scheme)) => keeping(arguments, &input, scheme).map_err(named)?,
         (None, _) => {
+            if let (Some(normals), Class::Primal) = (&per_vertex.normals, input.scheme.refinement().class()) {
+                require_smooth(&input.surface, normals).map_err(named)?;
+            }
             let control = control_mesh(arguments, &input, &per_vertex)?;
             refine(arguments, &input, &per_vertex, control).map_err(named)?
         }
