@@ -268,6 +268,24 @@ impl Features {
         found
     }
 
+    /// By vertex: whether the first step of refinement takes it by the rule of creases or of corners: two sharp or semi-sharp
+    /// edges or more, or a sharpness of its own. At darts, and where one edge is semi-sharp, it does not.
+    pub(crate) fn held_at_first(&self, surface: &Surface) -> Vec<bool> {
+        let (faces, incidence) = (surface.faces(), surface.incidence());
+        let corners = faces.corners();
+        let mut edges = vec![0u8; self.rules.len()];
+        for &c in self.sharp.iter().chain(self.semi_sharp.iter().map(|(c, _)| c)) {
+            for v in [corners[c as usize], corners[incidence.next(faces, c) as usize]] {
+                let count = &mut edges[v as usize];
+                *count = (*count + 1).min(2);
+            }
+        }
+        let mut held: Vec<bool> =
+            edges.iter().zip(&self.rules).map(|(&count, &rule)| count == 2 || rule == Rule::Corner).collect();
+        self.semi_sharp_vertices.iter().for_each(|&(v, _)| held[v as usize] = true);
+        held
+    }
+
     /// The number of sharp edges with two faces.
     pub fn creased_edges(&self) -> usize {
         self.creased
