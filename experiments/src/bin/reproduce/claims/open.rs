@@ -461,7 +461,7 @@ fn iterations_converge(lab: &Lab) -> Result<Finding> {
         let stages = Stages::new(&subject.surface, Scheme::default_for(subject.surface.faces()), None)?;
         let run = |method| staged::run(&stages, subject.surface.positions(), method, &stop(subject)).report.outcome;
         let methods = [Method::Pia, Method::Thall, Method::GaussSeidel { order: None }];
-        Ok(methods.into_iter().filter(|m| run(m.clone()) != Outcome::Converged).count())
+        Ok(methods.into_iter().filter(|&m| run(m) != Outcome::Converged).count())
     })?;
     let mut finding = Finding::settled(radii.collect()).also([
         Evidence::at_most("largest radius of PIA less that of its stages", over, DEFECTIVE),

@@ -24,8 +24,8 @@ pub fn frozen(album: &mut Album) -> Result<()> {
         let found = Artifacts::new(&control, points, 5)?;
         gap = found.gap;
         let caption = match crease {
-            Crease::Resting => format!("(a) frozen, resting: a kink of {:.0}° at each vertex", found.turn),
-            Crease::Averaged => format!("(b) frozen, averaged: {:.1} % off", 100.0 * gap / subject.surface.diagonal()),
+            Crease::Resting => format!("(a) resting: kinks of {:.0}°", found.turn),
+            Crease::Averaged => format!("(b) averaged: {:.1} % off", 100.0 * gap / subject.surface.diagonal()),
             Crease::Solved => "(c) solved for".into(),
         };
         let crease: Vec<DVec3> = torus_loop(10, 8, 2).map(|v| points[v as usize]).collect();
@@ -57,7 +57,7 @@ pub fn same_points(album: &mut Album) -> Result<()> {
     let ending = Tags { corners: corner.into_iter().collect(), ..of(part.collect()) };
     let mut panels = Vec::new();
     for (caption, tags) in
-        [("(a) smooth", of(vec![])), ("(b) two creases", of(rims(SHARP))), ("(c) a crease that ends, a corner", ending)]
+        [("(a) smooth", of(vec![])), ("(b) two creases", of(rims(SHARP))), ("(c) creases to darts", ending)]
     {
         let surface = subject.surface.tagged(&tags)?;
         let control = interpolate(&surface, Scheme::CatmullClark, &Options::default())?;
@@ -69,10 +69,10 @@ pub fn same_points(album: &mut Album) -> Result<()> {
     }
     let line = Line {
         name: "creases-same-points",
-        shows: "The same 26 points on three Catmull-Clark surfaces: smooth, with creases, with a crease that ends in darts and a corner",
+        shows: "The same 26 points on Catmull-Clark surfaces: smooth, with two creases, with creases from a corner to darts",
         subject: subject.points(),
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet(3, (180, 190), panels))
+    album.add(&line, &sheet(panels.len(), (180, 190), panels))
 }
