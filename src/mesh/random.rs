@@ -1,5 +1,5 @@
-//! Random meshes from a seed, for tests and measurements: closed triangulations and polygon meshes of several shapes, and
-//! what becomes of a closed mesh by holes, creases, corners, darts and semi-sharp edges.
+//! Random meshes from a seed, for tests and measurements: closed triangulations and polygon meshes of several shapes,
+//! and what becomes of a closed mesh by holes, creases, corners, darts and semi-sharp edges.
 
 use glam::DVec3;
 use rand::{Rng, RngExt, SeedableRng, seq::SliceRandom};
@@ -69,8 +69,8 @@ pub fn random_points(count: usize, seed: u64) -> Vec<DVec3> {
     (0..count).map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))).collect()
 }
 
-/// A closed mesh with at most three holes, at most seven creased edges and two sharp vertices, without darts, at random points;
-/// and its tags. `None` if the faces that are left are no manifold.
+/// A closed mesh with at most three holes, at most seven creased edges and two sharp vertices, without darts, at random
+/// points; and its tags. `None` if the faces that are left are no manifold.
 pub fn random_creased(closed: &Mesh, seed: u64) -> Option<(Surface, Tags)> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed + 77);
     let holes = rng.random_range(0..4);

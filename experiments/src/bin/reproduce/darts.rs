@@ -1,5 +1,5 @@
-//! PIA on meshes with darts, of which no proof of convergence is known: a search for divergence by hill climbing over tags and
-//! edges, and the same for SOR, which does diverge.
+//! PIA on meshes with darts, of which no proof of convergence is known: a search for divergence by hill climbing over
+//! tags and edges, and the same for SOR, which does diverge.
 
 use nalgebra::Complex;
 use rand::{Rng, RngExt, SeedableRng};
@@ -128,8 +128,8 @@ struct Found {
 }
 
 impl Found {
-    /// `None` without darts, or where the eigenvalues are not found. The null vectors that every mesh without creases and corners has
-    /// under the scheme are left out.
+    /// `None` without darts, or where the eigenvalues are not found. The null vectors that every mesh without creases
+    /// and corners has under the scheme are left out.
     fn new(search: &Search, mesh: Mesh, edges: &[[u32; 2]]) -> Option<Self> {
         let smooth = Surface::new(mesh).ok()?;
         let exists = |edge: &&[u32; 2]| smooth.incidence().half_edge(smooth.faces(), **edge).is_some();
@@ -270,12 +270,14 @@ fn run(context: &mut Context) -> Result<()> {
         .table(DARTS.id, DARTS.title, &rows);
     let tried: usize = rows.iter().map(|r| r.climb.tried).sum();
     table.note(format!(
-        "{tried} matrices A of closed meshes with sharp edges that end in darts, from fixed seeds. A step makes an edge sharp or smooth, or flips \
-         edges of the triangulation that the mesh is made from, and is kept where the quantity in `climbed` does not fall. \
-         `pia_rho`, `least_re` and `largest_im` are the largest ρ(I − A), the least Re λ and the largest |Im λ| of all matrices of the row, \
-         without the null vectors ±1 that darts leave. PIA would diverge at `pia_rho` above 1. The last columns are of the mesh climbed to, \
-         which is the file beside, with OpenSubdiv's tags; `pia_rho_without_tags` is 1 where it is singular without them. That SOR(1.8) is found to diverge says that such a search can find divergence. \
-         Whether PIA always converges with darts is open.",
+        "{tried} matrices A of closed meshes with sharp edges that end in darts, from fixed seeds. A step makes an \
+         edge sharp or smooth, or flips edges of the triangulation that the mesh is made from, and is kept where the \
+         quantity in `climbed` does not fall. `pia_rho`, `least_re` and `largest_im` are the largest ρ(I − A), the \
+         least Re λ and the largest |Im λ| of all matrices of the row, without the null vectors ±1 that darts leave. \
+         PIA would diverge at `pia_rho` above 1. The last columns are of the mesh climbed to, which is the file \
+         beside, with OpenSubdiv's tags; `pia_rho_without_tags` is 1 where it is singular without them. That SOR(1.8) \
+         is found to diverge says that such a search can find divergence. Whether PIA always converges with darts is \
+         open.",
     ));
     context.table(table)
 }

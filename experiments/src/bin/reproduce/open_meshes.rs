@@ -221,10 +221,10 @@ fn creased(context: &mut Context) -> Result<()> {
     let title = "Creased meshes made here: vertices by their rule, all of A, iterations";
     let mut table = table.table(format!("{}--creased", OPEN_MESHES.id), title, &rows);
     table.note(
-        "Under Catmull-Clark. `pia_rho` is the spectral radius of I − A and `largest_im` the largest |Im λ|, of all of A: it is not \
-         symmetric where there are curves, nor similar to a symmetric matrix where there are darts or irregular semi-sharp edges. \
-         PIA, Thall's ω = ½ and Gauss-Seidel (file order) run on all vertices together from V = P, corners and curves too, to 10⁻¹⁰ \
-         of the bounding box's diagonal.",
+        "Under Catmull-Clark. `pia_rho` is the spectral radius of I − A and `largest_im` the largest |Im λ|, of all of \
+         A: it is not symmetric where there are curves, nor similar to a symmetric matrix where there are darts or \
+         irregular semi-sharp edges. PIA, Thall's ω = ½ and Gauss-Seidel (file order) run on all vertices together \
+         from V = P, corners and curves too, to 10⁻¹⁰ of the bounding box's diagonal.",
     );
     context.table(table)?;
     if context.quick { Ok(()) } else { blocks(context) }

@@ -1,4 +1,5 @@
-//! All of A on open and creased meshes, dense: complex eigenvalues, singular values, spectral radii of iterations on it.
+//! All of A on open and creased meshes, dense: complex eigenvalues, singular values, spectral radii of iterations on
+//! it.
 
 use glam::DVec3;
 use nalgebra::{Complex, DMatrix, Schur};
@@ -19,7 +20,7 @@ pub struct Whole {
     system: LimitSystem,
 }
 
-/// Where the error matrix of an iteration stands.
+/// An iteration, by its error matrix.
 #[derive(Clone, Copy, Debug)]
 pub enum Relaxation<'a> {
     /// I − ωA.

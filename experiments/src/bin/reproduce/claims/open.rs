@@ -62,7 +62,7 @@ pub const PIA: &[Claim] = &[
         id: "P16",
         title: "Open meshes and creases: norms in which every error shrinks",
         place: "§2 and §5",
-        printed: "e^{k+1} is always less than e^k; how to make the method effective for open meshes is an interesting topic.",
+        printed: "e^{k+1} is always less than e^k; how to make the method effective for open meshes is of interest.",
         slow: false,
         check: norms,
     },
@@ -103,8 +103,8 @@ fn examined(mesh: Mesh, boundary: Boundary) -> Result<Surface> {
     Surface::examined(mesh, None, boundary).map_err(limitlab::Error::Defects)
 }
 
-/// The mesh left as it is, and with a corner, a creased loop, a hole by either rule, one of these in another component: with
-/// the number of components that nothing touches.
+/// The mesh left as it is, and with a corner, a creased loop, a hole by either rule, one of these in another component:
+/// with the number of components that nothing touches.
 fn variants(mesh: &Mesh) -> Result<Vec<(Surface, usize)>> {
     let closed = Surface::new(mesh.clone())?;
     let corner = Tags { corners: vec![(0, SHARP)], ..Tags::default() };
@@ -176,17 +176,30 @@ fn when_singular(lab: &Lab) -> Result<Finding> {
             ROUNDING,
         ),
         Evidence::shown("such meshes", darts.meshes),
-        Evidence::above("least singular value of A where two of these edges meet, or a vertex is semi-sharp", darts.cured, 1e-4),
-        Evidence::equal("random meshes with darts and semi-sharp tags whose kernel has another dimension", darts.others, 0.0),
+        Evidence::above(
+            "least singular value of A where two of these edges meet, or a vertex is semi-sharp",
+            darts.cured,
+            1e-4,
+        ),
+        Evidence::equal(
+            "random meshes with darts and semi-sharp tags whose kernel has another dimension",
+            darts.others,
+            0.0,
+        ),
         Evidence::shown("random meshes with darts and semi-sharp tags", darts.random),
         Evidence::at_most("departure of λ_min of a cube with one corner from .0334", (corner - 0.0334).abs(), 5e-5),
-        Evidence::at_most("departure of λ_min of a cube with a crease of two edges from .0239", (path - 0.0239).abs(), 5e-5),
+        Evidence::at_most(
+            "departure of λ_min of a cube with a crease of two edges from .0239",
+            (path - 0.0239).abs(),
+            5e-5,
+        ),
     ])
     .remark(
-        "Without darts and semi-sharp tags the Catmull-Clark matrix is singular exactly where a component has no boundary, \
-         crease or corner vertex, all valences 3 and a bipartite graph; that of the mid-edge scheme where it has none of these \
-         vertices and a bipartite graph; the other four never. Darts, and semi-sharp edges that meet no other, cure nothing; where two meet, \
-         for some steps only, they do. That such tags make nothing singular is observed, not proven.",
+        "Without darts and semi-sharp tags the Catmull-Clark matrix is singular exactly where a component has no \
+         boundary, crease or corner vertex, all valences 3 and a bipartite graph; that of the mid-edge scheme where it \
+         has none of these vertices and a bipartite graph; the other four never. Darts, and semi-sharp edges that meet \
+         no other, cure nothing; where two meet, for some steps only, they do. That such tags make nothing singular is \
+         observed, not proven.",
     ))
 }
 
@@ -479,8 +492,9 @@ fn iterations_converge(lab: &Lab) -> Result<Finding> {
         ]);
     }
     Ok(finding.remark(
-        "On all vertices together, curves and corners too, in whatever order: each error matrix is block triangular, and its \
-         blocks are those of symmetric positive definite systems. PIA's radius is 1 − λ_min, that of curves 2/3 at the most.",
+        "On all vertices together, curves and corners too, in whatever order: each error matrix is block triangular, \
+         and its blocks are those of symmetric positive definite systems. PIA's radius is 1 − λ_min, that of curves \
+         2/3 at the most.",
     ))
 }
 
@@ -548,19 +562,27 @@ fn norms(lab: &Lab) -> Result<Finding> {
             0.0,
         ),
         Evidence::shown("random open and creased meshes with λ_min of 0.01 and more", rows.len()),
-        Evidence::shown("largest power of 10 needed for K", rows.iter().filter_map(|r| r.1).max().unwrap_or(0) as usize),
+        Evidence::shown(
+            "largest power of 10 needed for K",
+            f64::from(rows.iter().filter_map(|r| r.1).max().unwrap_or(0)),
+        ),
         Evidence::shown("of them with ‖I − A‖ ≥ 1 in the plain norm H⁻¹", rows.iter().filter(|r| r.0 >= 1.0).count()),
-        Evidence::above("‖I − A‖ in the plain norm H⁻¹, 20 triangles at a boundary vertex under Loop", fan(Scheme::Loop)?, 1.0),
+        Evidence::above(
+            "‖I − A‖ in the plain norm H⁻¹, 20 triangles at a boundary vertex under Loop",
+            fan(Scheme::Loop)?,
+            1.0,
+        ),
         Evidence::above("the same under Catmull-Clark", fan(CC)?, 1.0),
         Evidence::at_most(
-            "departure from 1 of ‖e^200‖/(200ρ^200) over ‖e^100‖/(100ρ^100), principal vector of the triangle of side 7",
+            "departure from 1 of ‖e^k‖/(kρ^k) at k = 200 over that at 100, triangle of side 7",
             (second / first - 1.0).abs(),
             0.05,
         ),
     ])
     .remark(
-        "W = diag(K² at corners, K on curves, 1/h at smooth vertices). The plain norm, with 1/h of its own valence at every vertex, is not \
-         enough: many faces at a boundary vertex refute it. Where A cannot be diagonalised errors fall like kρ^k, not ρ^k.",
+        "W = diag(K² at corners, K on curves, 1/h at smooth vertices). The plain norm, with 1/h of its own valence at \
+         every vertex, is not enough: many faces at a boundary vertex refute it. Where A cannot be diagonalised errors \
+         fall like kρ^k, not ρ^k.",
     ))
 }
 
@@ -637,7 +659,11 @@ fn semi_sharp_curves(lab: &Lab) -> Result<Finding> {
     }
     Ok(Finding::settled(vec![
         Evidence::at_most("largest asymmetry of DA with D = 1/(θh) on the curves, 1/h beside", asymmetry, ROUNDING),
-        Evidence::at_most("largest departure of DA from M + Σ (1/θ − 1)/h · (1, 4, 1)/6 along the curves", form, ROUNDING),
+        Evidence::at_most(
+            "largest departure of DA from M + Σ (1/θ − 1)/h · (1, 4, 1)/6 along the curves",
+            form,
+            ROUNDING,
+        ),
         Evidence::at_most("largest |Im λ| of A", imaginary, 1e-9),
         Evidence::above("smallest eigenvalue of A", least, 0.0),
         Evidence::shown("tori with two semi-sharp loops, s = ½ … 4, Catmull-Clark and Loop", count),
@@ -645,8 +671,8 @@ fn semi_sharp_curves(lab: &Lab) -> Result<Finding> {
         Evidence::above("largest |Im λ| on random meshes with darts and semi-sharp tags anywhere", irregular, 1e-3),
     ])
     .remark(
-        "Semi-sharp curves with one sharpness along each, straight through regular vertices, only add a positive definite part to M. \
-         Elsewhere A is not similar to a symmetric matrix: there are complex eigenvalues.",
+        "Semi-sharp curves with one sharpness along each, straight through regular vertices, only add a positive \
+         definite part to M. Elsewhere A is not similar to a symmetric matrix: there are complex eigenvalues.",
     ))
 }
 
@@ -682,17 +708,29 @@ fn straightforward(lab: &Lab) -> Result<Finding> {
     });
     let rows = rows.collect::<Result<Vec<Row>>>()?;
     Ok(Finding::reproduced(vec![
-        Evidence::above("smallest diagonal entry less the sum of the others of its row, open and creased meshes", smallest(rows.iter().map(|r| r.dominance)), 0.0),
+        Evidence::above(
+            "smallest diagonal entry less the sum of the others of its row, open and creased meshes",
+            smallest(rows.iter().map(|r| r.dominance)),
+            0.0,
+        ),
         Evidence::at_least("smallest eigenvalue of A", smallest(rows.iter().map(|r| r.least)), 0.5 - ROUNDING),
-        Evidence::below("largest spectral radius of Gauss-Seidel on all of A", largest(rows.iter().map(|r| r.sweeps)), 1.0),
+        Evidence::below(
+            "largest spectral radius of Gauss-Seidel on all of A",
+            largest(rows.iter().map(|r| r.sweeps)),
+            1.0,
+        ),
         Evidence::below("that of undamped Jacobi", largest(rows.iter().map(|r| r.jacobi)), 1.0),
-        Evidence::at_most("largest distance of a limit point from its vertex over L after Gauss-Seidel", largest(rows.iter().map(|r| r.off)), 1e-10),
+        Evidence::at_most(
+            "largest distance of a limit point from its vertex over L after Gauss-Seidel",
+            largest(rows.iter().map(|r| r.off)),
+            1e-10,
+        ),
         Evidence::shown("open and creased meshes", rows.len()),
     ])
     .remark(
-        "With the row (1, 6, 1)/8 of a quadratic B-spline along boundaries and creases the system is as dominant as on closed \
-         meshes, eigenvalues stay in [½, 1], Gauss-Seidel and Jacobi converge. Here of the control points alone; the \
-         refinement of the surface along the boundary needs rules that the paper does not give.",
+        "With the row (1, 6, 1)/8 of a quadratic B-spline along boundaries and creases the system is as dominant as on \
+         closed meshes, eigenvalues stay in [½, 1], Gauss-Seidel and Jacobi converge. Here of the control points \
+         alone; the refinement of the surface along the boundary needs rules that the paper does not give.",
     ))
 }
 

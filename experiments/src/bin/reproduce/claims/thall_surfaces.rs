@@ -219,18 +219,35 @@ pub fn frozen_creases(_: &Lab) -> Result<Finding> {
     });
     let (resting, averaged, solved) = (resting?, averaged?, solved?);
     Ok(Finding::reproduced(vec![
-        Evidence::above("vertices that rest: turn of the crease at a vertex in degrees, torus:10x8", resting.turn, 10.0),
+        Evidence::above(
+            "vertices that rest: turn of the crease at a vertex in degrees, torus:10x8",
+            resting.turn,
+            10.0,
+        ),
         Evidence::above("the same: angle between facets on one side of it, in degrees", resting.jump, 10.0),
-        Evidence::above("vertices averaged along the crease: distance of a limit point from its vertex over L", averaged.gap / size, 1e-3),
+        Evidence::above(
+            "vertices averaged along the crease: distance of a limit point from its vertex over L",
+            averaged.gap / size,
+            1e-3,
+        ),
         Evidence::shown("the same: turn in degrees", averaged.turn),
-        Evidence::at_most("vertices solved for: distance of a limit point from its vertex over L", solved.gap / size, 1e-9),
+        Evidence::at_most(
+            "vertices solved for: distance of a limit point from its vertex over L",
+            solved.gap / size,
+            1e-9,
+        ),
         Evidence::below("the same: turn in degrees, after 5 refinements", solved.turn, 2.0),
-        Evidence::below("the same: angle between facets on one side, in degrees, after 5 refinements", solved.jump, 5.0),
+        Evidence::below(
+            "the same: angle between facets on one side, in degrees, after 5 refinements",
+            solved.jump,
+            5.0,
+        ),
         Evidence::shown("vertices that rest: distance of a limit point from its vertex over L", resting.gap / size),
     ])
     .remark(
-        "Frozen vertices that rest give a polygon with a kink in the surface at each, on both sides; frozen ones that are averaged along \
-         the crease give a smooth curve that misses them. With the crease rules in the matrix there is neither: (1, 4, 1)/6 along \
-         the crease first, then the smooth vertices. The picture is `figures--thall-creases.png`.",
+        "Frozen vertices that rest give a polygon with a kink in the surface at each, on both sides; frozen ones that \
+         are averaged along the crease give a smooth curve that misses them. With the crease rules in the matrix there \
+         is neither: (1, 4, 1)/6 along the crease first, then the smooth vertices. The picture is \
+         `figures--thall-creases.png`.",
     ))
 }

@@ -37,7 +37,7 @@ pub fn frozen(album: &mut Album) -> Result<()> {
     }
     let line = Line {
         name: "thall-creases",
-        shows: "Thall §2.7: a crease whose vertices are frozen at the start, resting or averaged along it, and one that is solved for",
+        shows: "Thall §2.7: a crease of vertices frozen at the start, resting or averaged along it, and one solved for",
         subject: subject.points(),
         iterations: None,
         error: Some(gap),
@@ -69,7 +69,7 @@ pub fn same_points(album: &mut Album) -> Result<()> {
     }
     let line = Line {
         name: "creases-same-points",
-        shows: "The same 26 points on Catmull-Clark surfaces: smooth, with two creases, with creases from a corner to darts",
+        shows: "The same 26 points on Catmull-Clark surfaces: smooth, with two creases, with creases to darts",
         subject: subject.points(),
         iterations: None,
         error: None,
