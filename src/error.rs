@@ -67,13 +67,16 @@ pub enum Error {
     },
     /// A method that needs A = H·M with a symmetric M, on a mesh with darts or semi-sharp vertices.
     #[error(
-        "vertex {vertex} is a dart or semi-sharp, so that no diagonal makes the matrix symmetric, as {method} needs it; use auto or lu"
+        "vertex {vertex} is a dart or semi-sharp, so that no diagonal makes the matrix symmetric, as {method} needs it; use auto, {}",
+        one_of(others)
     )]
     Unsymmetric {
         /// The first such vertex, from 0.
         vertex: usize,
         /// The method by name.
         method: &'static str,
+        /// Those that need none, by name.
+        others: Vec<&'static str>,
     },
     /// A vertex that is semi-sharp, or at a semi-sharp edge.
     #[error(
@@ -151,6 +154,12 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
+    /// An [`Error::Dart`] with the ways out that every mesh has.
+    pub(crate) fn dart(vertex: usize, scheme: &'static str) -> Self {
+        let advice = "make it a corner, or lead the crease on to a boundary, a corner or another crease";
+        Error::Dart { vertex, scheme, advice }
+    }
+
     /// An [`Error::Io`] about `path`.
     pub fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
         Error::Io { path: path.to_path_buf(), action, source }

@@ -54,7 +54,8 @@ pub fn run(out: &Path) -> limitlab::Result<Vec<MethodRow<'static>>> {
     limitlab::output::create_dir(out)?;
     figure("My method".into(), "mesh units", &rows).render()?.save(&out.join("own_method.png"))?;
     let grid = vec![(Method::Pia, (1..=20).map(|k| f64::from(k) / 10.0).collect())];
-    let found = sweep(&system, (points, points), &grid, None, &stop, rounding_floor(surface.diagonal()), &|_| ())?;
+    let found =
+        sweep((&system, &spectrum), (points, points), &grid, None, &stop, rounding_floor(surface.diagonal()), &|_| ())?;
     println!("best ω of PIA: {:?}", found.best(Method::Pia).map(|row| (row.omega, row.iterations)));
     Ok(rows)
 }

@@ -80,3 +80,37 @@ fn a_folder_that_cannot_be_made_ends_with_1() {
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(message.starts_with("error: ") && message.trim_end().lines().count() == 1, "{message}");
 }
+
+#[test]
+fn vertices_that_are_not_smooth_have_their_own_tables() {
+    let out = tempfile::tempdir().unwrap();
+    for (at, valence, size) in [("boundary", "1..3", 4), ("crease", "4", 9), ("corner", "1", 4), ("dart", "3", 7)] {
+        let object = json(&["--at", at, "--valence", valence, "--json"], out.path());
+        assert_eq!(object["at"], at);
+        let row = &object["rows"][0];
+        assert_eq!(row["eigenvalues"].as_array().unwrap().len(), size, "{at}");
+        let mask: Vec<f64> = row["limit_mask"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+        assert!((mask.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{at}: {mask:?}");
+        for file in ["", "-eigenvalues", "-masks"] {
+            let path = out.path().join(format!("splitting-catmull-clark-{at}{file}.csv"));
+            assert!(path.exists(), "{}", path.display());
+        }
+    }
+    let object = json(&["--at", "boundary", "--scheme", "loop", "--valence", "5..6", "--json"], out.path());
+    let planes: Vec<&Value> = (0..2).map(|k| &object["rows"][k]["sectors"][0]["tangent_plane"]).collect();
+    assert_eq!(planes, [&Value::from(true), &Value::from(false)]);
+    for (arguments, told) in [
+        (&["--at", "edge"][..], "smooth, boundary, crease, corner, dart"),
+        (&["--at", "dart", "--valence", "1..3"], "3..100"),
+        (&["--at", "corner", "--valence", "0"], "1..100"),
+        (
+            &["--at", "dart", "--scheme", "sqrt3"],
+            "sqrt3 has no local matrix at a dart vertex: choose catmull-clark or loop",
+        ),
+    ] {
+        let output = splitting(arguments, out.path());
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(message.contains(told), "{message}");
+    }
+}

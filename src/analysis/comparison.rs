@@ -8,14 +8,15 @@ use glam::DVec3;
 use super::custom_methods::{Named, Own};
 use super::predict::predicted_rate;
 use super::rate::observed_rate;
-use super::spectrum::Spectrum;
+use super::spectrum::{Spectra, Spectrum};
 use super::sweep::rounding_floor;
+use super::symmetric::SymmetricForm;
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::diagonal;
 use crate::solvers::anderson::WINDOW;
 use crate::solvers::jacobi::THALL_OMEGA;
-use crate::solvers::{Accelerated, Method, Solution, Step, Stop, run_from};
+use crate::solvers::{Accelerated, Method, Solution, Step, Stop, System, run_from};
 
 /// A method with its parameter in words: a line of a comparison.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,31 +60,32 @@ const EXCESS: f64 = 1e-6;
 
 /// The method with its open parameters set by the spectrum: Jacobi and W-PIA to their best ω, the interval of the heavy
 /// ball to the estimated one, that of Chebyshev to the proven one where that is positive, else to the estimated one.
-/// `spectrum` is asked only where it is needed.
+/// `spectra` are asked for only where they are needed; an interval stays open where they are complex.
 ///
 /// # Errors
-/// Those of `spectrum`.
-pub fn with_spectrum<'a>(
-    system: &LimitSystem,
+/// Those of `spectra`.
+pub fn with_spectrum<'a, K: Spectra>(
+    system: &impl System,
     method: Method<'a>,
-    spectrum: &dyn Fn() -> Result<Spectrum>,
+    spectra: &dyn Fn() -> Result<K>,
 ) -> Result<Method<'a>> {
-    let bounds = &system.bounds;
+    let bounds = &system.bounds();
+    let optimal = |form| Ok(Some(spectra()?.optimal_omega(form)));
+    let estimated = || Ok(spectra()?.real().map(|spectrum| estimated(system, spectrum)));
     Ok(match method {
-        Method::Jacobi { omega: None } => Method::Jacobi { omega: Some(spectrum()?.jacobi.optimal_omega()) },
-        Method::WPia { omega: None } => Method::WPia { omega: Some(spectrum()?.a.optimal_omega()) },
+        Method::Jacobi { omega: None } => Method::Jacobi { omega: optimal(SymmetricForm::Jacobi)? },
+        Method::WPia { omega: None } => Method::WPia { omega: optimal(SymmetricForm::A)? },
         Method::Anderson { of: Accelerated::Pia { omega: None }, window } => {
             Method::Anderson { of: Accelerated::Pia { omega: Some(1.0 / bounds.lambda_max) }, window }
         }
         Method::Anderson { of: Accelerated::Jacobi { omega: None }, window } => {
-            let omega = Some(spectrum()?.jacobi.optimal_omega());
-            Method::Anderson { of: Accelerated::Jacobi { omega }, window }
+            Method::Anderson { of: Accelerated::Jacobi { omega: optimal(SymmetricForm::Jacobi)? }, window }
         }
-        Method::HeavyBall { interval: None } => Method::HeavyBall { interval: Some(estimated(system, &spectrum()?)) },
+        Method::HeavyBall { interval: None } => Method::HeavyBall { interval: estimated()? },
         Method::Chebyshev { interval: None } if bounds.lambda_min > 0.0 => {
             Method::Chebyshev { interval: Some((bounds.lambda_min, bounds.lambda_max)) }
         }
-        Method::Chebyshev { interval: None } => Method::Chebyshev { interval: Some(estimated(system, &spectrum()?)) },
+        Method::Chebyshev { interval: None } => Method::Chebyshev { interval: estimated()? },
         Method::Lu
         | Method::Cholesky
         | Method::SecondCholesky
@@ -109,8 +111,8 @@ pub fn with_spectrum<'a>(
 }
 
 /// The interval of the heavy ball, and of Chebyshev, by estimates.
-fn estimated(system: &LimitSystem, spectrum: &Spectrum) -> (f64, f64) {
-    let highest = system.bounds.lambda_max.min((1.0 + EXCESS) * spectrum.a.max);
+fn estimated(system: &impl System, spectrum: &Spectrum) -> (f64, f64) {
+    let highest = system.lambda_max().min((1.0 + EXCESS) * spectrum.a.max);
     let lowest = if spectrum.a.min < VANISHING * highest { LOWEST * highest } else { SAFETY * spectrum.a.min };
     (lowest, highest)
 }
@@ -119,19 +121,19 @@ fn estimated(system: &LimitSystem, spectrum: &Spectrum) -> (f64, f64) {
 /// unpreconditioned CG. `order` is the vertex order of in-place sweeps, `order_name` its name.
 ///
 /// # Errors
-/// None with a given spectrum; the type is that of [`with_spectrum`].
+/// None with given spectra; the type is that of [`with_spectrum`].
 pub fn entries<'a>(
-    system: &LimitSystem,
-    spectrum: &Spectrum,
+    system: &impl System,
+    spectra: &(impl Spectra + Clone),
     methods: &[Method<'a>],
     order: Option<&'a [u32]>,
     order_name: &str,
 ) -> Result<Vec<Entry<'a>>> {
     let entry = |method: Method<'a>, variant| -> Result<Entry<'a>> {
-        let method = with_spectrum(system, method.in_order(order), &|| Ok(*spectrum))?;
+        let method = with_spectrum(system, method.in_order(order), &|| Ok(spectra.clone()))?;
         Ok(Entry { method, variant, parameter: parameter(variant, method, order_name) })
     };
-    let variants = |&method: &Method<'a>| variants(system, spectrum, method);
+    let variants = |&method: &Method<'a>| variants(system, spectra, method);
     let (first, further): (Vec<_>, Vec<_>) = methods.iter().map(variants).unzip();
     let lines = methods.iter().copied().zip(first).chain(further.into_iter().flatten());
     lines.map(|(method, variant)| entry(method, variant)).collect()
@@ -139,8 +141,8 @@ pub fn entries<'a>(
 
 /// What the line of a method is called, and its further lines.
 fn variants<'a>(
-    system: &LimitSystem,
-    spectrum: &Spectrum,
+    system: &impl System,
+    spectra: &impl Spectra,
     method: Method<'a>,
 ) -> (&'static str, Vec<(Method<'a>, &'static str)>) {
     let anderson = |omega| Method::Anderson { of: Accelerated::Jacobi { omega }, window: WINDOW };
@@ -149,8 +151,8 @@ fn variants<'a>(
         Method::Cholesky => ("faer", vec![(Method::SecondCholesky, "nalgebra-sparse")]),
         Method::SecondCholesky => ("nalgebra-sparse", Vec::new()),
         Method::Jacobi { .. } | Method::WPia { .. } => ("optimal", Vec::new()),
-        Method::Chebyshev { .. } if system.bounds.lambda_min > 0.0 => {
-            let interval = Some(estimated(system, spectrum));
+        Method::Chebyshev { .. } if system.bounds().lambda_min > 0.0 => {
+            let interval = spectra.real().map(|spectrum| estimated(system, spectrum));
             ("proven", vec![(Method::Chebyshev { interval }, "estimated")])
         }
         Method::Chebyshev { .. } | Method::HeavyBall { .. } => ("estimated", Vec::new()),
@@ -212,8 +214,7 @@ fn four_digits(x: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
-/// Runs the lines from V = `start` (P, unless there is reason for another), then the methods of the caller's [own], which
-/// start from the points, one after the other, so that their times are comparable. `done` is called after each.
+/// As [`compare_entries`], then the methods of the caller's [own], which start from the points.
 ///
 /// [own]: super::custom_methods
 ///
@@ -231,29 +232,7 @@ pub fn compare<'a>(
     stop: &Stop,
     done: &mut dyn FnMut(),
 ) -> Result<Vec<MethodRow<'a>>> {
-    let floor = rounding_floor(diagonal(points));
-    let observed_rate = |solution: &Solution| {
-        let maxima: Vec<f64> = solution.report.history.iter().map(|e| e.max).collect();
-        observed_rate(&maxima, floor)
-    };
-    let ours = entries
-        .iter()
-        .map(|entry| {
-            let watch = &mut |_: &Step| ControlFlow::Continue(());
-            let solution = run_from(system, points, start, entry.method, stop, watch);
-            let observed_rate = (!entry.method.is_direct()).then(|| observed_rate(&solution)).flatten();
-            let predicted_rate = predicted_rate(system, spectrum, entry.method)?;
-            done();
-            Ok(MethodRow {
-                method: Named::Ours(entry.method),
-                variant: entry.variant,
-                parameter: entry.parameter.clone(),
-                solution,
-                observed_rate,
-                predicted_rate,
-            })
-        })
-        .collect::<Result<Vec<MethodRow<'a>>>>()?;
+    let ours = compare_entries(system, spectrum, (points, start), entries, stop, done)?;
     let theirs = own.iter().map(|own| {
         let solution = own.run(system, points, stop);
         done();
@@ -261,10 +240,49 @@ pub fn compare<'a>(
             method: Named::Own(own.name.clone()),
             variant: "",
             parameter: own.parameter.clone(),
-            observed_rate: observed_rate(&solution),
+            observed_rate: observed(&solution, points),
             predicted_rate: None,
             solution,
         }
     });
     Ok(ours.into_iter().chain(theirs).collect())
+}
+
+/// Runs the lines from V = `start` (P, unless there is reason for another), one after the other, so that their times are
+/// comparable. `done` is called after each.
+///
+/// # Errors
+/// If an eigenvalue computation for a prediction does not converge.
+///
+/// # Panics
+/// If there is not one point a vertex in both.
+pub fn compare_entries<'a>(
+    system: &impl System,
+    spectra: &impl Spectra,
+    (points, start): (&[DVec3], &[DVec3]),
+    entries: &[Entry<'a>],
+    stop: &Stop,
+    done: &mut dyn FnMut(),
+) -> Result<Vec<MethodRow<'a>>> {
+    let row = |entry: &Entry<'a>| {
+        let watch = &mut |_: &Step| ControlFlow::Continue(());
+        let solution = run_from(system, points, start, entry.method, stop, watch);
+        let predicted_rate = predicted_rate(system, spectra, entry.method)?;
+        done();
+        Ok(MethodRow {
+            method: Named::Ours(entry.method),
+            variant: entry.variant,
+            parameter: entry.parameter.clone(),
+            observed_rate: (!entry.method.is_direct()).then(|| observed(&solution, points)).flatten(),
+            solution,
+            predicted_rate,
+        })
+    };
+    entries.iter().map(row).collect()
+}
+
+/// The factor per iteration fitted to the history's tail.
+fn observed(solution: &Solution, points: &[DVec3]) -> Option<f64> {
+    let maxima: Vec<f64> = solution.report.history.iter().map(|e| e.max).collect();
+    observed_rate(&maxima, rounding_floor(diagonal(points)))
 }

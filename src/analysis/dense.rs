@@ -3,10 +3,12 @@
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use glam::DVec3;
+use nalgebra::Complex;
 
 use super::symmetric::{SymmetricForm, symmetric};
 use crate::assemble::{Csr, LimitSystem};
 use crate::error::{Error, Result};
+use crate::solvers::System;
 
 /// Largest N for which dense eigenvalues are computed: cubic time, about a second here.
 pub const LARGEST: usize = 600;
@@ -23,6 +25,9 @@ pub struct Eigenvalues {
 /// Largest N for which dense eigenvalues are computed when they are asked for by name: about half a minute and
 /// 300 MB.
 pub const LARGEST_FULL: usize = 4000;
+
+/// Largest N for which all eigenvalues of a matrix that is similar to no symmetric one are computed.
+pub const LARGEST_COMPLEX: usize = 2000;
 
 /// O(N³) time, O(N²) memory.
 ///
@@ -47,6 +52,19 @@ fn both(system: &LimitSystem) -> Result<Eigenvalues> {
         a: values(&symmetric(system, SymmetricForm::A))?,
         jacobi: values(&symmetric(system, SymmetricForm::Jacobi))?,
     })
+}
+
+/// The eigenvalues of a matrix that is similar to no symmetric one, unsorted. O(N³) time, O(N²) memory.
+///
+/// # Errors
+/// If N exceeds [`LARGEST_COMPLEX`], or the computation does not converge.
+pub fn complex_eigenvalues(a: &Csr) -> Result<Vec<Complex<f64>>> {
+    within_limit(a.len(), LARGEST_COMPLEX)?;
+    unsymmetric_values(&to_dense(a))
+}
+
+fn unsymmetric_values(matrix: &Mat<f64>) -> Result<Vec<Complex<f64>>> {
+    matrix.eigenvalues().map_err(|e| Error::Computation(format!("dense eigenvalues: {e:?}")))
 }
 
 fn values(s: &Csr) -> Result<Vec<f64>> {
@@ -97,7 +115,7 @@ fn to_dense(s: &Csr) -> Mat<f64> {
 ///
 /// # Errors
 /// If N exceeds [`LARGEST`], or the computation does not converge.
-pub fn spectral_radius(system: &LimitSystem, mut step: impl FnMut(&mut [DVec3])) -> Result<f64> {
+pub fn spectral_radius(system: &impl System, mut step: impl FnMut(&mut [DVec3])) -> Result<f64> {
     let n = system.len();
     within_limit(n, LARGEST)?;
     let mut dense = Mat::<f64>::zeros(n, n);
@@ -117,8 +135,7 @@ pub fn spectral_radius(system: &LimitSystem, mut step: impl FnMut(&mut [DVec3]))
             }
         }
     }
-    let all = dense.eigenvalues().map_err(|e| Error::Computation(format!("dense eigenvalues: {e:?}")))?;
-    Ok(all.iter().map(|z| z.norm()).fold(0.0, f64::max))
+    Ok(unsymmetric_values(&dense)?.iter().map(|z| z.norm()).fold(0.0, f64::max))
 }
 
 fn within_limit(n: usize, limit: usize) -> Result<()> {

@@ -3,6 +3,7 @@
 
 pub mod a_priori;
 pub mod comparison;
+pub mod complex_spectrum;
 pub mod custom_methods;
 pub mod dense;
 pub mod dirichlet_neumann;

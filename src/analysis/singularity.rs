@@ -4,8 +4,9 @@
 //! Theory, on closed meshes with all valences ≥ 3: each scheme has its [`SingularSet`]. Under Catmull-Clark A is singular
 //! exactly when some connected component has all valences 3 and a bipartite edge graph; its null vector is the ±1
 //! colouring. Schemes with positive lower bounds are never singular. A component with a boundary, crease or corner vertex
-//! is none of these: its null vector would vanish there, and with the sums over its edges everywhere. Darts and semi-sharp
-//! vertices alone cure nothing: one step takes the ±1 vector to 0, whatever the sharpness.
+//! is none of these: its null vector would vanish there, and with the sums over its edges everywhere. Darts, of edges that are
+//! sharp for ever or for some steps, cure nothing: one step takes the ±1 vector to 0 at vertices of valence 3, at midpoints and
+//! at centroids. Where two semi-sharp edges meet, or a vertex is semi-sharp itself, it leaves ½ and more.
 
 use glam::DVec3;
 
@@ -16,7 +17,6 @@ use super::{dense, subspace_iteration::Eigenvalue};
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::Surface;
-use crate::mesh::features::Rule;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::schemes::{Scheme, SingularSet};
 use crate::solvers::{Accelerated, Method};
@@ -90,9 +90,10 @@ impl Singularity {
         };
         let mut colour = colour(surface);
         let mut regular = vec![false; components];
+        let held = surface.features().map(|features| features.held_at_first(surface));
         for v in 0..mesh.len() {
             let bad = valence.is_some_and(|valence| topology.incidence.face_count(v) != valence)
-                || surface.features().is_some_and(|f| matches!(f.rules()[v], Rule::Crease | Rule::Corner))
+                || held.as_ref().is_some_and(|held| held[v])
                 || neighbours(surface, v).any(|w| colour[w] == colour[v]);
             if bad {
                 regular[component[v] as usize] = true;

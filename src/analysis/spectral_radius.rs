@@ -6,8 +6,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::dense;
-use crate::assemble::LimitSystem;
 use crate::error::{Error, Result};
+use crate::solvers::System;
 
 /// Steps of the power method before the first Arnoldi process.
 const WARM_UP: usize = 30;
@@ -43,7 +43,7 @@ pub struct SpectralRadius {
 ///
 /// # Errors
 /// As there.
-pub fn sweep_radius(system: &LimitSystem, step: impl FnMut(&mut [DVec3])) -> Result<f64> {
+pub fn sweep_radius(system: &impl System, step: impl FnMut(&mut [DVec3])) -> Result<f64> {
     Ok(spectral_radius(system, step)?.value)
 }
 
@@ -55,7 +55,7 @@ pub fn sweep_radius(system: &LimitSystem, step: impl FnMut(&mut [DVec3])) -> Res
 ///
 /// # Errors
 /// If the dense computation does not converge.
-pub fn spectral_radius(system: &LimitSystem, mut step: impl FnMut(&mut [DVec3])) -> Result<SpectralRadius> {
+pub fn spectral_radius(system: &impl System, mut step: impl FnMut(&mut [DVec3])) -> Result<SpectralRadius> {
     let n = system.len();
     if n <= DENSE {
         return Ok(SpectralRadius {

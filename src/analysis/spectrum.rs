@@ -71,6 +71,70 @@ pub struct Spectrum {
     pub jacobi: Extremes,
 }
 
+/// What is computed of the spectra of A and of D⁻¹A: it settles parameters that methods leave open, and predicts rates.
+pub trait Spectra {
+    /// max |1 − ωλ| over the eigenvalues of the matrix of `form`: the rate of relaxation by ω. `None` if too little of them is
+    /// known.
+    fn radius(&self, form: SymmetricForm, omega: f64) -> Option<f64>;
+
+    /// Where that is least.
+    fn optimal_omega(&self, form: SymmetricForm) -> f64;
+
+    /// Where that is 1, beyond which relaxation diverges.
+    fn critical_omega(&self, form: SymmetricForm) -> f64;
+
+    /// The ends of the real parts of the eigenvalues.
+    fn ends(&self, form: SymmetricForm) -> Extremes;
+
+    /// The spectra themselves, where they are real: what methods need that are made for an interval.
+    fn real(&self) -> Option<&Spectrum>;
+
+    /// The ends of what a run from `start` [excites](excited) of the spectrum, where that is real.
+    ///
+    /// # Errors
+    /// If an eigenvalue computation does not converge.
+    fn excited(
+        &self,
+        system: &impl System,
+        data: (&[DVec3], &[DVec3]),
+        form: SymmetricForm,
+    ) -> Result<Option<Extremes>>;
+}
+
+impl Spectra for Spectrum {
+    fn radius(&self, form: SymmetricForm, omega: f64) -> Option<f64> {
+        Some(self.ends(form).radius(omega))
+    }
+
+    fn optimal_omega(&self, form: SymmetricForm) -> f64 {
+        self.ends(form).optimal_omega()
+    }
+
+    fn critical_omega(&self, form: SymmetricForm) -> f64 {
+        self.ends(form).critical_omega()
+    }
+
+    fn ends(&self, form: SymmetricForm) -> Extremes {
+        match form {
+            SymmetricForm::A => self.a,
+            SymmetricForm::Jacobi => self.jacobi,
+        }
+    }
+
+    fn real(&self) -> Option<&Spectrum> {
+        Some(self)
+    }
+
+    fn excited(
+        &self,
+        system: &impl System,
+        data: (&[DVec3], &[DVec3]),
+        form: SymmetricForm,
+    ) -> Result<Option<Extremes>> {
+        excited(system, data, form)
+    }
+}
+
 /// Relative accuracy of λ_min and λ_max.
 const ACCURACY: f64 = 1e-9;
 /// Vertices up to which the eigenvalues at an end that Lanczos found are counted by factorizations of the whole matrix.

@@ -8,11 +8,10 @@ use rayon::prelude::*;
 
 use super::predict::predicted_rate;
 use super::rate::observed_rate;
-use super::spectrum::{Extremes, Spectrum, excited, spectrum};
+use super::spectrum::{Extremes, Spectra};
 use super::symmetric::SymmetricForm;
-use crate::assemble::LimitSystem;
 use crate::error::Result;
-use crate::solvers::{Errors, Method, Outcome, Step, Stop, run_from};
+use crate::solvers::{Errors, Method, Outcome, Step, Stop, System, run_from};
 
 /// A method at one ω.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,17 +39,21 @@ pub struct SweepRow {
 pub struct Thresholds {
     /// Jacobi, Thall, PIA or W-PIA, as given with the grid.
     pub method: Method<'static>,
-    /// The ends of the spectrum of D⁻¹A for Jacobi and Thall, of A for PIA and W-PIA.
-    pub matrix: Extremes,
-    /// The same of the part of the spectrum that the data excite; `None` if the start is the solution.
+    /// The ends of the spectrum of D⁻¹A for Jacobi and Thall, of A for PIA and W-PIA; of its real parts where it is complex.
+    pub ends: Extremes,
+    /// ω beyond which the method diverges.
+    pub critical_omega: f64,
+    /// ω of the least radius.
+    pub optimal_omega: f64,
+    /// That radius.
+    pub optimal_rho: f64,
+    /// The ends of the part of the spectrum that the data excite; `None` if the start is the solution, or the spectrum complex.
     pub data: Option<Extremes>,
 }
 
 /// A sweep's result on one system.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OmegaSweep {
-    /// The ends of the spectra of A and D⁻¹A.
-    pub spectrum: Spectrum,
     /// In the order of the grids; SOR has none.
     pub thresholds: Vec<Thresholds>,
     /// In the order of the grids; fewer than asked for while the sweep runs.
@@ -71,7 +74,7 @@ pub fn rounding_floor(diagonal: f64) -> f64 {
     64.0 * f64::EPSILON * diagonal
 }
 
-/// Runs every method at every ω of its grid, from V = `start` (P, unless there is reason for another), in parallel over the
+/// Runs every method at every ω of its grid on a system with these spectra, from V = `start` (P, unless there is reason for another), in parallel over the
 /// grid.
 ///
 /// `grids` pairs a method (Jacobi, PIA or SOR) with its values of ω; `order` is the vertex order of SOR;
@@ -84,7 +87,7 @@ pub fn rounding_floor(diagonal: f64) -> f64 {
 /// # Panics
 /// If a method has no ω, or there is not one point a vertex in both.
 pub fn sweep(
-    system: &LimitSystem,
+    (system, spectra): (&impl System, &(impl Spectra + Sync)),
     (points, start): (&[DVec3], &[DVec3]),
     grids: &[(Method<'static>, Vec<f64>)],
     order: Option<&[u32]>,
@@ -92,12 +95,11 @@ pub fn sweep(
     floor: f64,
     done: &(dyn Fn(&OmegaSweep) + Sync),
 ) -> Result<OmegaSweep> {
-    let spectrum = spectrum(system)?;
     let mut thresholds = Vec::new();
     for (method, _) in grids {
-        let (form, matrix) = match method {
-            Method::Jacobi { .. } | Method::Thall => (SymmetricForm::Jacobi, spectrum.jacobi),
-            Method::Pia | Method::WPia { .. } => (SymmetricForm::A, spectrum.a),
+        let form = match method {
+            Method::Jacobi { .. } | Method::Thall => SymmetricForm::Jacobi,
+            Method::Pia | Method::WPia { .. } => SymmetricForm::A,
             Method::Lu
             | Method::Cholesky
             | Method::SecondCholesky
@@ -114,19 +116,23 @@ pub fn sweep(
             | Method::Anderson { .. }
             | Method::HeavyBall { .. } => continue,
         };
-        thresholds.push(Thresholds { method: *method, matrix, data: excited(system, (points, start), form)? });
+        let (ends, critical_omega) = (spectra.ends(form), spectra.critical_omega(form));
+        let optimal_omega = spectra.optimal_omega(form);
+        let optimal_rho = spectra.radius(form, optimal_omega).unwrap_or_else(|| ends.radius(optimal_omega));
+        let data = spectra.excited(system, (points, start), form)?;
+        thresholds.push(Thresholds { method: *method, ends, critical_omega, optimal_omega, optimal_rho, data });
     }
     let jobs: Vec<(Method<'static>, f64)> =
         grids.iter().flat_map(|(method, omegas)| omegas.iter().map(|&omega| (*method, omega))).collect();
     // Beside the rows, the number of each.
-    let found = Mutex::new((OmegaSweep { spectrum, thresholds: thresholds.clone(), rows: Vec::new() }, Vec::new()));
+    let found = Mutex::new((OmegaSweep { thresholds: thresholds.clone(), rows: Vec::new() }, Vec::new()));
     jobs.par_iter().enumerate().try_for_each(|(number, &(method, omega))| -> Result<()> {
         let Some(swept) = method.in_order(order).at_omega(omega) else {
             panic!("{method} is not swept over ω");
         };
         let watch = &mut |_: &Step| ControlFlow::Continue(());
         let report = run_from(system, points, start, swept, stop, watch).report;
-        let predicted = predicted_rate(system, &spectrum, swept)?;
+        let predicted = predicted_rate(system, spectra, swept)?;
         let maxima: Vec<f64> = report.history.iter().map(|e| e.max).collect();
         let data = thresholds.iter().find(|t| t.method == method).and_then(|t| t.data);
         let row = SweepRow {

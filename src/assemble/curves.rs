@@ -3,10 +3,12 @@
 use glam::DVec3;
 use nalgebra::DMatrix;
 
-use super::stars::StarOf;
+use super::stars::row_at;
 use crate::error::Result;
 use crate::mesh::Surface;
+use crate::mesh::features::Rule;
 use crate::schemes::Scheme;
+use crate::schemes::local_limit::StarOf;
 
 /// The tridiagonal systems of all curves: `w_i x_{i−1} + (1 − 2w_i) x_i + w_i x_{i+1} = p_i`, between vertices that are known, or
 /// round a closed curve. w is the scheme's [`curve_weight`](Scheme::curve_weight), less where semi-sharp edges end on the
@@ -112,8 +114,11 @@ impl Curves {
         let plain = scheme.curve_weight();
         let Some(features) = surface.features() else { return Ok(Curves { weight: plain, chains: Vec::new() }) };
         let mut own = Vec::new();
-        for (v, rule) in features.semi_sharp_on_curves(surface) {
-            own.push((v, StarOf::new(surface, features, v as usize).row(scheme, rule)?.edges));
+        for v in features.at_semi_sharp(surface) {
+            if features.rules()[v as usize] == Rule::Crease {
+                let star = StarOf::new(surface, features, v as usize);
+                own.push((v, row_at(&star, scheme, Rule::Crease)?.edges));
+            }
         }
         let weight = |v: u32| {
             let found = own.binary_search_by_key(&v, |entry| entry.0);

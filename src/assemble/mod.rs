@@ -1,5 +1,5 @@
 //! Assembly of the limit system `A V = P` of a mesh: the schemes as four small functions, one generic assembler into
-//! own compressed sparse rows, the same as a sequence of stages where there are boundaries and creases, proven bounds
+//! own compressed sparse rows, the same as a sequence of stages where there are boundaries and creases, and as a whole, proven bounds
 //! from valences and face sizes, Matrix Market files; systems of other origin.
 //! This room knows no solvers.
 
@@ -10,17 +10,21 @@ pub mod csr;
 pub mod curves;
 pub mod face_sums;
 mod gather;
+pub mod general;
 pub mod kernel;
 pub mod matrix_market;
 mod neighbours;
 pub mod operator;
 mod parts;
+pub mod staged_operator;
 pub mod stages;
 pub mod stars;
 pub mod system;
 pub mod weights;
 
 pub use csr::Csr;
+pub use general::GeneralSystem;
 pub use operator::Operator;
+pub use staged_operator::StagedOperator;
 pub use stages::Stages;
 pub use system::LimitSystem;

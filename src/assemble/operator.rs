@@ -88,6 +88,12 @@ impl Operator {
         }
     }
 
+    /// As [`inside`](Self::inside), in the order of a surface whose rows that are not free are all that is not smooth.
+    pub(super) fn with_fixed(surface: &Surface, scheme: Scheme, free: &[bool]) -> Result<Self> {
+        check(surface, scheme)?;
+        Self::build(surface.faces(), (surface.incidence(), None), scheme, (None, Some(free)))
+    }
+
     fn build(
         faces: &Faces,
         sides: (&Incidence, Option<&Topology>),

@@ -23,6 +23,7 @@ use glam::DVec3;
 use super::bounds::SpectralBounds;
 use super::csr::{Csr, Pattern};
 use super::curves::Curves;
+use super::general::GeneralSystem;
 use super::stars::StarRows;
 use super::system::{LimitSystem, check, rows_of};
 use crate::error::{Error, Result};
@@ -235,6 +236,11 @@ impl Stages {
             offsets.push(columns.len() as u32);
         }
         Csr::new(Arc::new(Pattern::new(offsets, columns)), values)
+    }
+
+    /// `A V = P` of all vertices at once, for methods that need no symmetry.
+    pub fn whole(&self) -> GeneralSystem {
+        GeneralSystem::new(self.matrix())
     }
 
     /// All control points, from the [known](Self::known) ones and those of the block.

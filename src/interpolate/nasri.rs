@@ -14,7 +14,7 @@ use crate::solvers::{Method, Solution, Stop};
 /// the others (a principal submatrix, whose eigenvalues stay in [¼, 1], so it is soluble on every mesh).
 ///
 /// # Errors
-/// A mesh that is not closed; no vertex marked.
+/// Those of [`Stages::new`]: darts, semi-sharp edges and vertices, a boundary that is treated as interior; no vertex marked.
 ///
 /// # Panics
 /// If `interpolated` has not one entry a vertex.

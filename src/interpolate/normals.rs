@@ -10,6 +10,7 @@ use std::f64::consts::PI;
 use glam::{DQuat, DVec3};
 
 use super::thall::angle;
+use super::zheng_cai::Constraints;
 use crate::error::short;
 use crate::mesh::Surface;
 use crate::mesh::frame::direction;
@@ -85,14 +86,8 @@ pub fn rotate_rings(
     assert_eq!(normals.len(), control.len(), "one entry a vertex");
     assert!(rotation.levels > 0, "at least one level");
     let wanted = unit_normals(normals)?;
-    if let Some(features) = control.features()
-        && let Some(v) = (0..control.len()).find(|&v| wanted[v].is_some() && !features.is_smooth(v))
-    {
-        let what =
-            format!("vertex {v} is sharp, and has no ring that could be turned about its point: leave its normal out");
-        return Err(Error::mesh("normals", what));
-    }
-    scheme.check_size(control.mesh(), rotation.levels + 1)?;
+    Constraints { normals: Some(normals), ..Constraints::default() }.check_smooth(control)?;
+    scheme.check_size(control, rotation.levels + 1)?;
     let mut surface = scheme.refined(control)?;
     let mut turned: Vec<(u32, f64)> = Vec::new();
     for level in 0..rotation.levels {

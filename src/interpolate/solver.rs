@@ -23,7 +23,10 @@
 //! difference X, zero where V is known: the rows there are fixed, and A_SS X_S = (P − A V)_S is solved by the same chain.
 //!
 //! *Darts and semi-sharp vertices.* Their rows are not those of H·M. They are held while the others are solved for, and moved by
-//! GMRES on what is left of A at them, a solution of the others for each product; LU of all takes the place of LDLᵀ.
+//! GMRES on what is left of A at them, a solution of the others for each product; LU of all takes the place of LDLᵀ. Methods by
+//! name that need no symmetry run on all of A, all vertices at once, in any order. Curves are not solved before: whatever the
+//! order, the iterations of the curves stay among themselves and converge at least as fast as 2/3 under PIA, so that an exact
+//! start saves next to nothing; and one matrix has one predicted rate.
 //!
 //! Direct methods lose at every size tried, by `reports/scaling.md`.
 
@@ -34,9 +37,9 @@ use glam::DVec3;
 
 use super::staged;
 use crate::analysis::comparison::with_spectrum;
+use crate::analysis::complex_spectrum::ComplexSpectrum;
 use crate::analysis::failed::Failed;
 use crate::analysis::spectrum::spectrum;
-use crate::assemble::bounds::SpectralBounds;
 use crate::assemble::curves::Curves;
 use crate::assemble::stages::free;
 use crate::assemble::stars::StarRows;
@@ -53,7 +56,7 @@ use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::gmres::gmres;
 use crate::solvers::mixed::{self, Workspace};
 use crate::solvers::system::Rows;
-use crate::solvers::{Iterate, Method, Outcome, Report, Solution, Step, Stop, run, solve};
+use crate::solvers::{Iterate, Method, Outcome, Report, Solution, Step, Stop, run, run_watched, solve};
 
 /// From this many vertices on, the rows of the operator are breadth first. Tuned.
 pub const ORDERED: usize = 200_000;
@@ -267,29 +270,21 @@ fn by_method(
     let start = Instant::now();
     let stages = Stages::new(surface, scheme, marks)?;
     if let Some(stars) = stages.stars() {
-        return match method {
-            Method::Lu => lu_of_all(&stages, surface.positions(), stop),
-            _ => Err(Error::Unsymmetric { vertex: stars.vertices()[0] as usize, method: method.name() }),
-        };
+        if method.needs_symmetry() {
+            return Err(method.refused_at(stars.vertices()[0] as usize));
+        }
+        let system = stages.whole();
+        let method = with_spectrum(&system, method, &|| ComplexSpectrum::new(&system))?;
+        let seconds = start.elapsed().as_secs_f64();
+        let mut solution = run_watched(&system, surface.positions(), method, stop, watch);
+        solution.setup_seconds += seconds;
+        return Ok(solution);
     }
     let order = method.order().map(|order| stages.order(order));
     let block = stages.block();
     let method = with_spectrum(block, method.in_order(order.as_deref()), &|| spectrum(block))?;
     let seconds = start.elapsed().as_secs_f64();
     let mut solution = staged::run_watched(&stages, surface.positions(), method, stop, watch);
-    solution.setup_seconds += seconds;
-    Ok(solution)
-}
-
-/// By LU of the whole matrix, which no diagonal makes symmetric where there are darts and semi-sharp vertices.
-fn lu_of_all(stages: &Stages, points: &[DVec3], stop: &Stop) -> Result<Solution> {
-    let start = Instant::now();
-    let a = stages.matrix();
-    // LU reads the columns of A off the rows of M, as it may where M is symmetric.
-    let (h, m, diagonal) = (vec![1.0; a.len()], a.transpose(), a.diagonal());
-    let bounds = SpectralBounds::gershgorin(&diagonal);
-    let seconds = start.elapsed().as_secs_f64();
-    let mut solution = run(&LimitSystem { h, m, a, diagonal, bounds }, points, Method::Lu, stop);
     solution.setup_seconds += seconds;
     Ok(solution)
 }

@@ -39,6 +39,50 @@ pub struct SurfaceMesh {
     pub not_flattened: Vec<u32>,
 }
 
+/// Refuses, before a system is solved, what [`surface`] would refuse for its scheme and its faces.
+///
+/// # Errors
+/// Too few levels for normals or handles, handles under a primal scheme, either under mid-edge; a normal or a handle at a vertex
+/// that is not smooth; what the refinement has no rules for.
+///
+/// # Panics
+/// If a list has not one entry a vertex.
+pub fn check(surface: &Surface, scheme: Scheme, request: &SurfaceOptions) -> Result<()> {
+    let given = &request.constraints;
+    given.check(surface.len())?;
+    given.check_smooth(surface)?;
+    let refinement = scheme.refinement();
+    match scheme.first_rule() {
+        Some(_) if request.levels == 0 && (given.normals.is_some() || given.handles.is_some()) => {
+            return Err(too_few("normals and shape handles act on", 1));
+        }
+        Some(_) => {}
+        None if given.handles.is_some() => {
+            return Err(Error::NotOffered {
+                what: format!("shape handles scale the type-V faces of Doo-Sabin surfaces, and {refinement} has none"),
+                schemes: &["zheng-cai", "nasri"],
+            });
+        }
+        None if given.normals.is_some() => {
+            if refinement.class() != Class::Primal {
+                return Err(Error::NotOffered {
+                    what: format!(
+                        "given normals turn the rings of vertices that stay, or tilt the faces of Doo-Sabin surfaces, and \
+                         {refinement} has neither"
+                    ),
+                    schemes: &["zheng-cai", "nasri", "catmull-clark"],
+                });
+            }
+            let needed = request.rotation.levels + 1;
+            if request.levels < needed {
+                return Err(too_few("given normals turn the rings of", needed));
+            }
+        }
+        None => {}
+    }
+    if request.levels > 0 || request.normals { refinement.check(surface) } else { Ok(()) }
+}
+
 /// Makes the surface of a control mesh found for `scheme`. `points` are the given points.
 ///
 /// Catmull-Clark, Loop and √3: original vertices keep their numbers; given normals are met by turned rings
@@ -47,23 +91,18 @@ pub struct SurfaceMesh {
 /// ones are Doo-Sabin. Mid-edge: plain refinement. Time and memory are those of the refinements.
 ///
 /// # Errors
-/// Too few levels for normals or handles, handles under a primal scheme, either under mid-edge; those of
-/// [`rotate_rings`], [`FirstRefinement::new`] and the refinement.
+/// Those of [`check`], [`rotate_rings`], [`FirstRefinement::new`] and the refinement.
 ///
 /// # Panics
 /// If a list has not one entry a vertex.
 pub fn surface(control: Surface, scheme: Scheme, points: &[DVec3], request: &SurfaceOptions) -> Result<SurfaceMesh> {
+    check(&control, scheme, request)?;
     let given = &request.constraints;
     let wants_limits = request.limit || request.normals;
     let rule = scheme.first_rule();
     let mut made = match rule {
         None => primal(control, scheme.refinement(), request)?,
-        Some(_) if request.levels == 0 => {
-            if given.normals.is_some() || given.handles.is_some() {
-                return Err(too_few("normals and shape handles act on", 1));
-            }
-            SurfaceMesh::plain(control)
-        }
+        Some(_) if request.levels == 0 => SurfaceMesh::plain(control),
         Some(rule) => {
             let corrected = rule == CornerRule::ZhengCai || given.normals.is_some() || given.handles.is_some();
             if corrected {
@@ -96,8 +135,9 @@ pub fn surface(control: Surface, scheme: Scheme, points: &[DVec3], request: &Sur
         }
         if request.limit {
             let limits = match rule {
-                _ if fine.features().is_some() => limit_points(fine, system)?,
                 Some(rule) => doo_sabin::limit_positions(rule, fine)?,
+                // By the rows of A also where a refinement has no rules for sharp edges.
+                None if fine.features().is_some() => limit_points(fine, system)?,
                 None => scheme.limit_positions(fine)?,
             };
             made.surface.positions_mut().copy_from_slice(&limits);
@@ -124,30 +164,10 @@ fn refine(scheme: Refinement, control: Surface, levels: usize, topology: bool) -
 }
 
 fn primal(control: Surface, scheme: Refinement, request: &SurfaceOptions) -> Result<SurfaceMesh> {
-    let given = &request.constraints;
     let wants_limits = request.limit || request.normals;
-    if given.handles.is_some() {
-        return Err(Error::NotOffered {
-            what: format!("shape handles scale the type-V faces of Doo-Sabin surfaces, and {scheme} has none"),
-            schemes: &["zheng-cai", "nasri"],
-        });
-    }
-    let Some(normals) = given.normals else {
+    let Some(normals) = request.constraints.normals else {
         return Ok(SurfaceMesh::plain(refine(scheme, control, request.levels, wants_limits)?));
     };
-    if scheme.class() != Class::Primal {
-        return Err(Error::NotOffered {
-            what: format!(
-                "given normals turn the rings of vertices that stay, or tilt the faces of Doo-Sabin surfaces, and {scheme} \
-                 has neither"
-            ),
-            schemes: &["zheng-cai", "nasri", "catmull-clark"],
-        });
-    }
-    let needed = request.rotation.levels + 1;
-    if request.levels < needed {
-        return Err(too_few("given normals turn the rings of", needed));
-    }
     let rotated = rotate_rings(&control, scheme, normals, request.rotation)?;
     let further = request.levels - rotated.refinements;
     let surface = refine(scheme, rotated.surface, further, wants_limits)?;

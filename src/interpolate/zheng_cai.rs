@@ -4,16 +4,20 @@
 //! their centroids near the given points (Eq. 7). Phase two corrects the first refinement so that the centroids are
 //! exact, the faces planar, and the normals the given ones (Eq. 17). Doo-Sabin then keeps centroids and tangent
 //! planes at every level.
+//!
+//! On open and creased meshes curves come first, exactly: their limit points are no centroids of faces, and depend on nothing
+//! beside them. Both phases are those of the smooth vertices then, whose faces are all there.
 
 use glam::DVec3;
 
 use super::normals::unit_normals;
-use crate::assemble::stages::nothing;
+use crate::assemble::curves::Curves;
+use crate::assemble::stages::{free, nothing};
 use crate::error::short;
 use crate::mesh::{Mesh, Surface};
 use crate::parallel;
-use crate::schemes::Refinement;
-use crate::schemes::doo_sabin::{CornerRule, refine_by};
+use crate::schemes::doo_sabin::{CornerRule, first_vertex_face, refine_by};
+use crate::schemes::{Refinement, Scheme};
 use crate::{Error, Result};
 
 /// Vertices of one task.
@@ -59,6 +63,24 @@ pub struct Constraints<'a> {
 }
 
 impl Constraints<'_> {
+    /// Normals, and handles other than 1, at smooth vertices only.
+    pub(super) fn check_smooth(&self, surface: &Surface) -> Result<()> {
+        let Some(features) = surface.features() else { return Ok(()) };
+        let is_shaped = |v: usize| {
+            self.normals.is_some_and(|normals| normals[v].is_some()) || self.handles.is_some_and(|s| s[v] != 1.0)
+        };
+        match (0..surface.len()).find(|&v| is_shaped(v) && !features.is_smooth(v)) {
+            None => Ok(()),
+            Some(v) => Err(Error::mesh(
+                "constraints",
+                format!(
+                    "vertex {v} is sharp, and has neither a ring nor a face that turns about its point: leave its normal \
+                     out, and its shape handle at 1"
+                ),
+            )),
+        }
+    }
+
     pub(super) fn is_interpolated(&self, v: usize) -> bool {
         self.interpolated.is_none_or(|marks| marks[v])
     }
@@ -109,40 +131,33 @@ pub struct Auxiliary {
     pub passed: bool,
 }
 
-/// Phase one: sweeps of Eq. 7 from V = I, without a matrix. With S_F the sum of a face's corners, kept up to date
+/// Phase one: curves by elimination, then sweeps of Eq. 7 over the smooth vertices from V = I, without a matrix. With S_F the sum of a face's corners, kept up to date
 /// as vertices move, an update is V += (2mI − mV − Σ_F S_F/|F|)/(m + Σ_F 1/|F|): O(1) a corner whatever the face
 /// sizes. Vertices that are not interpolated keep V = I. The system is strictly diagonally dominant, so both sweeps
-/// converge on every mesh; [`Scheme::ZhengCai`](crate::schemes::Scheme::ZhengCai) is the same system for all
+/// converge on every mesh; [`Scheme::ZhengCai`] is the same system for all
 /// other solvers.
 ///
 /// # Errors
-/// No vertex is interpolated; a boundary, creases.
+/// No vertex is interpolated; a boundary that is treated as interior, darts, semi-sharp edges and vertices.
 ///
 /// # Panics
 /// If `interpolated` has not one entry a vertex, or an order names a vertex that the mesh lacks.
 pub fn auxiliary(surface: &Surface, interpolated: Option<&[bool]>, phase: &PhaseOne) -> Result<Auxiliary> {
-    // Its rows are those of vertices with whole faces around them.
-    let what = "Zheng and Cai's first phase";
-    if surface.features().is_some() {
-        return Err(Error::Creased { what });
-    }
-    if !surface.is_closed() {
-        return Err(Error::Open { edges: surface.boundary_edges(), scheme: what });
-    }
+    Refinement::DooSabin.check(surface)?;
     let mesh = surface.mesh();
-    let constraints = Constraints { interpolated, ..Constraints::default() };
-    constraints.check(mesh.len())?;
+    let free = free(surface, interpolated)?;
     let tolerance = phase.eps * mesh.diagonal();
     let mut system = LocalSystem::new(surface);
+    Curves::new(surface, Scheme::ZhengCai, interpolated)?.solve(&mut system.points);
     let mut next = match phase.sweep {
-        Sweep::Jacobi => mesh.positions.clone(),
+        Sweep::Jacobi => system.points.clone(),
         Sweep::GaussSeidel(_) => Vec::new(),
     };
     let mut updates = Vec::new();
     let mut passed = false;
     while updates.len() < phase.max_iterations && !passed {
         system.sum_faces();
-        let moves = |v: &usize| constraints.is_interpolated(*v);
+        let moves = |v: &usize| free.as_ref().is_none_or(|free| free[*v]);
         let largest = match phase.sweep {
             Sweep::GaussSeidel(Some(order)) => system.sweep(order.iter().map(|&v| v as usize).filter(moves)),
             Sweep::GaussSeidel(None) => system.sweep((0..mesh.len()).filter(moves)),
@@ -222,7 +237,7 @@ impl<'a> LocalSystem<'a> {
 pub struct FirstRefinement {
     /// The corrected mesh: faces of type F first, then E, then V.
     pub surface: Surface,
-    /// The type-V face of vertex v is face `first_vertex_face + v`.
+    /// The type-V face of vertex v is face `first_vertex_face + v`; of one that is not smooth, the first of them.
     pub first_vertex_face: usize,
     /// Interpolated vertices whose type-V face has no average normal (its corners lie in a line or a point, or its
     /// vector area vanishes): their centroid is exact, but the face was only moved, not flattened.
@@ -230,7 +245,7 @@ pub struct FirstRefinement {
 }
 
 impl FirstRefinement {
-    /// Refines `auxiliary` once by `rule` and corrects the type-V face of every interpolated vertex (§3.3, §4):
+    /// Refines `auxiliary` once by `rule` and corrects the type-V face of every smooth interpolated vertex (§3.3, §4):
     /// W_k += ((W_c − W_k)·n) n + (I − W_c), then W_k ← I + s(W_k − I). n is the given normal or the average one
     /// of Eq. 10. Afterwards the centroid is I and the face lies in a plane perpendicular to n, so the limit surface
     /// passes through I with the normal ±n. Of all such corrections this is the smallest (Eq. 9).
@@ -239,21 +254,24 @@ impl FirstRefinement {
     /// refinement.
     ///
     /// # Errors
-    /// A mesh that is not closed; constraints that contradict each other or make no sense; a normal in whose plane
-    /// the face would have no area. All with the vertex.
+    /// What [`refine_by`] refuses; constraints that contradict each other or make no sense, or are about vertices that are not
+    /// smooth; a normal in whose plane the face would have no area. All with the vertex.
     ///
     /// # Panics
     /// If `points` or a list of constraints has not one entry a vertex.
     pub fn new(auxiliary: &Surface, rule: CornerRule, points: &[DVec3], constraints: &Constraints) -> Result<Self> {
         assert_eq!(points.len(), auxiliary.len(), "one point a vertex");
         constraints.check(points.len())?;
+        constraints.check_smooth(auxiliary)?;
         let normals = constraints.normals.map(unit_normals).transpose()?;
         let mut mesh = refine_by(rule, auxiliary)?;
-        let first_vertex_face = auxiliary.faces().len() + auxiliary.topology().edges();
+        let first_vertex_face = first_vertex_face(auxiliary);
+        // Those of sharp vertices hold no limit points.
+        let is_smooth = |v: usize| auxiliary.features().is_none_or(|features| features.is_smooth(v));
         let mut not_flattened = Vec::new();
         let mut ring = Vec::new();
         for (v, &point) in points.iter().enumerate() {
-            if !constraints.is_interpolated(v) {
+            if !constraints.is_interpolated(v) || !is_smooth(v) {
                 continue;
             }
             let face = mesh.faces.face(first_vertex_face + v);
@@ -277,7 +295,11 @@ impl FirstRefinement {
                 mesh.positions[c as usize] = point + scale * flat;
             }
         }
-        Ok(FirstRefinement { surface: Surface::of_valid(mesh), first_vertex_face, not_flattened })
+        let surface = match auxiliary.features() {
+            None => Surface::of_valid(mesh),
+            Some(_) => Refinement::DooSabin.refined_surface(auxiliary, mesh)?,
+        };
+        Ok(FirstRefinement { surface, first_vertex_face, not_flattened })
     }
 
     /// The mesh at `level`: 1 is the first refinement itself, each further one a Doo-Sabin step. The type-V face of
@@ -327,6 +349,7 @@ pub struct TwoPhase {
 /// ```
 pub fn interpolate(surface: &Surface, constraints: &Constraints, phase: &PhaseOne) -> Result<TwoPhase> {
     constraints.check(surface.len())?;
+    constraints.check_smooth(surface)?;
     let auxiliary = auxiliary(surface, constraints.interpolated, phase)?;
     let first = FirstRefinement::new(&auxiliary.surface, CornerRule::ZhengCai, surface.positions(), constraints)?;
     Ok(TwoPhase { auxiliary, first })

@@ -64,6 +64,7 @@ pub struct Features {
     sharp: Vec<u32>,
     creased: usize,
     curves: Vec<Curve>,
+    is_midway: bool,
     /// By half-edge, as in `sharp`, and by vertex.
     semi_sharp: Vec<(u32, f64)>,
     semi_sharp_vertices: Vec<(u32, f64)>,
@@ -128,7 +129,6 @@ impl Features {
             list.dedup_by_key(|entry| entry.0);
         }
         let corners = faces.corners();
-        let end = |c: u32| corners[incidence.next(faces, c) as usize];
         let pairs = pairs(faces, incidence, &sharp);
         let mut rules = vec![Rule::Smooth; n];
         for at in pairs.chunk_by(|a, b| a[0] == b[0]) {
@@ -149,50 +149,79 @@ impl Features {
         for v in resting {
             rules[v as usize] = Rule::Corner;
         }
-        let ends_of = |&(c, _): &(u32, f64)| [corners[c as usize], end(c)];
-        let semi = semi_sharp.iter().flat_map(ends_of).chain(semi_sharp_vertices.iter().map(|s| s.0));
-        for v in semi {
-            let rule = &mut rules[v as usize];
-            if *rule == Rule::Smooth {
-                *rule = Rule::SemiSharp;
-            }
-        }
+        set_semi_sharp(&mut rules, faces, incidence, &semi_sharp, &semi_sharp_vertices);
         let curves = curves(&pairs, &rules);
         let creased = sharp.len() - boundary.len();
-        Ok(Some(Features { rules, sharp, creased, curves, semi_sharp, semi_sharp_vertices }))
+        Ok(Some(Features { rules, sharp, creased, curves, is_midway: false, semi_sharp, semi_sharp_vertices }))
     }
 
-    /// Those of the mesh after a step that splits every edge in two by a vertex of its own, from its faces and topology: old
-    /// vertices come first and keep their rules, new ones on sharp edges are creases, all others smooth. `halves(c)` are the
-    /// half-edges of the finer mesh along half-edge `c`, in this order. O(N), and O(k log k) for k sharp edges.
+    /// Those of the mesh after a step that splits every sharp edge in as many parts, from its faces and topology: old
+    /// vertices come first and keep their rules, new ones on sharp edges are creases, and what is semi-sharp has lost 1; all
+    /// others are smooth. `None` if nothing is sharp any more. `pieces(c, put)` puts the half-edges of the finer mesh along
+    /// half-edge `c`, in this order. O(N), and O(k log k) for k sharp edges.
     pub(crate) fn refined(
         &self,
         faces: &Faces,
         topology: &Topology,
         coarse: &Topology,
-        halves: impl Fn(u32) -> [u32; 2],
-    ) -> Self {
+        pieces: impl Fn(u32, &mut Vec<u32>),
+    ) -> Option<Self> {
+        let (mut along, mut back) = (Vec::new(), Vec::new());
+        let mut first_sides = |c: u32, put: &mut Vec<u32>| {
+            along.clear();
+            back.clear();
+            pieces(c, &mut along);
+            match coarse.twin(c) {
+                Some(t) => pieces(t, &mut back),
+                None => back.extend(along.iter().rev()),
+            }
+            // The twin's, in the order of this side.
+            put.extend(along.iter().zip(back.iter().rev()).map(|(&a, &b)| a.min(b)));
+        };
         let mut sharp: Vec<u32> = Vec::with_capacity(2 * self.sharp.len());
         for &c in &self.sharp {
-            let along = halves(c);
-            // The twin's halves, in the order of this side.
-            let back = coarse.twin(c).map_or(along, |t| {
-                let [first, second] = halves(t);
-                [second, first]
-            });
-            sharp.extend([along[0].min(back[0]), along[1].min(back[1])]);
+            first_sides(c, &mut sharp);
         }
+        let parts = sharp.len() / self.sharp.len().max(1);
         sharp.par_sort_unstable();
+        let left = |list: &[(u32, f64)]| -> Vec<(u32, f64)> {
+            list.iter().map(|&(k, s)| (k, s - 1.0)).filter(|entry| entry.1 > 0.0).collect()
+        };
+        let mut semi_sharp: Vec<(u32, f64)> = Vec::new();
+        let mut parts_of = Vec::new();
+        for (c, s) in left(&self.semi_sharp) {
+            parts_of.clear();
+            first_sides(c, &mut parts_of);
+            semi_sharp.extend(parts_of.iter().map(|&c| (c, s)));
+        }
+        semi_sharp.sort_unstable_by_key(|entry| entry.0);
+        let semi_sharp_vertices = left(&self.semi_sharp_vertices);
         let incidence = &topology.incidence;
         let pairs = pairs(faces, incidence, &sharp);
         let mut rules = self.rules.clone();
         rules.resize(incidence.vertices(), Rule::Smooth);
+        if self.is_semi_sharp() {
+            let smooth = |_, rule: &mut Rule| *rule = if *rule == Rule::SemiSharp { Rule::Smooth } else { *rule };
+            parallel::change(&mut rules, smooth);
+            set_semi_sharp(&mut rules, faces, incidence, &semi_sharp, &semi_sharp_vertices);
+        }
         for pair in pairs.iter().filter(|pair| pair[0] as usize >= self.rules.len()) {
             rules[pair[0] as usize] = Rule::Crease;
         }
+        if sharp.is_empty() && parallel::all(rules.len(), |v| rules[v] == Rule::Smooth) {
+            return None;
+        }
         let curves = curves(&pairs, &rules);
-        let (semi_sharp, semi_sharp_vertices) = (Vec::new(), Vec::new());
-        Features { rules, sharp, creased: 2 * self.creased, curves, semi_sharp, semi_sharp_vertices }
+        Some(Features {
+            rules,
+            sharp,
+            creased: parts * self.creased,
+            curves,
+            // Of two steps that split edges in three, the first leaves sharp ones whole.
+            is_midway: parts == 1,
+            semi_sharp,
+            semi_sharp_vertices,
+        })
     }
 
     /// Calls `visit(v, [a, b])` for every crease vertex and its two neighbours along the curve.
@@ -227,6 +256,17 @@ impl Features {
         &self.sharp
     }
 
+    /// Both half-edges of each sharp edge, or the one that it has.
+    pub(crate) fn sharp_sides<'a>(&'a self, topology: &'a Topology) -> impl Iterator<Item = u32> + 'a {
+        self.sharp.iter().flat_map(|&c| std::iter::once(c).chain(topology.twin(c)))
+    }
+
+    /// Whether the edge of half-edge `c` is sharp. O(log k) for k sharp edges.
+    pub(crate) fn is_sharp(&self, topology: &Topology, c: u32) -> bool {
+        let first = topology.twin(c).map_or(c, |t| t.min(c));
+        self.sharp.binary_search(&first).is_ok()
+    }
+
     /// The semi-sharp edges, as [`sharp_half_edges`](Self::sharp_half_edges), with their sharpness.
     pub fn semi_sharp_edges(&self) -> &[(u32, f64)] {
         &self.semi_sharp
@@ -255,17 +295,30 @@ impl Features {
         found.map_or(0.0, |at| self.semi_sharp_vertices[at].1)
     }
 
-    /// The vertices on curves where a semi-sharp edge ends, or that are semi-sharp themselves, ascending, with their rule.
-    pub(crate) fn semi_sharp_on_curves(&self, surface: &Surface) -> Vec<(u32, Rule)> {
+    /// The vertices that are semi-sharp themselves, or at the ends of semi-sharp edges, ascending.
+    pub(crate) fn at_semi_sharp(&self, surface: &Surface) -> Vec<u32> {
+        let mut all = touched(surface.faces(), surface.incidence(), &self.semi_sharp, &self.semi_sharp_vertices);
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// By vertex: whether the first step of refinement takes it by the rule of creases or of corners: two sharp or semi-sharp
+    /// edges or more, or a sharpness of its own. At darts, and where one edge is semi-sharp, it does not.
+    pub(crate) fn held_at_first(&self, surface: &Surface) -> Vec<bool> {
         let (faces, incidence) = (surface.faces(), surface.incidence());
         let corners = faces.corners();
-        let ends = |&(c, _): &(u32, f64)| [corners[c as usize], corners[incidence.next(faces, c) as usize]];
-        let all = self.semi_sharp.iter().flat_map(ends).chain(self.semi_sharp_vertices.iter().map(|s| s.0));
-        let mut found: Vec<(u32, Rule)> =
-            all.map(|v| (v, self.rules[v as usize])).filter(|s| s.1 == Rule::Crease).collect();
-        found.sort_unstable_by_key(|s| s.0);
-        found.dedup();
-        found
+        let mut edges = vec![0u8; self.rules.len()];
+        for &c in self.sharp.iter().chain(self.semi_sharp.iter().map(|(c, _)| c)) {
+            for v in [corners[c as usize], corners[incidence.next(faces, c) as usize]] {
+                let count = &mut edges[v as usize];
+                *count = (*count + 1).min(2);
+            }
+        }
+        let mut held: Vec<bool> =
+            edges.iter().zip(&self.rules).map(|(&count, &rule)| count == 2 || rule == Rule::Corner).collect();
+        self.semi_sharp_vertices.iter().for_each(|&(v, _)| held[v as usize] = true);
+        held
     }
 
     /// The number of sharp edges with two faces.
@@ -288,11 +341,40 @@ impl Features {
         self.is_semi_sharp() || !parallel::all(self.rules.len(), |v| self.rules[v] != Rule::Dart)
     }
 
+    /// Whether the mesh comes of the first of two steps of a √3 refinement, of which the second splits the sharp edges in
+    /// three. Systems take every mesh as one that is given, which is not.
+    pub fn is_midway(&self) -> bool {
+        self.is_midway
+    }
+
     /// How many vertices follow a rule.
     pub fn count(&self, rule: Rule) -> usize {
         let counts =
             parallel::map(self.rules.len(), CHUNK, |range| self.rules[range].iter().filter(|&&r| r == rule).count());
         counts.into_iter().sum()
+    }
+}
+
+/// The ends of semi-sharp edges, and semi-sharp vertices, in any order.
+fn touched(faces: &Faces, incidence: &Incidence, edges: &[(u32, f64)], vertices: &[(u32, f64)]) -> Vec<u32> {
+    let corners = faces.corners();
+    let ends = |&(c, _): &(u32, f64)| [corners[c as usize], corners[incidence.next(faces, c) as usize]];
+    edges.iter().flat_map(ends).chain(vertices.iter().map(|entry| entry.0)).collect()
+}
+
+/// What semi-sharp edges and vertices make of smooth ones.
+fn set_semi_sharp(
+    rules: &mut [Rule],
+    faces: &Faces,
+    incidence: &Incidence,
+    edges: &[(u32, f64)],
+    vertices: &[(u32, f64)],
+) {
+    for v in touched(faces, incidence, edges, vertices) {
+        let rule = &mut rules[v as usize];
+        if *rule == Rule::Smooth {
+            *rule = Rule::SemiSharp;
+        }
     }
 }
 

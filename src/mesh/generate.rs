@@ -439,5 +439,43 @@ pub fn ring_sphere(n: usize) -> Mesh {
     Mesh::new(positions, faces)
 }
 
+/// An open disc: a vertex 0 with `n` faces of `size` corners about it, their other corners on a circle.
+///
+/// # Panics
+/// If n or `size` is below 3.
+pub fn disc(n: usize, size: usize) -> Mesh {
+    assert!(n >= 3 && size >= 3, "three faces of three corners at the least");
+    let rim = (size - 2) * n;
+    let mut faces = Faces::default();
+    for k in 0..n {
+        let corners = (0..size - 1).map(|j| (1 + ((size - 2) * k + j) % rim) as u32);
+        faces.push(&std::iter::once(0).chain(corners).collect::<Vec<_>>());
+    }
+    let on_circle = |k: usize| {
+        let (sin, cos) = (TAU * k as f64 / rim as f64).sin_cos();
+        DVec3::new(cos, sin, 0.0)
+    };
+    Mesh::new(std::iter::once(DVec3::Z).chain((1..=rim).map(on_circle)).collect(), faces)
+}
+
+/// An open triangle with `m` edges a side: a regular grid of m² triangles, not flat.
+pub fn triangle(m: usize) -> Mesh {
+    let number = |a: usize, b: usize| (a * (2 * m + 3 - a) / 2 + b) as u32;
+    let mut faces = Faces::default();
+    let mut points = Vec::new();
+    for a in 0..=m {
+        for b in 0..=m - a {
+            points.push(DVec3::new(a as f64, b as f64, (a * b) as f64));
+            if a + b < m {
+                faces.push(&[number(a, b), number(a + 1, b), number(a, b + 1)]);
+            }
+            if a + b + 1 < m {
+                faces.push(&[number(a + 1, b), number(a + 1, b + 1), number(a, b + 1)]);
+            }
+        }
+    }
+    Mesh::new(points, faces)
+}
+
 #[cfg(test)]
 mod tests;

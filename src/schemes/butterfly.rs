@@ -1,6 +1,13 @@
-//! The modified Butterfly scheme (Zorin, Schröder & Sweldens 1996) on closed triangle meshes: interpolatory,
+//! The modified Butterfly scheme (Zorin, Schröder & Sweldens 1996) on triangle meshes: interpolatory,
 //! so limit points are the vertices themselves. The tension parameter w is 0, which leaves the 8-point
 //! stencil at edges of two regular vertices.
+//!
+//! Sharp edges (those of a boundary, creases) take the four-point rule (−1, 9, 9, −1)/16 along their curve, whose polygon goes
+//! on beyond an end by the mirrored point 2·end − next; so the curve depends on nothing beside it. At the other edges of a sharp
+//! vertex its own mask would need a ring that is not there: it counts as regular. A wing that lies beyond a sharp side xy of a
+//! triangle xyz, where there is nothing or another surface, is the mirrored point x + y − z. It continues the lattice of
+//! a regular mesh, so that linear functions are reproduced up to the boundary; and both sides of a crease are
+//! refined without each other.
 
 use std::f64::consts::TAU;
 
@@ -8,10 +15,16 @@ use glam::DVec3;
 
 use super::interpolatory::{RegularMask, SQRT_3, tangents, vertices};
 use super::loop_scheme::{refined_topology, split_in_four};
+use super::refined;
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::ring::{Place, RingRule, Rings};
-use super::star::{Tangents, next_in_triangle, prev_in_triangle, require_room, require_triangles, twin};
+use super::sharp::{Polygons, mirrored};
+use super::star::{
+    Tangents, across, next_in_triangle, prev_in_triangle, require_no_pillow, require_no_semi_sharp, require_room,
+    require_triangles,
+};
 use crate::Result;
+use crate::mesh::edge_numbers::EdgeNumbers;
 use crate::mesh::{Mesh, Surface};
 use crate::pages::large;
 use crate::parallel;
@@ -67,55 +80,97 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     name: NAME,
     class: Class::Interpolatory,
     needs_triangles: true,
+    check,
     refine,
     refined_topology,
-    halves: None,
+    refined_features: |surface, refined, topology| {
+        refined::features_of_pieces(surface, refined, topology, refined::halves_in_fours)
+    },
     size: Size::in_four,
     limit_positions: |surface| vertices(NAME, surface),
     limit_normals,
 };
 
+/// Refuses what Loop's refinement does, and what is semi-sharp.
+fn check(surface: &Surface) -> Result<()> {
+    require_triangles(surface, NAME)?;
+    require_no_pillow(surface)?;
+    require_no_semi_sharp(surface, NAME)
+}
+
 /// One step.
 ///
 /// An edge of two regular vertices (valence 6) takes the 8-point stencil, one with an extraordinary vertex that
 /// vertex's mask, one with two the mean of both. Vertices and faces are numbered as by
-/// [`loop_scheme::refine`](super::loop_scheme::refine).
+/// [`loop_scheme::refine`](super::loop_scheme::refine). Sharp edges, and those beside them, take the rules
+/// [above](self).
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary, a face is
-/// no triangle (the first is named), a vertex has valence < 3, or the result is too large for 32-bit indices.
+/// As [`loop_scheme::refine`](super::loop_scheme::refine).
 pub fn refine(surface: &Surface) -> Result<Mesh> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_triangles(surface, NAME)?;
+    check(surface)?;
     require_room(mesh, 4)?;
     let rule = RingRule { place: Place::Edge, mask: |n| (CENTER, extraordinary_mask(n)), amplitudes };
     let rings = Rings::new(surface, rule);
     let edges = topology.edge_numbers();
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
     parallel::append(&mut positions, &mesh.positions);
+    let at = |c: usize| mesh.positions[mesh.faces.corners()[c] as usize];
     edges.extend(&mut positions, |c| {
-        let t = twin(topology, c);
-        match [c, t].map(|c| rings.is_extraordinary(c)) {
-            [false, false] => regular(surface, c) + regular(surface, t),
-            [true, false] => rings.point(c),
-            [false, true] => rings.point(t),
-            [true, true] => 0.5 * (rings.point(c) + rings.point(t)),
-        }
+        point(surface, &rings, c, |side| at(prev_in_triangle(across(topology, side as u32))))
     });
+    set_at_sharp_edges(&mut positions[mesh.len()..], surface, &rings, &edges);
     Ok(Mesh::new(positions, split_in_four(mesh, &edges)))
 }
 
+/// The new point of the edge of half-edge `c`; `beyond(side)` is the vertex across a side of its triangles.
+fn point(surface: &Surface, rings: &Rings, c: u32, beyond: impl Fn(usize) -> DVec3) -> DVec3 {
+    let t = across(surface.topology(), c);
+    match [c, t].map(|c| rings.is_extraordinary(c)) {
+        [false, false] => regular(surface, c, &beyond) + regular(surface, t, &beyond),
+        [true, false] => rings.point(c),
+        [false, true] => rings.point(t),
+        [true, true] => 0.5 * (rings.point(c) + rings.point(t)),
+    }
+}
+
 /// The regular stencil's half on the side of half-edge `c`.
-fn regular(surface: &Surface, c: u32) -> DVec3 {
-    let (mesh, topology) = (surface.mesh(), surface.topology());
+fn regular(surface: &Surface, c: u32, beyond: impl Fn(usize) -> DVec3) -> DVec3 {
+    let mesh = surface.mesh();
     let [end, opposite, wing] = REGULAR;
     let at = |c: usize| mesh.positions[mesh.faces.corners()[c] as usize];
     let (next, prev) = (next_in_triangle(c), prev_in_triangle(c));
-    let across = |side: usize| at(prev_in_triangle(twin(topology, side as u32)));
-    end * at(c as usize) + opposite * at(prev) + wing * (across(next) + across(prev))
+    end * at(c as usize) + opposite * at(prev) + wing * (beyond(next) + beyond(prev))
 }
 
-/// The tangents of the limit surface at all vertices, found in the mesh refined once, which is what they cost.
+/// Sets the points of sharp edges, and of the other edges of their triangles, whose wings lie beyond. `points` is one an edge.
+/// O(k log k) for k sharp edges, by one thread.
+fn set_at_sharp_edges(points: &mut [DVec3], surface: &Surface, rings: &Rings, edges: &EdgeNumbers) {
+    let Some(features) = surface.features() else { return };
+    let (old, topology, corners) = (surface.positions(), surface.topology(), surface.faces().corners());
+    let at = |c: usize| old[corners[c] as usize];
+    let beyond = |side: usize| match features.is_sharp(topology, side as u32) {
+        true => mirrored(surface, side as u32),
+        false => at(prev_in_triangle(across(topology, side as u32))),
+    };
+    let polygons = Polygons::new(old, features);
+    for &sharp in features.sharp_half_edges() {
+        let ends = [sharp as usize, next_in_triangle(sharp)].map(|c| corners[c] as usize);
+        let [before, a, b, after] = polygons.about(ends);
+        points[edges.of(sharp) as usize] = 0.5625 * (a + b) - 0.0625 * (before + after);
+    }
+    for side in features.sharp_sides(topology) {
+        for c in [next_in_triangle(side) as u32, prev_in_triangle(side) as u32] {
+            if !features.is_sharp(topology, c) {
+                points[edges.of(c) as usize] = point(surface, rings, c, beyond);
+            }
+        }
+    }
+}
+
+/// The tangents of the limit surface at all smooth vertices, found in the mesh refined once, which is what they cost. Sharp
+/// vertices have none.
 ///
 /// # Errors
 /// As [`refine`].

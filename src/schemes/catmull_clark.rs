@@ -16,7 +16,6 @@ use super::star::{
 };
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
-use crate::mesh::features::Rule;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
@@ -52,10 +51,18 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     name: "catmull-clark",
     class: Class::Primal,
     needs_triangles: false,
+    check: require_rules,
     refine,
     refined_topology,
-    halves: Some(refined::halves_in_quads),
-    size: |c| Size { vertices: c.vertices + c.edges() + c.faces, faces: c.corners, corners: 4 * c.corners },
+    refined_features: |surface, refined, topology| {
+        refined::features_of_pieces(surface, refined, topology, refined::halves_in_quads)
+    },
+    size: |c| Size {
+        vertices: c.vertices + c.edges() + c.faces,
+        faces: c.corners,
+        corners: 4 * c.corners,
+        has_features: c.has_features,
+    },
     limit_positions,
     limit_normals,
 };
@@ -67,7 +74,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// (vertex, edge leaving it, face, edge entering it).
 ///
 /// The points of sharp edges are their midpoints, of crease vertices (a + 6v + b)/8 with the neighbours a and b along the
-/// curve; corners rest; darts follow the rule of smooth vertices.
+/// curve; corners rest; darts follow the rule of smooth vertices; what is semi-sharp blends these with the smooth points.
 ///
 /// # Errors
 /// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
@@ -174,7 +181,8 @@ pub fn limit_mask(n: usize) -> [f64; 3] {
 /// The limit points of all vertices, of any valence and beside faces of any size:
 /// ((n²−n) v + Σ_j 2 e_j + Σ_F 4 c_F)/(n(n+5)), c_F the centroids, which is [`limit_mask`] with the
 /// opposite corner of each face replaced by 4c_F − v − e_j − e_{j+1} (Thall Eq. 14). On curves (a + 4v + b)/6 with the
-/// neighbours a and b along the curve; corners rest; at darts [`dart_mask`], with opposite corners replaced likewise.
+/// neighbours a and b along the curve; corners rest; at darts [`dart_mask`], with opposite corners replaced likewise; what is
+/// semi-sharp has the rows of its steps.
 ///
 /// # Errors
 /// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior.
@@ -192,20 +200,7 @@ pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
         let n = topology.incidence.face_count(v) as f64;
         *limit = ((n * n - n) * mesh.positions[v] + *limit) / (n * (n + 5.0));
     }
-    if let Some(features) = surface.features() {
-        sharp::set_limits(&mut limits, surface, CUBIC);
-        let mut star = Vec::new();
-        for v in features.with_rule(Rule::Dart) {
-            sharp::dart_star(surface, features, v, &mut star);
-            let mask = dart_mask(star.len());
-            let seen = |c: u32| mesh.positions[mesh.faces.corners()[c as usize] as usize] - mesh.positions[v];
-            let masks = star.iter().zip(mask[1..].as_chunks::<2>().0);
-            let moved = masks.map(|(&c, &[edge, face])| {
-                edge * seen(topology.incidence.next(&mesh.faces, c)) + face * opposite(surface, c, v)
-            });
-            limits[v] = mesh.positions[v] + moved.sum::<DVec3>();
-        }
-    }
+    sharp::set_limits(&mut limits, surface, CUBIC, Some(StarRule::CatmullClark));
     Ok(limits)
 }
 

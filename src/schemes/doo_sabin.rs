@@ -1,15 +1,20 @@
-//! Doo-Sabin subdivision (Doo & Sabin 1978) of any closed polygon mesh, and the modified first step of Zheng &
-//! Cai, after which Doo-Sabin goes on. A vertex's limit point is the centroid of its type-V face after the first
-//! step: the point that Nasri's system, or Zheng and Cai's, puts on the given one.
+//! Doo-Sabin subdivision (Doo & Sabin 1978) of any polygon mesh, and the modified first step of Zheng & Cai, after
+//! which Doo-Sabin goes on. A vertex's limit point is the centroid of its type-V face after the first step: the point
+//! that Nasri's system, or Zheng and Cai's, puts on the given one. Sharp edges, those of a boundary too, are cut by
+//! Chaikin's rule, so that their curves are quadratic B-splines.
 
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use super::chaikin;
 use super::refined::{self, push_ends, set_by_edge, set_rows};
 use super::refinement::{Class, RefinementRules, Size};
-use super::star::{CHUNK, Circle, Tangents, centroid, for_each_star, put_stars, require_closed, require_room, twin};
+use super::scheme::QUADRATIC;
+use super::sharp;
+use super::star::{CHUNK, Circle, Tangents, centroid, for_each_star, put_stars, require_curves, require_room, twin};
 use crate::Result;
+use crate::mesh::features::Features;
 use crate::mesh::incidence::split_by_face;
 use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::filled;
@@ -23,11 +28,21 @@ pub enum CornerRule {
     DooSabin,
     /// V'_i = (V_i + centroid)/2 (Zheng-Cai Eq. 4), meant for the first step only.
     ZhengCai,
+    /// V'_i = ½V_i + ¼(V_{i−1} + V_{i+1}): two steps of [mid-edge](super::mid_edge) at once.
+    MidEdge,
 }
 
 impl CornerRule {
+    /// The rule of all steps after one by this.
+    pub(super) fn further(self) -> Self {
+        match self {
+            CornerRule::DooSabin | CornerRule::ZhengCai => CornerRule::DooSabin,
+            CornerRule::MidEdge => CornerRule::MidEdge,
+        }
+    }
+
     /// The weights of the corners of an `m`-gon in its corner 0, in order. Doo-Sabin: (m+5)/(4m), then
-    /// (3 + 2cos(2πj/m))/(4m); Zheng-Cai: ½ + 1/(2m), then 1/(2m).
+    /// (3 + 2cos(2πj/m))/(4m); Zheng-Cai: ½ + 1/(2m), then 1/(2m); mid-edge: ½, and ¼ on both sides.
     pub fn circulant(self, m: usize) -> Vec<f64> {
         let size = m as f64;
         let weight = |j: usize| match (self, j) {
@@ -35,6 +50,9 @@ impl CornerRule {
             (CornerRule::DooSabin, _) => (3.0 + 2.0 * (TAU * j as f64 / size).cos()) / (4.0 * size),
             (CornerRule::ZhengCai, 0) => 0.5 + 0.5 / size,
             (CornerRule::ZhengCai, _) => 0.5 / size,
+            (CornerRule::MidEdge, 0) => 0.5,
+            (CornerRule::MidEdge, j) if j == 1 || j + 1 == m => 0.25,
+            (CornerRule::MidEdge, _) => 0.0,
         };
         (0..m).map(weight).collect()
     }
@@ -57,7 +75,9 @@ pub fn corner_points(mesh: &Mesh, rule: CornerRule) -> Vec<DVec3> {
     points
 }
 
-fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: CornerRule, points: &mut [DVec3]) {
+/// The new points of the corners of a face, `circle` having as many.
+pub(super) fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: CornerRule, points: &mut [DVec3]) {
+    let corner = |k: usize| positions[face[k % face.len()] as usize];
     let size = face.len() as f64;
     let (mut sum, mut cosine, mut sine) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
     for (&v, unit) in face.iter().zip(circle) {
@@ -66,24 +86,28 @@ fn face_points(positions: &[DVec3], face: &[u32], circle: &[DVec2], rule: Corner
         cosine += unit.x * point;
         sine += unit.y * point;
     }
-    for ((&v, unit), new) in face.iter().zip(circle).zip(points) {
+    for (k, ((&v, unit), new)) in face.iter().zip(circle).zip(points).enumerate() {
         let point = positions[v as usize];
         *new = match rule {
             CornerRule::DooSabin => 0.25 * point + (0.75 * sum + 0.5 * (unit.x * cosine + unit.y * sine)) / size,
             CornerRule::ZhengCai => 0.5 * (point + sum / size),
+            CornerRule::MidEdge => 0.5 * point + 0.25 * (corner(k + 1) + corner(k + face.len() - 1)),
         };
     }
 }
 
+const NAME: &str = "doo-sabin";
+
 /// All that defines the refinement.
 pub(super) const RULES: RefinementRules = RefinementRules {
-    name: "doo-sabin",
+    name: NAME,
     class: Class::Dual,
     needs_triangles: false,
+    check: |surface| require_curves(surface, NAME),
     refine,
     refined_topology,
-    halves: None,
-    size: |c| Size { vertices: c.corners, faces: c.faces + c.edges() + c.vertices, corners: 4 * c.corners },
+    refined_features: chaikin::refined_features,
+    size: Size::dual,
     limit_positions: |surface| limit_positions(CornerRule::DooSabin, surface),
     limit_normals: |surface| limit_normals(CornerRule::DooSabin, surface),
 };
@@ -96,18 +120,30 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
     refine_by(CornerRule::DooSabin, surface)
 }
 
-/// One step by either rule.
+/// One step by a rule.
 ///
 /// Vertices of the result: one for each old corner, in corner order. Faces of the result: type F, one for each
 /// old face, its corners in order; type E, a quad for each edge (in order of its first half-edge); type V, one
 /// for each old vertex, so that the face of vertex v has index F + E + v.
 ///
+/// On an open or creased mesh the vertices of old corners are followed by two of every sharp edge (a, b), ¾a + ¼b and ¼a + ¾b, in
+/// the order of [`sharp_half_edges`](crate::mesh::features::Features::sharp_half_edges), and then by the old vertices that are
+/// corners, which stay. A sharp edge has a quad in each of its faces, between its two points and the corners there: that in the
+/// face of its first half-edge in the edge's own place, the second ones, X for as many creased edges, after the quads of all
+/// edges. A vertex has a face of type V between each two of its sharp edges, the first of which has index F + E + X + v; all
+/// further ones come last. Inside the surface a corner with less than three sharp edges has a triangle for each two points about
+/// it.
+///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or the
-/// result is too large for 32-bit indices.
+/// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
+/// [`Error::Dart`](crate::Error::Dart), [`Error::SemiSharp`](crate::Error::SemiSharp);
+/// [`Error::TooLarge`](crate::Error::TooLarge) if 32-bit indices do not reach the result.
 pub fn refine_by(rule: CornerRule, surface: &Surface) -> Result<Mesh> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_closed(surface)?;
+    require_curves(surface, NAME)?;
+    if let Some(features) = surface.features() {
+        return chaikin::refine(rule, surface, features);
+    }
     require_room(mesh, 4)?;
     let count = mesh.faces.corners().len();
     let incidence = &topology.incidence;
@@ -132,19 +168,30 @@ pub fn refine_by(rule: CornerRule, surface: &Surface) -> Result<Mesh> {
     Ok(Mesh::new(corner_points(mesh, rule), Faces::from_parts(offsets, corners)))
 }
 
-/// The topology of `refined`, which is what [`refine_by`] made of the surface.
-pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
-    refined::of_corners(surface, refined)
+/// The index of the type-V face of vertex 0 after a step; the first one of every vertex follows in order.
+pub fn first_vertex_face(surface: &Surface) -> usize {
+    let creased = surface.features().map_or(0, Features::creased_edges);
+    surface.faces().len() + surface.topology().edges() + creased
 }
 
-/// The limit points of all vertices when the first step is by `rule` and all others are Doo-Sabin: the
-/// centroids of the type-V faces, (1/n) Σ of the vertex's corner points.
+/// The topology of `refined`, which is what [`refine_by`] made of the surface: with sharp edges, where faces of type V have
+/// sizes of their own, from its faces.
+pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
+    match surface.features() {
+        None => refined::of_corners(surface, refined),
+        Some(_) => Topology::new(&refined.faces, refined.len()),
+    }
+}
+
+/// The limit points of all vertices when the first step is by `rule` and all others are Doo-Sabin, or mid-edge too: the
+/// centroids of the type-V faces, (1/n) Σ of the vertex's corner points. On curves (a + 6v + b)/8 with the neighbours a
+/// and b along the curve; corners rest.
 ///
 /// # Errors
-/// [`Error::Open`](crate::Error::Open).
+/// [`Error::Open`](crate::Error::Open), [`Error::Dart`](crate::Error::Dart), [`Error::SemiSharp`](crate::Error::SemiSharp).
 pub fn limit_positions(rule: CornerRule, surface: &Surface) -> Result<Vec<DVec3>> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_closed(surface)?;
+    require_curves(surface, NAME)?;
     let mut limits = vec![DVec3::ZERO; mesh.len()];
     for (&v, point) in mesh.faces.corners().iter().zip(corner_points(mesh, rule)) {
         limits[v as usize] += point;
@@ -152,13 +199,17 @@ pub fn limit_positions(rule: CornerRule, surface: &Surface) -> Result<Vec<DVec3>
     for (v, limit) in limits.iter_mut().enumerate() {
         *limit /= topology.incidence.face_count(v) as f64;
     }
+    if let Some(features) = surface.features() {
+        sharp::set_vertices(&mut limits, surface.positions(), features, QUADRATIC);
+    }
     Ok(limits)
 }
 
-/// The unit normals of the limit surface at the [`limit_positions`]; zero where [`Tangents::normal`] is.
+/// The unit normals of the limit surface at the [`limit_positions`]; zero where [`Tangents::normal`] is, and where the surface
+/// has several: on creases, and at corners that are inside or have sharp edges between the two of a boundary.
 ///
 /// # Errors
-/// [`Error::Open`](crate::Error::Open).
+/// As [`limit_positions`].
 pub fn limit_normals(rule: CornerRule, surface: &Surface) -> Result<Vec<DVec3>> {
     let mesh = surface.mesh();
     let limits = limit_positions(rule, surface)?;
@@ -169,6 +220,10 @@ pub fn limit_normals(rule: CornerRule, surface: &Surface) -> Result<Vec<DVec3>> 
         let ring = star.iter().map(|&c| points[c as usize]);
         normals.push(ring_normal(limits[v], ring, circle.of(star.len())));
     });
+    if let Some(features) = surface.features() {
+        let rules = (rule, rule.further());
+        chaikin::for_each_tangents(surface, features, rules, |v, pair| normals[v] = pair.normal());
+    }
     Ok(normals)
 }
 

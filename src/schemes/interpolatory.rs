@@ -25,8 +25,9 @@ pub(super) fn vertices(name: &'static str, surface: &Surface) -> Result<Vec<DVec
     Ok(mesh.positions.clone())
 }
 
-/// The tangents at the vertices 0 to `originals` − 1 of a closed triangle mesh, in which they are the only vertices
-/// that may be extraordinary (valence other than 6), and are apart by as many edges as the mask reaches.
+/// The tangents at the vertices 0 to `originals` − 1 of a triangle mesh, in which they are the only vertices
+/// that may be extraordinary (valence other than 6), and are apart by as many edges as the mask reaches, and so far from sharp
+/// edges that do not end at them. Sharp vertices have none.
 ///
 /// At an extraordinary vertex the rule of both schemes maps the ring to the ring by a circulant, so the first harmonic
 /// of the ring is the mask.
@@ -37,7 +38,7 @@ pub(super) fn tangents(surface: &Surface, originals: usize, mask: &RegularMask) 
     let turned = |c: u32, times: usize| {
         (0..times).fold(c, |c, _| {
             let next = topology.counter_clockwise(&mesh.faces, c);
-            next.expect("a closed mesh has no last corner")
+            next.expect("a smooth vertex has no last corner")
         })
     };
     // On through the regular vertex at the end of `c`, and 60° to the left of that.
@@ -47,6 +48,10 @@ pub(super) fn tangents(surface: &Surface, originals: usize, mask: &RegularMask) 
     let mut ring: Vec<DVec3> = Vec::new();
     let mut star = Vec::new();
     for v in 0..originals {
+        if surface.features().is_some_and(|f| !f.is_smooth(v)) {
+            found.push(Tangents::default());
+            continue;
+        }
         topology.star(&mesh.faces, v, &mut star);
         let center = mesh.positions[v];
         if star.len() != 6 {

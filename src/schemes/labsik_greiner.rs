@@ -1,4 +1,4 @@
-//! Labsik & Greiner's interpolatory √3 scheme (2000) on closed triangle meshes: a new vertex in every triangle, old
+//! Labsik & Greiner's interpolatory √3 scheme (2000) on triangle meshes: a new vertex in every triangle, old
 //! edges flipped, old vertices left where they are, so limit points are the vertices themselves.
 //!
 //! The 12-point mask of a triangle of three regular vertices (valence 6) is the only symmetric one on these points
@@ -9,16 +9,23 @@
 //! valence 6, as the scale of the scheme wants it). This determines the mask ([`extraordinary_mask`]).
 //! OpenMesh's subdivider of that name, which cites the paper, has the same numbers at every valence; the paper
 //! itself was not at hand.
+//!
+//! Along sharp edges every second step interpolates by cubics, (−5, 60, 30, −4)/81; beyond the ends of curves the polygon goes
+//! on by the mirrored point. What the mask of a triangle needs beyond a sharp edge xy of a triangle xyz is mirrored
+//! too: x + y − z, then 2x − z and 2y − z. Sharp vertices count as regular.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
 use super::interpolatory::{RegularMask, SQRT_3, tangents, vertices};
+use super::refined;
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::ring::{Place, RingRule, Rings};
+use super::sharp::mirrored;
 use super::sqrt3::{flip, refined_topology};
-use super::star::{Tangents, prev_in_triangle, require_room, require_triangles, twin};
+use super::star::{Tangents, across, next_in_triangle, prev_in_triangle, require_room};
+use super::thirds;
 use crate::Result;
 use crate::mesh::{Mesh, Surface};
 use crate::pages::large;
@@ -85,9 +92,12 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     name: NAME,
     class: Class::Interpolatory,
     needs_triangles: true,
+    check: |surface| thirds::require(surface, NAME),
     refine,
     refined_topology,
-    halves: None,
+    refined_features: |surface, refined, topology| {
+        refined::features_of_pieces(surface, refined, topology, thirds::pieces)
+    },
     size: Size::in_three,
     limit_positions: |surface| vertices(NAME, surface),
     limit_normals,
@@ -99,61 +109,106 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// vertices' masks. Vertices and faces are numbered as by [`sqrt3::refine`](super::sqrt3::refine).
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary, a face is no triangle (the first is
-/// named), or the result is too large for 32-bit indices.
+/// As [`sqrt3::refine`](super::sqrt3::refine).
 pub fn refine(surface: &Surface) -> Result<Mesh> {
     let mesh = surface.mesh();
-    require_triangles(surface, NAME)?;
+    thirds::require(surface, NAME)?;
     require_room(mesh, 3)?;
     let rule = RingRule { place: Place::Triangle, mask: extraordinary_mask, amplitudes };
     let rings = Rings::new(surface, rule);
-    let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
+    let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len() + surface.boundary_edges()));
     parallel::append(&mut positions, &mesh.positions);
-    let center = |f: usize| {
-        let own = [0, 1, 2].map(|i| 3 * f as u32 + i);
-        let extraordinary = own.map(|c| rings.is_extraordinary(c));
-        let sharing = extraordinary.map(usize::from).iter().sum::<usize>();
-        if sharing == 0 {
-            return regular(surface, own);
-        }
-        let mut sum = DVec3::ZERO;
-        for (c, extraordinary) in own.into_iter().zip(extraordinary) {
-            if extraordinary {
-                sum += rings.point(c);
-            }
-        }
-        sum / sharing as f64
-    };
-    parallel::extend(&mut positions, mesh.faces.len(), |_| center);
+    parallel::extend(&mut positions, mesh.faces.len(), |_| |f| center(surface, &rings, f, |_| None));
+    for f in beside_sharp_edges(surface) {
+        positions[mesh.len() + f] = center(surface, &rings, f, |side| beyond(surface, side));
+    }
+    thirds::set_thirds(&mut positions, surface, |_, _| 1.0);
     Ok(Mesh::new(positions, flip(surface)))
 }
 
+/// The new point of a triangle; `beyond(side)` is what is put across a side, if anything.
+fn center(surface: &Surface, rings: &Rings, f: usize, beyond: impl Fn(u32) -> Option<DVec3>) -> DVec3 {
+    let own = [0, 1, 2].map(|i| 3 * f as u32 + i);
+    let extraordinary = own.map(|c| rings.is_extraordinary(c));
+    let sharing = extraordinary.map(usize::from).iter().sum::<usize>();
+    if sharing == 0 {
+        return regular(surface, own, beyond);
+    }
+    let mut sum = DVec3::ZERO;
+    for (c, extraordinary) in own.into_iter().zip(extraordinary) {
+        if extraordinary {
+            sum += rings.point(c);
+        }
+    }
+    sum / sharing as f64
+}
+
+/// What is put across a side: beyond a sharp edge the mirrored vertex. Between two steps, when a triangle at a sharp edge
+/// stands for two that reach beyond it, that is across its two other sides.
+fn beyond(surface: &Surface, side: u32) -> Option<DVec3> {
+    let (features, topology) = (surface.features()?, surface.topology());
+    let is_sharp = |&c: &u32| features.is_sharp(topology, c);
+    let found = match topology.twin(side) {
+        _ if is_sharp(&side) => Some(side),
+        Some(t) if features.is_midway() => {
+            [next_in_triangle(t) as u32, prev_in_triangle(t) as u32].into_iter().find(is_sharp)
+        }
+        _ => None,
+    };
+    found.map(|c| mirrored(surface, c))
+}
+
+/// The triangles whose mask may reach beyond a sharp edge: those at one, their neighbours, and theirs.
+fn beside_sharp_edges(surface: &Surface) -> Vec<usize> {
+    let Some(features) = surface.features() else { return Vec::new() };
+    let topology = surface.topology();
+    let mut found: Vec<usize> = features.sharp_sides(topology).map(|c| c as usize / 3).collect();
+    for _ in 0..2 {
+        let sides = found.iter().flat_map(|&f| [0, 1, 2].map(|i| 3 * f as u32 + i));
+        let neighbors: Vec<usize> = sides.filter_map(|c| topology.twin(c)).map(|t| t as usize / 3).collect();
+        found.extend(neighbors);
+        found.sort_unstable();
+        found.dedup();
+    }
+    found
+}
+
 /// The regular mask at the triangle with these corners.
-fn regular(surface: &Surface, own: [u32; 3]) -> DVec3 {
+fn regular(surface: &Surface, own: [u32; 3], beyond: impl Fn(u32) -> Option<DVec3>) -> DVec3 {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    let [corner, across, wing] = REGULAR;
+    let [corner, tip_weight, wing] = REGULAR;
     let at = |c: usize| mesh.positions[mesh.faces.corners()[c] as usize];
-    let opposite = |c: u32| prev_in_triangle(twin(topology, c));
+    let opposite = |c: u32| prev_in_triangle(across(topology, c));
     let mut near = DVec3::ZERO;
     let mut tips = DVec3::ZERO;
     let mut wings = DVec3::ZERO;
     for side in own {
         near += at(side as usize);
+        if let Some(tip) = beyond(side) {
+            // The wings there are mirrored at its sides, and their sum is twice the tip.
+            tips += tip;
+            wings += 2.0 * tip;
+            continue;
+        }
         let tip = opposite(side);
         tips += at(tip);
         // The two other sides of the triangle across: the one that ends at the tip and the one that leaves it.
-        for beyond in [prev_in_triangle(tip as u32), tip] {
-            wings += at(opposite(beyond as u32));
+        for side in [prev_in_triangle(tip as u32) as u32, tip as u32] {
+            wings += beyond(side).unwrap_or_else(|| at(opposite(side)));
         }
     }
-    corner * near + across * tips + wing * wings
+    corner * near + tip_weight * tips + wing * wings
 }
 
-/// The tangents of the limit surface at all vertices, found in the mesh refined twice, which is what they cost.
+/// The tangents of the limit surface at all smooth vertices, found in the mesh refined twice, which is what they cost. Sharp
+/// vertices have none.
 ///
 /// # Errors
 /// As [`refine`].
 pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
+    if let Some(found) = thirds::of_next(surface, |s| Refinement::LabsikGreiner.refined(s), limit_tangents)? {
+        return Ok(found);
+    }
     let twice = Refinement::LabsikGreiner.refined_n(surface, 2)?;
     Ok(tangents(&twice, surface.len(), &TANGENTS))
 }

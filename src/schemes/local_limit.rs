@@ -11,7 +11,11 @@
 
 use std::f64::consts::TAU;
 
-use crate::mesh::features::SHARP;
+use glam::DVec3;
+
+use crate::mesh::Surface;
+use crate::mesh::features::{Features, SHARP};
+use crate::mesh::incidence::{next_in, prev_in};
 
 /// How a star is refined, under the schemes that have rules for darts and semi-sharp edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +44,16 @@ pub(crate) struct StarRow {
     pub(crate) edges: Vec<f64>,
     /// At each corner of a face that is on no edge of the vertex.
     pub(crate) faces: Vec<f64>,
+}
+
+/// The star of a vertex of a mesh, with the numbers of its vertices.
+pub(crate) struct StarOf {
+    pub(crate) vertex: usize,
+    pub(crate) star: Star,
+    /// The other ends of its edges.
+    ends: Vec<u32>,
+    /// The corners of each face that are on none of its edges.
+    others: Vec<Vec<u32>>,
 }
 
 /// What a vertex follows in one step.
@@ -217,6 +231,57 @@ impl Star {
         let vanishing: Vec<f64> = all.map(|&s| left(s, k)).filter(|&s| s > 0.0 && s <= 1.0).collect();
         let old = (vanishing.iter().sum::<f64>() / vanishing.len().max(1) as f64).min(1.0);
         vec![(old, k), (1.0 - old, k + 1)]
+    }
+}
+
+impl StarOf {
+    pub(crate) fn new(surface: &Surface, features: &Features, vertex: usize) -> Self {
+        let (faces, topology) = (surface.faces(), surface.topology());
+        let corners = faces.corners();
+        let mut at = Vec::new();
+        let closed = topology.star(faces, vertex, &mut at);
+        let range = |c: u32| faces.range(topology.incidence.face_of(c));
+        let sharpness = |side: u32| features.sharpness(topology.twin(side).map_or(side, |twin| twin.min(side)));
+        let (mut edges, mut ends) = (Vec::new(), Vec::new());
+        let (mut sizes, mut others) = (Vec::new(), Vec::new());
+        for &c in &at {
+            let here = range(c);
+            edges.push(sharpness(c));
+            ends.push(corners[next_in(&here, c) as usize]);
+            sizes.push(here.len());
+            let on_edges = [c, next_in(&here, c), prev_in(&here, c)];
+            let rest = here.filter(|&d| !on_edges.contains(&(d as u32)));
+            others.push(rest.map(|d| corners[d]).collect());
+        }
+        if let (false, Some(&last)) = (closed, at.last()) {
+            let into = prev_in(&range(last), last);
+            edges.push(sharpness(into));
+            ends.push(corners[into as usize]);
+        }
+        let own = features.vertex_sharpness(vertex as u32);
+        StarOf { vertex, star: Star { edges, vertex: own, sizes }, ends, others }
+    }
+
+    /// Column and entry of a row, the vertex itself first; those of two edges to one vertex apart.
+    pub(crate) fn entries<'a>(&'a self, row: &'a StarRow) -> impl Iterator<Item = (u32, f64)> + 'a {
+        let edges = self.ends.iter().copied().zip(row.edges.iter().copied());
+        let faces = self.others.iter().zip(&row.faces);
+        let faces = faces.flat_map(|(others, &a)| others.iter().map(move |&v| (v, a)));
+        std::iter::once((self.vertex as u32, row.own)).chain(edges).chain(faces)
+    }
+
+    /// Where a step takes the vertex; `smooth` is where it would go if all edges and itself were smooth.
+    pub(super) fn vertex_point(&self, points: &[DVec3], smooth: DVec3) -> DVec3 {
+        let own = points[self.vertex];
+        let by_rule = |steps: usize| match self.star.rule(steps) {
+            StepRule::Corner => own,
+            StepRule::Crease => {
+                let along = self.star.crease(steps).into_iter().map(|j| points[self.ends[j] as usize]);
+                0.75 * own + 0.125 * along.sum::<DVec3>()
+            }
+            StepRule::Smooth | StepRule::Dart => smooth,
+        };
+        self.star.blend(0).into_iter().map(|(weight, steps)| weight * by_rule(steps)).sum()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Loop subdivision (Loop 1987) of triangle meshes, with Loop's own weights at extraordinary vertices; sharp edges after Hoppe et al.
 //! 1994, with a rule for creases alone that does not depend on what lies beside them.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use glam::DVec3;
 
@@ -9,17 +9,15 @@ use super::local_limit::{Star, StarRule};
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Definition, PaperNames, SingularSet, from_limit_weight};
-use super::sharp::{self, Across};
+use super::sharp::{self, across_boundary_of_triangles};
 use super::star::{
-    Tangents, across, blend_with_neighbors, next_in_triangle, prev_in_triangle, push_blends, refuse, require_room,
-    require_triangles_alone, ring_tangents,
+    Tangents, across, blend_with_neighbors, prev_in_triangle, push_blends, require_no_pillow, require_room,
+    require_triangles, ring_tangents,
 };
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
-use crate::mesh::features::Rule;
 use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
-use crate::parallel::find_first;
 
 /// The mask of the vertex point at valence `n`: the weight of the vertex, 3/8 + (3/8 + ¼cos(2π/n))², and of
 /// each neighbour, the rest over n.
@@ -71,9 +69,12 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     name: "loop",
     class: Class::Primal,
     needs_triangles: true,
+    check,
     refine,
     refined_topology,
-    halves: Some(refined::halves_in_fours),
+    refined_features: |surface, refined, topology| {
+        refined::features_of_pieces(surface, refined, topology, refined::halves_in_fours)
+    },
     size: Size::in_four,
     limit_positions,
     limit_normals,
@@ -86,7 +87,7 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// it), then the middle one.
 ///
 /// The points of sharp edges are their midpoints, of crease vertices (a + 6v + b)/8 with the neighbours a and b along the
-/// curve; corners rest; darts follow the rule of smooth vertices.
+/// curve; corners rest; darts follow the rule of smooth vertices; what is semi-sharp blends these with the smooth points.
 ///
 /// # Errors
 /// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
@@ -96,9 +97,8 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// triangles would share all corners too.
 pub fn refine(surface: &Surface) -> Result<Mesh> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_triangles_alone(surface, "loop")?;
+    check(surface)?;
     require_room(mesh, 4)?;
-    require_no_pillow(surface)?;
     let (old, corners) = (&mesh.positions, mesh.faces.corners());
     let edges = topology.edge_numbers();
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
@@ -120,18 +120,10 @@ pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
     refined::of_fours(surface, refined)
 }
 
-/// Refuses two triangles with the same corners, which a valid mesh has only beside a part with a boundary.
-fn require_no_pillow(surface: &Surface) -> Result<()> {
-    if surface.is_closed() {
-        return Ok(());
-    }
-    let (topology, incidence) = (surface.topology(), surface.incidence());
-    let is_inside = |&c: &u32| topology.twin(c).is_some() && topology.twin(prev_in_triangle(c) as u32).is_some();
-    let has_two = |v: usize| incidence.face_count(v) == 2 && incidence.corners_at(v).iter().all(is_inside);
-    match find_first(surface.len(), has_two) {
-        Some(v) => refuse(format!("vertex {v} has two triangles with the same corners; remove them")),
-        None => Ok(()),
-    }
+/// Refuses other faces than triangles, and two of them with the same corners.
+fn check(surface: &Surface) -> Result<()> {
+    require_triangles(surface, "loop")?;
+    require_no_pillow(surface)
 }
 
 /// The faces of a 1-to-4 split of triangles.
@@ -149,26 +141,15 @@ pub(super) fn split_in_four(mesh: &Mesh, edges: &EdgeNumbers) -> Faces {
 }
 
 /// The limit points of all vertices: [`limit_mask`]; on curves (a + 4v + b)/6 with the neighbours a and b along the curve;
-/// corners rest; at darts [`dart_mask`].
+/// corners rest; at darts [`dart_mask`]; what is semi-sharp has the rows of its steps.
 ///
 /// # Errors
 /// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
 /// [`Error::NotTriangles`](crate::Error::NotTriangles) with the first face that is none.
 pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
-    require_triangles_alone(surface, "loop")?;
+    require_triangles(surface, "loop")?;
     let mut limits = blend_with_neighbors(surface, limit_mask);
-    if let Some(features) = surface.features() {
-        sharp::set_limits(&mut limits, surface, CUBIC);
-        let (old, corners) = (surface.positions(), surface.faces().corners());
-        let mut star = Vec::new();
-        for v in features.with_rule(Rule::Dart) {
-            sharp::dart_star(surface, features, v, &mut star);
-            let mask = dart_mask(star.len());
-            let ring = star.iter().zip(&mask[1..]);
-            let moved = ring.map(|(&c, &weight)| weight * (old[corners[next_in_triangle(c)] as usize] - old[v]));
-            limits[v] = old[v] + moved.sum::<DVec3>();
-        }
-    }
+    sharp::set_limits(&mut limits, surface, CUBIC, Some(StarRule::Loop));
     Ok(limits)
 }
 
@@ -186,25 +167,6 @@ pub fn dart_mask(n: usize) -> Vec<f64> {
     std::iter::once(row.own).chain(row.edges).collect()
 }
 
-/// The weights of the tangent across the boundary at a vertex of `m` triangles there. `None` from six on: the limit normals of
-/// its faces differ.
-///
-/// With θ = π/m and λ = 3/8 + ¼cos θ, the left eigenvector for λ of a step on the star is sin jθ on the inner neighbours
-/// e_1 … e_{m−1}; its sum is 0; and the column of e_0 leaves its weight there, (sin θ − Σ sin jθ)/8 over λ − 1/4. With one
-/// triangle it is e_0 + e_1 − 2v, for 1/4.
-fn across_boundary(m: usize) -> Option<Across> {
-    match m {
-        1 => return Some(Across { edges: vec![1.0; 2], faces: Vec::new() }),
-        2..=5 => {}
-        _ => return None,
-    }
-    let theta = PI / m as f64;
-    let mut edges: Vec<f64> = (0..=m).map(|j| (theta * j as f64).sin()).collect();
-    let end = (edges[1] - edges[1..m].iter().sum::<f64>()) / (1.0 + 2.0 * theta.cos());
-    (edges[0], edges[m]) = (end, end);
-    Some(Across { edges, faces: Vec::new() })
-}
-
 /// The tangents of the limit surface at all vertices: cos(2πj/n) and sin(2πj/n) on the neighbours in
 /// counter-clockwise order. At a boundary vertex with up to five triangles and no sharp edge between them one goes along the
 /// boundary and one across it; at a corner with one triangle they go along its sides. All others that are not smooth have none:
@@ -214,9 +176,11 @@ fn across_boundary(m: usize) -> Option<Across> {
 /// # Errors
 /// As [`limit_positions`].
 pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
-    require_triangles_alone(surface, "loop")?;
+    require_triangles(surface, "loop")?;
     let mut tangents = ring_tangents(surface);
-    sharp::set_tangents(&mut tangents, surface, across_boundary, |_, _| DVec3::ZERO);
+    // The column of e_0 leaves its weight there, (sin θ − Σ sin jθ)/8, over λ − 1/4 with λ = 3/8 + ¼cos θ.
+    let end = |theta: f64, sum: f64| (theta.sin() - sum) / (1.0 + 2.0 * theta.cos());
+    sharp::set_tangents(&mut tangents, surface, |m| across_boundary_of_triangles(m, end), |_, _| DVec3::ZERO);
     Ok(tangents)
 }
 

@@ -1,16 +1,22 @@
-//! The mid-edge scheme (Peters & Reif 1997, "the simplest subdivision scheme for smoothing polyhedra") on any closed
+//! The mid-edge scheme (Peters & Reif 1997, "the simplest subdivision scheme for smoothing polyhedra") on any
 //! polygon mesh: the new vertices are the midpoints of the edges, and there is a new face in every old face, and one about
 //! every old vertex.
 //!
 //! The face about a vertex v of valence n has the corners (v + v_j)/2, and each further step joins the midpoints of its
 //! sides: its centroid ½v + ½ mean v_j stays, and the first harmonic of its corners shrinks by cos(π/n).
+//!
+//! A step makes of n edges round a curve n again, so that sharp edges have no rule for one alone. Two steps are one of
+//! Doo-Sabin's kind, with ½v + ¼(u + w) in the corner of a face between u and w, and twice as many points on curves: Chaikin's.
+//! On open and creased meshes a step is two at once.
 
 use glam::DVec3;
 
+use super::doo_sabin::{CornerRule, refine_by};
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{Definition, PaperNames, QUADRATIC, SingularSet};
-use super::star::{Tangents, blend_with_neighbors, require_closed, require_room, ring_tangents, stars, twin};
+use super::star::{Tangents, blend_with_neighbors, require_curves, require_room, ring_tangents, stars, twin};
+use super::{chaikin, doo_sabin};
 use crate::Result;
 use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
@@ -42,15 +48,21 @@ pub(super) const DEFINITION: Definition = Definition {
     star_rule: None,
 };
 
+const NAME: &str = "mid-edge";
+
 /// All that defines the refinement.
 pub(super) const RULES: RefinementRules = RefinementRules {
-    name: "mid-edge",
+    name: NAME,
     class: Class::Dual,
     needs_triangles: false,
+    check: |surface| require_curves(surface, NAME),
     refine,
     refined_topology,
-    halves: None,
-    size: |c| Size { vertices: c.edges(), faces: c.faces + c.vertices, corners: 2 * c.corners },
+    refined_features: chaikin::refined_features,
+    size: |c| match c.has_features {
+        true => c.dual(),
+        false => Size { vertices: c.edges(), faces: c.faces + c.vertices, corners: 2 * c.corners, ..c },
+    },
     limit_positions,
     limit_normals,
 };
@@ -60,9 +72,10 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// Vertices: the midpoints of the edges, by their first half-edges. Faces: those of the old faces, whose corner c lies on
 /// the edge of the old corner c, then those of the old vertices, counter-clockwise.
 ///
+/// Of an open or creased mesh two steps at once: [`refine_by`] with [`CornerRule::MidEdge`].
+///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or the result is too large for 32-bit
-/// indices.
+/// As [`refine_by`].
 ///
 /// ```
 /// use limitlab::mesh::{Surface, builtin};
@@ -74,7 +87,10 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// ```
 pub fn refine(surface: &Surface) -> Result<Mesh> {
     let (mesh, topology) = (surface.mesh(), surface.topology());
-    require_closed(surface)?;
+    require_curves(surface, NAME)?;
+    if surface.features().is_some() {
+        return refine_by(CornerRule::MidEdge, surface);
+    }
     require_room(mesh, 2)?;
     let (points, old) = (&mesh.positions, mesh.faces.corners());
     let edges = topology.edge_numbers();
@@ -99,7 +115,10 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
 
 /// The topology of `refined`, which is what [`refine`] made of the surface.
 pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
-    refined::of_midpoints(surface, refined)
+    match surface.features() {
+        None => refined::of_midpoints(surface, refined),
+        Some(_) => doo_sabin::refined_topology(surface, refined),
+    }
 }
 
 /// The limit mask of a vertex of valence `n`: ½ at the vertex, 1/(2n) at each neighbour.
@@ -107,16 +126,21 @@ pub fn limit_mask(n: usize) -> [f64; 2] {
     [0.5, 0.5 / n as f64]
 }
 
-/// The limit points of all vertices: the centroids of their faces after a step, which all further ones keep.
+/// The limit points of all vertices: the centroids of their faces after a step, which all further ones keep; on curves
+/// (a + 6v + b)/8 with the neighbours a and b along the curve; corners rest.
 ///
 /// # Errors
-/// [`Error::Open`](crate::Error::Open).
+/// As [`refine`], but for the size.
 pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
-    require_closed(surface)?;
-    Ok(blend_with_neighbors(surface, limit_mask))
+    require_curves(surface, NAME)?;
+    match surface.features() {
+        None => Ok(blend_with_neighbors(surface, limit_mask)),
+        Some(_) => doo_sabin::limit_positions(CornerRule::MidEdge, surface),
+    }
 }
 
-/// The unit normals of the limit surface at the [`limit_positions`]; zero where [`Tangents::normal`] is. cos(2πj/n) and
+/// The unit normals of the limit surface at the [`limit_positions`]; zero where [`Tangents::normal`] is, and at sharp vertices
+/// as under [Doo-Sabin](doo_sabin::limit_normals). cos(2πj/n) and
 /// sin(2πj/n) on the neighbours are the left eigenvectors of a step of their face, for the pair cos(π/n)e^{±iπ/n}.
 ///
 /// At valence 3 its square ¼ is an eigenvalue of the surroundings too: they approach the tangent plane like 1/m with the
@@ -125,6 +149,9 @@ pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
 /// # Errors
 /// As [`limit_positions`].
 pub fn limit_normals(surface: &Surface) -> Result<Vec<DVec3>> {
-    require_closed(surface)?;
-    Ok(ring_tangents(surface).iter().map(Tangents::normal).collect())
+    require_curves(surface, NAME)?;
+    match surface.features() {
+        None => Ok(ring_tangents(surface).iter().map(Tangents::normal).collect()),
+        Some(_) => doo_sabin::limit_normals(CornerRule::MidEdge, surface),
+    }
 }

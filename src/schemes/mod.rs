@@ -13,9 +13,9 @@
 //! | [`butterfly`] | modified Butterfly, Zorin, Schröder & Sweldens 1996 | triangles | yes |
 //! | [`labsik_greiner`] | interpolatory √3, Labsik & Greiner 2000 | triangles | yes |
 //!
-//! Catmull-Clark and Loop take open and creased meshes too: edges with one face and tagged ones are
-//! [sharp](crate::mesh::features), their curves cubic B-splines. All others refuse them with an
-//! [`Error::NotOffered`](crate::Error::NotOffered), and all of them refuse a boundary that is treated as interior with an
+//! All take open and creased meshes too: edges with one face and tagged ones are [sharp](crate::mesh::features), their curves
+//! cubic B-splines, quadratic ones under the dual schemes, or interpolated by cubics. All refuse a boundary that is treated as
+//! interior with an
 //! [`Error::Open`](crate::Error::Open). A step takes time and memory
 //! proportional to the mesh, with flat arrays only, in parallel: every new point is gathered from the old ones, with
 //! the same result for any number of threads; new faces, and their topology, come from index arithmetic on half-edges.
@@ -34,6 +34,7 @@
 
 pub mod butterfly;
 pub mod catmull_clark;
+mod chaikin;
 pub mod doo_sabin;
 mod interpolatory;
 pub mod labsik_greiner;
@@ -48,6 +49,7 @@ mod scheme;
 mod sharp;
 pub mod sqrt3;
 mod star;
+pub(crate) mod thirds;
 pub mod unified_sqrt3;
 mod zheng_cai;
 

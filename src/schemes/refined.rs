@@ -7,6 +7,8 @@
 //! valid too.
 
 use super::star::{next_in_triangle, prev_in_triangle, stars};
+use crate::Result;
+use crate::mesh::features::Features;
 use crate::mesh::incidence::split_rows;
 use crate::mesh::topology::{NONE, Scatter};
 use crate::mesh::{Incidence, Mesh, Surface, Topology};
@@ -87,14 +89,26 @@ pub(super) fn of_fours(surface: &Surface, refined: &Mesh) -> Topology {
     halved(surface, refined, [offsets, corners, twins], halves_in_fours)
 }
 
-/// The half-edges along half-edge c after the split into quads.
-pub(super) fn halves_in_quads(surface: &Surface, c: u32) -> [u32; 2] {
-    [4 * c, 4 * surface.incidence().next(surface.faces(), c) + 3]
+/// Puts the half-edges along half-edge c after the split into quads.
+pub(super) fn halves_in_quads(surface: &Surface, c: u32, put: &mut Vec<u32>) {
+    put.extend([4 * c, 4 * surface.incidence().next(surface.faces(), c) + 3]);
 }
 
-/// The half-edges along half-edge c after the split of triangles in four.
-pub(super) fn halves_in_fours(_: &Surface, c: u32) -> [u32; 2] {
-    [outer(c), outer(next_in_triangle(c) as u32) + 2]
+/// Puts the half-edges along half-edge c after the split of triangles in four.
+pub(super) fn halves_in_fours(_: &Surface, c: u32, put: &mut Vec<u32>) {
+    put.extend([outer(c), outer(next_in_triangle(c) as u32) + 2]);
+}
+
+/// The features after a step, where `pieces` puts the half-edges of the refined mesh along a sharp half-edge, in this order.
+pub(super) fn features_of_pieces(
+    surface: &Surface,
+    refined: &Mesh,
+    topology: &Topology,
+    pieces: fn(&Surface, u32, &mut Vec<u32>),
+) -> Result<Option<Features>> {
+    let Some(features) = surface.features() else { return Ok(None) };
+    let pieces = |c, put: &mut Vec<u32>| pieces(surface, c, put);
+    Ok(features.refined(&refined.faces, topology, surface.topology(), pieces))
 }
 
 /// After the split of triangles in four, the first corner of the triangle at corner c.
@@ -118,10 +132,11 @@ fn halved(
     surface: &Surface,
     refined: &Mesh,
     [offsets, corners, twins]: [Vec<u32>; 3],
-    halves: fn(&Surface, u32) -> [u32; 2],
+    halves: fn(&Surface, u32, &mut Vec<u32>),
 ) -> Topology {
     let incidence = Incidence::from_parts(offsets, corners, &refined.faces);
-    let mut boundary: Vec<u32> = surface.boundary_half_edges().iter().flat_map(|&c| halves(surface, c)).collect();
+    let mut boundary = Vec::with_capacity(2 * surface.boundary_edges());
+    surface.boundary_half_edges().iter().for_each(|&c| halves(surface, c, &mut boundary));
     boundary.sort_unstable();
     Topology::open(incidence, twins, boundary)
 }
@@ -166,8 +181,11 @@ fn put<const N: usize>(part: &mut [u32], row: [u32; N]) -> &mut [u32] {
 }
 
 /// After the split of every triangle in three and the flip of every old edge: triangle c is (vertex, face of t, face
-/// of c).
+/// of c). With sharp edges, which rest or are split in three, it is found anew.
 pub(super) fn of_flips(surface: &Surface, refined: &Mesh) -> Topology {
+    if surface.features().is_some() {
+        return Topology::new(&refined.faces, refined.len());
+    }
     let (mesh, topology) = (surface.mesh(), surface.topology());
     let (incidence, twin) = (&topology.incidence, topology.twins());
     let count = twin.len();

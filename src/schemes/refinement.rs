@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::{butterfly, catmull_clark, doo_sabin, labsik_greiner, loop_scheme, mid_edge, sqrt3};
 use crate::memory::require;
+use crate::mesh::features::Features;
 use crate::mesh::{Mesh, Surface, Topology};
 use crate::{Error, Result};
 
@@ -27,6 +28,8 @@ pub(super) struct Size {
     pub(super) vertices: u64,
     pub(super) faces: u64,
     pub(super) corners: u64,
+    /// Whether there are sharp edges or vertices.
+    pub(super) has_features: bool,
 }
 
 impl Size {
@@ -36,26 +39,37 @@ impl Size {
 
     /// After the split of every triangle in four.
     pub(super) fn in_four(self) -> Self {
-        Size { vertices: self.vertices + self.edges(), faces: 4 * self.faces, corners: 4 * self.corners }
+        let (vertices, faces, corners) = (self.vertices + self.edges(), 4 * self.faces, 4 * self.corners);
+        Size { vertices, faces, corners, ..self }
     }
 
     /// After the split of every triangle in three.
     pub(super) fn in_three(self) -> Self {
-        Size { vertices: self.vertices + self.faces, faces: 3 * self.faces, corners: 3 * self.corners }
+        let (vertices, faces, corners) = (self.vertices + self.faces, 3 * self.faces, 3 * self.corners);
+        Size { vertices, faces, corners, ..self }
+    }
+
+    /// After a step that makes a vertex of every corner, and a face of every face, edge and vertex.
+    pub(super) fn dual(self) -> Self {
+        let faces = self.faces + self.edges() + self.vertices;
+        Size { vertices: self.corners, faces, corners: 4 * self.corners, ..self }
     }
 }
+
+/// What is sharp on the refined mesh of a surface, with its topology; `None` if nothing is.
+type RefinedFeatures = fn(&Surface, &Mesh, &Topology) -> Result<Option<Features>>;
 
 /// All that defines a refinement.
 pub(super) struct RefinementRules {
     pub(super) name: &'static str,
     pub(super) class: Class,
     pub(super) needs_triangles: bool,
+    /// Refuses what has no rules, before any work.
+    pub(super) check: fn(&Surface) -> Result<()>,
     pub(super) refine: fn(&Surface) -> Result<Mesh>,
     /// Of a mesh and what `refine` made of it.
     pub(super) refined_topology: fn(&Surface, &Mesh) -> Topology,
-    /// The half-edges of the refined mesh along a half-edge, in this order, where a step splits every edge in two and has
-    /// rules for sharp ones.
-    pub(super) halves: Option<fn(&Surface, u32) -> [u32; 2]>,
+    pub(super) refined_features: RefinedFeatures,
     pub(super) size: fn(Size) -> Size,
     pub(super) limit_positions: fn(&Surface) -> Result<Vec<DVec3>>,
     pub(super) limit_normals: fn(&Surface) -> Result<Vec<DVec3>>,
@@ -76,7 +90,7 @@ pub enum Refinement {
     Butterfly,
     /// Interpolatory √3, Labsik & Greiner 2000, on triangles.
     LabsikGreiner,
-    /// Mid-edge, Peters & Reif 1997, on polygons of any size.
+    /// Mid-edge, Peters & Reif 1997, on polygons of any size. With sharp edges a step is two at once.
     MidEdge,
 }
 
@@ -119,20 +133,31 @@ impl Refinement {
         self.rules().needs_triangles
     }
 
+    /// Refuses, before any work, what a [step](Self::refine) refuses but for its size.
+    ///
+    /// # Errors
+    /// As [`refine`](Self::refine), but for [`Error::TooLarge`].
+    pub fn check(self, surface: &Surface) -> Result<()> {
+        (self.rules().check)(surface)
+    }
+
     /// One step: positions and faces. The scheme's own `refine` says how the result is numbered.
     ///
     /// # Errors
     /// [`Error::Open`] if the mesh has a boundary that is treated as interior; [`Error::NotOffered`] if it has sharp edges or
-    /// vertices, which Catmull-Clark and Loop alone take; [`Error::NotTriangles`] where the scheme needs these;
+    /// [`Error::Open`] if the mesh has a boundary that is treated as interior; [`Error::Dart`] but under Catmull-Clark, Loop and
+    /// Butterfly, [`Error::SemiSharp`] but under the first two; [`Error::NotTriangles`] where the scheme needs these;
     /// [`Error::TooLarge`].
     pub fn refine(self, surface: &Surface) -> Result<Mesh> {
         (self.rules().refine)(surface)
     }
 
     /// One step, with its topology: equal to [`Topology::new`] of its faces, at a fraction of the cost, as index
-    /// arithmetic on the coarse one gives it. The refinement of a valid mesh is valid.
+    /// arithmetic on the coarse one gives it; under Doo-Sabin and mid-edge of a mesh with sharp edges it is found from the faces. The
+    /// refinement of a valid mesh is valid.
     ///
-    /// Rules of vertices stay; both halves of a sharp edge are sharp, and the vertex between them is a crease vertex.
+    /// Rules of vertices stay under primal and interpolatory schemes; the parts of a sharp edge are sharp, and the vertices
+    /// between them are crease vertices. Of what is semi-sharp, 1 less is left.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).
@@ -148,15 +173,18 @@ impl Refinement {
     /// ```
     pub fn refined(self, surface: &Surface) -> Result<Surface> {
         let refined = self.refine(surface)?;
+        self.refined_surface(surface, refined)
+    }
+
+    /// `refined`, which is what a step made of the surface, or has the same faces.
+    pub(crate) fn refined_surface(self, surface: &Surface, refined: Mesh) -> Result<Surface> {
         let topology = (self.rules().refined_topology)(surface, &refined);
-        Ok(match (surface.features(), self.rules().halves) {
-            (Some(features), Some(halves)) => {
-                let halves = |c| halves(surface, c);
-                let features = features.refined(&refined.faces, &topology, surface.topology(), halves);
-                Surface::of_parts(refined, topology, surface.boundary(), Some(features))
+        Ok(match surface.features() {
+            Some(_) => {
+                let features = (self.rules().refined_features)(surface, &refined, &topology)?;
+                Surface::of_parts(refined, topology, surface.boundary(), features)
             }
-            // Without features, as others are refused above.
-            _ => Surface::of_topology(refined, topology),
+            None => Surface::of_topology(refined, topology),
         })
     }
 
@@ -165,12 +193,14 @@ impl Refinement {
     ///
     /// # Errors
     /// [`Error::TooLarge`] or [`Error::Memory`] with the numbers of faces and vertices.
-    pub fn check_size(self, mesh: &Mesh, levels: usize) -> Result<()> {
+    pub fn check_size(self, surface: &Surface, levels: usize) -> Result<()> {
+        let mesh = surface.mesh();
         let count = |n: usize| n as u64;
         let mut size = Size {
             vertices: count(mesh.len()),
             faces: count(mesh.faces.len()),
             corners: count(mesh.faces.corners().len()),
+            has_features: surface.features().is_some(),
         };
         let mut bytes = 0u64;
         for _ in 0..levels {
@@ -182,7 +212,7 @@ impl Refinement {
                 break;
             }
         }
-        let Size { vertices, faces, corners } = size;
+        let Size { vertices, faces, corners, .. } = size;
         let what = || format!("the surface after {levels} refinements with {faces} faces and {vertices} vertices");
         if corners > u64::from(u32::MAX) {
             return Err(Error::TooLarge {
@@ -199,7 +229,7 @@ impl Refinement {
     /// # Errors
     /// As [`check_size`](Self::check_size) and [`refine`](Self::refine).
     pub fn refine_n(self, surface: &Surface, levels: usize) -> Result<Mesh> {
-        self.check_size(surface.mesh(), levels)?;
+        self.check_size(surface, levels)?;
         let Some(last) = levels.checked_sub(1) else {
             return Ok(surface.mesh().clone());
         };
@@ -215,12 +245,13 @@ impl Refinement {
     /// # Errors
     /// As [`refine_n`](Self::refine_n).
     pub fn refined_n(self, surface: &Surface, levels: usize) -> Result<Surface> {
-        self.check_size(surface.mesh(), levels)?;
+        self.check_size(surface, levels)?;
         (0..levels).try_fold(surface.clone(), |coarse, _| self.refined(&coarse))
     }
 
     /// The limit points of all vertices; under dual refinements the centroids of the faces that they become, under the
-    /// interpolatory ones the vertices themselves. On curves of sharp edges (a + 4v + b)/6; corners rest.
+    /// interpolatory ones the vertices themselves. On curves of sharp edges (a + 4v + b)/6, and under dual ones (a + 6v + b)/8;
+    /// corners rest.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).
@@ -231,7 +262,8 @@ impl Refinement {
     /// The unit normals of the limit surface at the [`limit_positions`](Self::limit_positions); zero where
     /// [`Tangents::normal`](super::Tangents::normal) is, and where the surface has several or they are not computed: on
     /// creases, at darts, at corners but for those with one face, on a boundary beside four faces or more under Catmull-Clark,
-    /// six under Loop.
+    /// six under Loop and √3; at all sharp vertices under the interpolatory ones; under dual ones on creases, and at corners but
+    /// for those on a boundary with two sharp edges.
     ///
     /// # Errors
     /// As [`refine`](Self::refine).

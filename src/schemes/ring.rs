@@ -45,7 +45,7 @@ pub(super) struct Rings<'a> {
     mesh: &'a Mesh,
     topology: &'a Topology,
     rule: RingRule,
-    /// Of every vertex, or the greatest number where that does not fit. A byte each, so that they stay in a cache.
+    /// Of every vertex that is smooth, or the greatest number where that does not fit. A byte each, so that they stay in a cache.
     valences: Vec<u8>,
     /// By valence, up to [`WALKED`].
     masks: Vec<Half>,
@@ -56,7 +56,17 @@ pub(super) struct Rings<'a> {
 impl<'a> Rings<'a> {
     pub(super) fn new(surface: &'a Surface, rule: RingRule) -> Self {
         let (mesh, topology) = (surface.mesh(), surface.topology());
-        let valence = |v: usize| topology.incidence.face_count(v);
+        // Sharp vertices have no whole ring: they count as regular.
+        let features = surface.features();
+        let valence = |v: usize| match features.is_none_or(|f| f.is_smooth(v)) {
+            true => topology.incidence.face_count(v),
+            false => REGULAR.into(),
+        };
+        let mut valences = parallel::collect(mesh.len(), |v| valence(v).min(u8::MAX.into()) as u8);
+        for c in features.filter(|f| f.is_midway()).into_iter().flat_map(|f| f.sharp_sides(topology)) {
+            // With what is put beyond the sharp edges, a ring of six: a vertex of the step before.
+            valences[mesh.faces.corners()[prev_in_triangle(c)] as usize] = REGULAR;
+        }
         let half = |n: usize| {
             let mut half = Half::default();
             if n >= 3 {
@@ -77,7 +87,7 @@ impl<'a> Rings<'a> {
         Rings {
             mesh,
             topology,
-            valences: parallel::collect(mesh.len(), |v| valence(v).min(u8::MAX.into()) as u8),
+            valences,
             masks: (0..=WALKED).map(half).collect(),
             wide: parallel::flat_map(mesh.len(), CHUNK, |range| {
                 range.filter(|&v| valence(v) > WALKED).map(|v| Wide::new(surface, v, &rule)).collect()
@@ -86,7 +96,7 @@ impl<'a> Rings<'a> {
         }
     }
 
-    /// Whether the vertex of corner `c` is extraordinary.
+    /// Whether the vertex of corner `c` is smooth and extraordinary.
     #[inline]
     pub(super) fn is_extraordinary(&self, c: u32) -> bool {
         self.valences[self.mesh.faces.corners()[c as usize] as usize] != REGULAR

@@ -1,5 +1,5 @@
-//! √3 subdivision (Kobbelt 2000) of closed triangle meshes: a new vertex in every triangle, old edges flipped,
-//! old vertices relaxed. Two steps make a 1-to-9 split.
+//! √3 subdivision (Kobbelt 2000) of triangle meshes: a new vertex in every triangle, old edges flipped,
+//! old vertices relaxed. Two steps make a 1-to-9 split, of sharp edges too.
 
 use std::f64::consts::TAU;
 
@@ -8,9 +8,9 @@ use glam::DVec3;
 use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Definition, PaperNames, SingularSet, from_limit_weight};
-use super::star::{
-    Tangents, blend_with_neighbors, centroid, push_blends, require_room, require_triangles, ring_tangents, twin,
-};
+use super::sharp::{self, across_boundary_of_triangles};
+use super::star::{Tangents, across, blend_with_neighbors, centroid, push_blends, require_room, ring_tangents};
+use super::thirds;
 use crate::Result;
 use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
@@ -68,9 +68,12 @@ pub(super) const RULES: RefinementRules = RefinementRules {
     name: "sqrt3",
     class: Class::Primal,
     needs_triangles: true,
+    check: |surface| thirds::require(surface, "sqrt3"),
     refine,
     refined_topology,
-    halves: None,
+    refined_features: |surface, refined, topology| {
+        refined::features_of_pieces(surface, refined, topology, thirds::pieces)
+    },
     size: Size::in_three,
     limit_positions,
     limit_normals,
@@ -81,16 +84,28 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// Vertices of the result: old vertices, then one for each face. Faces of the result: one for each old
 /// corner, in corner order, as (vertex, face across the edge that leaves it, its own face).
 ///
+/// Sharp edges rest in the first of two steps, and sharp vertices with them. In the second they are split in three, at
+/// (16, 10, 1)/27 and (1, 10, 16)/27 of the vertices along the curve, and crease vertices become (4, 19, 4)/27; at the ends of
+/// curves the polygon goes on by the mirrored point; corners rest. The new vertices there take the numbers of
+/// the faces, which have none inside, then further ones for boundary edges.
+///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary, a face is
-/// no triangle (the first is named), or the result is too large for 32-bit indices.
+/// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
+/// [`Error::NotTriangles`](crate::Error::NotTriangles) with the first face that is none,
+/// [`Error::Dart`](crate::Error::Dart), [`Error::SemiSharp`](crate::Error::SemiSharp),
+/// [`Error::TooLarge`](crate::Error::TooLarge) if 32-bit indices do not reach the result; [`Error::Mesh`](crate::Error::Mesh)
+/// with a vertex of two triangles that have all corners in common.
 pub fn refine(surface: &Surface) -> Result<Mesh> {
     let mesh = surface.mesh();
-    require_triangles(surface, "sqrt3")?;
+    thirds::require(surface, "sqrt3")?;
     require_room(mesh, 3)?;
-    let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len()));
+    let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len() + surface.boundary_edges()));
     push_blends(&mut positions, surface, vertex_mask);
     parallel::extend(&mut positions, mesh.faces.len(), |_| |f| centroid(&mesh.positions, mesh.faces.face(f)));
+    for (v, point) in thirds::moved(surface, vertex_mask) {
+        positions[v] = point;
+    }
+    thirds::set_thirds(&mut positions, surface, |_, _| 0.0);
     Ok(Mesh::new(positions, flip(surface)))
 }
 
@@ -99,39 +114,58 @@ pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
     refined::of_flips(surface, refined)
 }
 
-/// The faces after the split in three and the flip of every old edge: one for each half-edge.
+/// The faces after the split in three and the flip of every old edge that is not sharp: one for each half-edge.
 pub(super) fn flip(surface: &Surface) -> Faces {
     let (mesh, topology) = (surface.mesh(), surface.topology());
     let vertices = mesh.len() as u32;
     let old = mesh.faces.corners();
     let mut corners = large(vec![0; 3 * old.len()]);
     set_rows(&mut corners, |c| {
-        let across = twin(topology, c);
+        let across = across(topology, c);
         [old[c as usize], vertices + across / 3, vertices + c / 3]
     });
+    thirds::keep_sharp_edges(&mut corners, surface);
     Faces::of_size(3, corners)
 }
 
-/// The limit points of all vertices.
+/// The limit points of all vertices: [`limit_mask`]; on curves (a + 4v + b)/6 with the neighbours a and b along the curve;
+/// corners rest.
+///
+/// Between two steps that holds at all vertices but those across from sharp edges, where a point z has no row of its
+/// star alone: with its ring completed to valence n, each sharp edge xy adds h(n) (w − x − y + u)/27 to the limit
+/// mask, w and u being the next vertices on the curve. It costs a step there.
 ///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or a face
-/// is no triangle.
+/// As [`refine`].
 pub fn limit_positions(surface: &Surface) -> Result<Vec<DVec3>> {
-    require_triangles(surface, "sqrt3")?;
-    Ok(blend_with_neighbors(surface, limit_mask))
+    thirds::require(surface, "sqrt3")?;
+    if let Some(found) = thirds::of_next(surface, |s| Refinement::Sqrt3.refined(s), limit_positions)? {
+        return Ok(found);
+    }
+    let mut limits = blend_with_neighbors(surface, limit_mask);
+    sharp::set_limits(&mut limits, surface, CUBIC, None);
+    Ok(limits)
 }
 
 /// The tangents of the limit surface at all vertices: cos(2πj/n) and sin(2πj/n) on the neighbours in
 /// counter-clockwise order. A step maps the ring's first harmonic to itself, turned by π/n and scaled by
 /// ⅔cos(π/n), so these span the left eigenspace of the subdominant pair.
 ///
+/// At a boundary vertex with up to five triangles and no sharp edge between them one goes along the boundary and one across
+/// it; at a corner with one triangle they go along its sides. All others that are not smooth have none.
+///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary or a face
-/// is no triangle.
+/// As [`refine`].
 pub fn limit_tangents(surface: &Surface) -> Result<Vec<Tangents>> {
-    require_triangles(surface, "sqrt3")?;
-    Ok(ring_tangents(surface))
+    thirds::require(surface, "sqrt3")?;
+    if let Some(found) = thirds::of_next(surface, |s| Refinement::Sqrt3.refined(s), limit_tangents)? {
+        return Ok(found);
+    }
+    let mut tangents = ring_tangents(surface);
+    // Two steps have (2 + 2cos θ)/9; the column of e_0 leaves its weight there, (3 sin θ − 4Σ sin jθ)/27 over that less 1/9.
+    let end = |theta: f64, sum: f64| (3.0 * theta.sin() - 4.0 * sum) / (3.0 + 6.0 * theta.cos());
+    sharp::set_tangents(&mut tangents, surface, |m| across_boundary_of_triangles(m, end), |_, _| DVec3::ZERO);
+    Ok(tangents)
 }
 
 /// The unit normals of the limit surface at all vertices; zero where [`Tangents::normal`] is.

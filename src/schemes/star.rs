@@ -19,15 +19,34 @@ pub(super) const CHUNK: usize = 1024;
 const DEGENERATE: f64 = 1e-14;
 
 /// Refuses a boundary that is treated as interior: around its vertices there are no whole faces, and it has no rules of its
-/// own; and what is semi-sharp.
+/// own.
 pub(crate) fn require_rules(surface: &Surface) -> Result<()> {
     match surface.features() {
-        Some(features) if features.is_semi_sharp() => {
-            let vertex = features.rules().iter().position(|&rule| rule == Rule::SemiSharp).unwrap_or(0);
-            Err(Error::SemiSharp { vertex, scheme: "subdivision" })
-        }
         None if !surface.is_closed() => Err(Error::Open { edges: surface.boundary_edges(), scheme: "subdivision" }),
         _ => Ok(()),
+    }
+}
+
+/// Refuses what Chaikin's curves have no rule for: a boundary that is treated as interior, darts, and all that is semi-sharp.
+pub(crate) fn require_curves(surface: &Surface, scheme: &'static str) -> Result<()> {
+    require_rules(surface)?;
+    require_no_semi_sharp(surface, scheme)?;
+    require_no_dart(surface, scheme)
+}
+
+/// Refuses semi-sharp edges and vertices, naming the first vertex there.
+pub(crate) fn require_no_semi_sharp(surface: &Surface, scheme: &'static str) -> Result<()> {
+    match surface.features().and_then(|features| features.at_semi_sharp(surface).first().copied()) {
+        Some(v) => Err(Error::SemiSharp { vertex: v as usize, scheme }),
+        None => Ok(()),
+    }
+}
+
+/// Refuses darts, naming the first.
+pub(crate) fn require_no_dart(surface: &Surface, scheme: &'static str) -> Result<()> {
+    match surface.features().and_then(|features| features.with_rule(Rule::Dart).first().copied()) {
+        Some(vertex) => Err(Error::dart(vertex, scheme)),
+        None => Ok(()),
     }
 }
 
@@ -37,24 +56,32 @@ pub(crate) fn require_closed(surface: &Surface) -> Result<()> {
     match surface.features() {
         Some(_) => Err(Error::NotOffered {
             what: "only refinements with rules for sharp edges take boundaries, creases and corners".into(),
-            schemes: &["catmull-clark", "loop"],
+            schemes: &["catmull-clark", "loop", "nasri", "zheng-cai", "mid-edge"],
         }),
         None => Ok(()),
     }
 }
 
-/// Refuses a mesh that is not closed or has a face that is no triangle, naming the first such face.
-pub(crate) fn require_triangles(surface: &Surface, scheme: &'static str) -> Result<()> {
-    require_closed(surface)?;
-    require_triangles_alone(surface, scheme)
-}
-
 /// Refuses a mesh with a face that is no triangle, naming the first such face, and a boundary without rules.
-pub(crate) fn require_triangles_alone(surface: &Surface, scheme: &'static str) -> Result<()> {
+pub(crate) fn require_triangles(surface: &Surface, scheme: &'static str) -> Result<()> {
     require_rules(surface)?;
     let faces = surface.faces();
     match find_first(faces.len(), |f| faces.range(f).len() != 3) {
         Some(face) => Err(Error::NotTriangles { face, corners: faces.face(face).len(), scheme }),
+        None => Ok(()),
+    }
+}
+
+/// Refuses two triangles with the same corners, which a valid mesh has only beside a part with a boundary.
+pub(crate) fn require_no_pillow(surface: &Surface) -> Result<()> {
+    if surface.is_closed() {
+        return Ok(());
+    }
+    let (topology, incidence) = (surface.topology(), surface.incidence());
+    let is_inside = |&c: &u32| topology.twin(c).is_some() && topology.twin(prev_in_triangle(c) as u32).is_some();
+    let has_two = |v: usize| incidence.face_count(v) == 2 && incidence.corners_at(v).iter().all(is_inside);
+    match find_first(surface.len(), has_two) {
+        Some(v) => refuse(format!("vertex {v} has two triangles with the same corners; remove them")),
         None => Ok(()),
     }
 }

@@ -1,8 +1,10 @@
 //! The unified √3 scheme of Lin & Luo (§4–5): a parameter α at every vertex blends the approximating √3 scheme
 //! (α = 0) with an interpolatory one (α = 1). New vertices take the mean α of their triangle.
 
-use super::sqrt3::{flip, refined_topology, relaxation};
-use super::star::{by_valence, centroid, neighbor_sum, refuse, require_room, require_triangles};
+use super::refinement::Refinement;
+use super::sqrt3::{flip, relaxation, vertex_mask};
+use super::star::{by_valence, centroid, neighbor_sum, refuse, require_room};
+use super::thirds;
 use crate::Result;
 use crate::mesh::{Mesh, Surface};
 use crate::pages::large;
@@ -18,16 +20,19 @@ pub const ALPHA_RANGE: std::ops::RangeInclusive<f64> = 0.0..=2.0;
 /// ⅓ Σ (P_i − α_i Δ_i) (Eq. 8 with Eq. 10; Eq. 4 and 9 as printed have the opposite sign of Δ). Vertices and
 /// faces are numbered as by [`sqrt3::refine`](super::sqrt3::refine).
 ///
+/// On sharp edges and vertices Δ_i is the displacement by √3 too, which is none in the first of two steps. The new points on an
+/// edge from a to b blend those of √3 with cubic interpolation, (60, 30, −5, −4)/81, by their own parameter (2α_a + α_b)/3. The
+/// paper has no rule there.
+///
 /// # Errors
-/// [`Error::Mesh`](crate::Error::Mesh) if the mesh has a boundary, a face is
-/// no triangle (the first is named), the result is too large for 32-bit indices, or a parameter lies outside [`ALPHA_RANGE`].
+/// As [`sqrt3::refine`](super::sqrt3::refine); [`Error::Mesh`](crate::Error::Mesh) with a parameter outside [`ALPHA_RANGE`].
 ///
 /// # Panics
 /// If `alpha` has not one entry for each vertex.
 pub fn refine(surface: &Surface, alpha: &[f64]) -> Result<(Mesh, Vec<f64>)> {
     let (mesh, incidence) = (surface.mesh(), surface.incidence());
     assert!(alpha.len() == mesh.len(), "one α for each vertex");
-    require_triangles(surface, "unified sqrt3")?;
+    thirds::require(surface, "unified sqrt3")?;
     require_room(mesh, 3)?;
     if let Some(v) = find_first(alpha.len(), |v| !ALPHA_RANGE.contains(&alpha[v])) {
         return refuse(format!(
@@ -40,12 +45,15 @@ pub fn refine(surface: &Surface, alpha: &[f64]) -> Result<(Mesh, Vec<f64>)> {
         [-a, a / n as f64]
     });
     let old = &mesh.positions;
-    let count = mesh.len() + mesh.faces.len();
-    let displacements = parallel::collect(mesh.len(), |v| {
+    let count = mesh.len() + mesh.faces.len() + surface.boundary_edges();
+    let mut displacements = parallel::collect(mesh.len(), |v| {
         let (n, sum) = neighbor_sum(mesh, incidence, v);
         let [a, b] = masks[n];
         a * old[v] + b * sum
     });
+    for (v, point) in thirds::moved(surface, vertex_mask) {
+        displacements[v] = point - old[v];
+    }
     let mut positions = large(Vec::with_capacity(count));
     parallel::extend(&mut positions, mesh.len(), |_| |v| old[v] + (1.0 - alpha[v]) * displacements[v]);
     // What each vertex gives to its triangles.
@@ -56,6 +64,8 @@ pub fn refine(surface: &Surface, alpha: &[f64]) -> Result<(Mesh, Vec<f64>)> {
     parallel::append(&mut parameters, alpha);
     let sum = |face: &[u32]| face.iter().map(|&v| alpha[v as usize]).sum::<f64>();
     parallel::extend(&mut parameters, mesh.faces.len(), |_| |f| sum(mesh.faces.face(f)) / 3.0);
+    thirds::set_thirds(&mut positions, surface, |a, b| (2.0 * alpha[a] + alpha[b]) / 3.0);
+    thirds::set_means(&mut parameters, surface);
     Ok((Mesh::new(positions, flip(surface)), parameters))
 }
 
@@ -68,6 +78,5 @@ pub fn refine(surface: &Surface, alpha: &[f64]) -> Result<(Mesh, Vec<f64>)> {
 /// As [`refine`].
 pub fn refined(surface: &Surface, alpha: &[f64]) -> Result<(Surface, Vec<f64>)> {
     let (mesh, parameters) = refine(surface, alpha)?;
-    let topology = refined_topology(surface, &mesh);
-    Ok((Surface::of_topology(mesh, topology), parameters))
+    Ok((Refinement::Sqrt3.refined_surface(surface, mesh)?, parameters))
 }

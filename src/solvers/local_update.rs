@@ -6,6 +6,9 @@
 //! (Gauss-Southwell; each such step lowers the energy of the symmetric system), and the threshold falls to the
 //! tolerance by steps, so that large residuals go first. Where the first of these steps tell that the work would come
 //! near that of a whole solution, all is solved anew.
+//!
+//! On open and creased meshes the curves are solved anew by each edit that moves one of their points, exactly and in O(|C|);
+//! what that changes beside them is relaxed. Moving a smooth point moves no curve.
 
 use std::collections::VecDeque;
 
@@ -14,7 +17,8 @@ use glam::DVec3;
 use super::iteration::Stop;
 use super::mixed;
 use super::system::Rows;
-use crate::assemble::Operator;
+use crate::assemble::{Operator, StagedOperator};
+use crate::parallel;
 
 /// From one threshold to the next. Tuned: 0.3 to 0.03 differ by less than a tenth.
 const FALL: f64 = 0.1;
@@ -30,16 +34,19 @@ const MOST: usize = 10_000;
 /// Marks of a vertex.
 const QUEUED: u8 = 1;
 const TOUCHED: u8 = 2;
+const FIXED: u8 = 4;
 
 /// Points, their control points, and the residual between them, kept up to date through edits.
 pub struct Editor<'a> {
     operator: &'a Operator,
+    /// With curves: these, and room for their points.
+    staged: Option<(&'a StagedOperator, Vec<DVec3>)>,
     points: Vec<DVec3>,
     control: Vec<DVec3>,
-    /// P − A V.
+    /// P − A V; of no meaning at fixed vertices.
     residual: Vec<DVec3>,
     queue: VecDeque<u32>,
-    /// [`QUEUED`], [`TOUCHED`].
+    /// [`QUEUED`], [`TOUCHED`], [`FIXED`].
     marks: Vec<u8>,
     /// Vertices whose residual this edit has changed.
     touched: Vec<u32>,
@@ -65,10 +72,50 @@ impl<'a> Editor<'a> {
     /// # Panics
     /// If there is not one point a vertex in both.
     pub fn new(operator: &'a Operator, points: Vec<DVec3>, control: Vec<DVec3>) -> Self {
+        Self::made(operator, None, points, control)
+    }
+
+    /// As [`new`](Self::new), on an open or creased mesh. The curves are solved here, so that `control` need not hold them.
+    ///
+    /// # Panics
+    /// As [`new`](Self::new).
+    ///
+    /// ```
+    /// use glam::DVec3;
+    /// use limitlab::assemble::StagedOperator;
+    /// use limitlab::interpolate::{Interpolator, limit_points};
+    /// use limitlab::mesh::{Surface, builtin, features::Tags};
+    /// use limitlab::schemes::Scheme;
+    /// use limitlab::solvers::{Stop, local_update::Editor};
+    ///
+    /// let cube = Surface::new(builtin::builtin("quad-sphere:3")?)?;
+    /// let corner = cube.tagged(&Tags { corners: vec![(0, 10.0)], ..Tags::default() })?;
+    /// let stop = Stop { tolerance: 1e-10, max_iterations: 1000 };
+    /// let mut control = Vec::new();
+    /// Interpolator::new(&corner, Scheme::CatmullClark, None)?.solve(corner.positions(), &mut control, &stop);
+    /// let operator = StagedOperator::new(&corner, Scheme::CatmullClark)?;
+    /// let mut editor = Editor::staged(&operator, corner.positions().to_vec(), control);
+    /// editor.edit(&[(0, DVec3::new(0.0, 0.0, 2.0))], 1e-10, usize::MAX);
+    /// let limits = limit_points(&corner.with_positions(editor.control().to_vec()), Scheme::CatmullClark)?;
+    /// assert_eq!(limits[0], DVec3::new(0.0, 0.0, 2.0));
+    /// assert!(limits[1].distance(corner.positions()[1]) < 1e-9);
+    /// # Ok::<(), limitlab::Error>(())
+    /// ```
+    pub fn staged(operator: &'a StagedOperator, points: Vec<DVec3>, control: Vec<DVec3>) -> Self {
+        Self::made(operator.operator(), Some((operator, points.clone())), points, control)
+    }
+
+    fn made(
+        operator: &'a Operator,
+        staged: Option<(&'a StagedOperator, Vec<DVec3>)>,
+        points: Vec<DVec3>,
+        control: Vec<DVec3>,
+    ) -> Self {
         let n = operator.len();
         assert!(points.len() == n && control.len() == n, "one point a vertex");
         let mut editor = Editor {
             operator,
+            staged,
             points,
             control,
             residual: vec![DVec3::ZERO; n],
@@ -76,7 +123,15 @@ impl<'a> Editor<'a> {
             marks: vec![0; n],
             touched: Vec::new(),
         };
+        if let Some((staged, _)) = editor.staged {
+            staged.fixed().iter().for_each(|&c| editor.marks[c as usize] = FIXED);
+        }
         editor.evaluate();
+        editor.solve_curves();
+        for &v in &editor.touched {
+            editor.marks[v as usize] = 0;
+        }
+        editor.touched.clear();
         editor
     }
 
@@ -114,14 +169,18 @@ impl<'a> Editor<'a> {
             self.marks[v as usize] = 0;
         }
         self.touched.clear();
-        let mut largest = 0.0f64;
+        let mut on_curves = false;
         for &(v, p) in moves {
             let i = v as usize;
             self.residual[i] += p - self.points[i];
             self.points[i] = p;
             self.touch(i);
-            largest = largest.max(self.residual[i].length());
+            on_curves |= self.marks[i] & FIXED != 0;
         }
+        if on_curves {
+            self.solve_curves();
+        }
+        let largest = self.max_error();
         let mut relaxations = 0;
         let mut threshold = largest;
         let thresholds = (tolerance / largest).ln() / FALL.ln();
@@ -166,22 +225,48 @@ impl<'a> Editor<'a> {
         squares.fold(0.0, f64::max).sqrt()
     }
 
+    /// Brings the control points of curves and corners up to date, and the residuals beside them.
+    fn solve_curves(&mut self) {
+        let Some((staged, mut known)) = self.staged.take() else { return };
+        staged.fixed().iter().for_each(|&c| known[c as usize] = self.points[c as usize]);
+        staged.curves().solve(&mut known);
+        for (k, &c) in staged.fixed().iter().enumerate() {
+            let change = known[c as usize] - self.control[c as usize];
+            self.control[c as usize] = known[c as usize];
+            if change != DVec3::ZERO {
+                for &(i, a) in staged.column(k) {
+                    self.residual[i as usize] -= a * change;
+                    self.touch(i as usize);
+                }
+            }
+        }
+        self.staged = Some((staged, known));
+    }
+
     fn solve_all(&mut self, tolerance: f64) {
         let stop = Stop { tolerance, max_iterations: MOST };
-        self.control = mixed::solve(self.operator, &self.points, &stop).0;
+        match &self.staged {
+            None => self.control = mixed::solve(self.operator, &self.points, &stop).0,
+            Some((staged, _)) => {
+                // What is missing vanishes on the curves.
+                staged.fixed().iter().for_each(|&c| self.residual[c as usize] = DVec3::ZERO);
+                let missing = mixed::solve(self.operator, &self.residual, &stop).0;
+                parallel::change(&mut self.control, |i, v| *v += missing[i]);
+            }
+        }
         self.evaluate();
         (0..self.points.len()).for_each(|i| self.touch(i));
     }
 
     fn touch(&mut self, i: usize) {
-        if self.marks[i] & TOUCHED == 0 {
+        if self.marks[i] & (TOUCHED | FIXED) == 0 {
             self.marks[i] |= TOUCHED;
             self.touched.push(i as u32);
         }
     }
 
     fn enqueue(&mut self, i: usize, threshold: f64) {
-        if self.residual[i].length_squared() > threshold * threshold && self.marks[i] & QUEUED == 0 {
+        if self.residual[i].length_squared() > threshold * threshold && self.marks[i] & (QUEUED | FIXED) == 0 {
             self.marks[i] |= QUEUED;
             self.queue.push_back(i as u32);
         }

@@ -18,7 +18,8 @@ use super::iteration::{Errors, Failure, Outcome, Report, Step, Stop, WarmStart, 
 use super::jacobi::{Jacobi, THALL_OMEGA};
 use super::pia::Pia;
 use super::ssor::Ssor;
-use super::system::{Rows, System};
+use super::system::{Entries, Rows, System};
+use crate::assemble::LimitSystem;
 use crate::error::Error;
 
 /// ω of `sor` unless told: about the best for all schemes on irregular meshes. Tuned on the sweeps in
@@ -192,6 +193,39 @@ impl<'a> Method<'a> {
         }
     }
 
+    /// Whether the method needs A = H·M with a symmetric M: Cholesky and its relatives, conjugate gradients, and iterations made
+    /// for an interval of eigenvalues, which have to be real. The others run on any A with a positive diagonal; that they
+    /// converge is proven for symmetric M only.
+    pub fn needs_symmetry(self) -> bool {
+        match self {
+            Method::Cholesky
+            | Method::SecondCholesky
+            | Method::Ldlt
+            | Method::Chebyshev { .. }
+            | Method::Cg
+            | Method::PlainCg
+            | Method::PcgJacobi
+            | Method::PcgSsor { .. }
+            | Method::PcgIc0
+            | Method::HeavyBall { .. } => true,
+            Method::Lu
+            | Method::Jacobi { .. }
+            | Method::Thall
+            | Method::GaussSeidel { .. }
+            | Method::Sor { .. }
+            | Method::Ssor { .. }
+            | Method::Pia
+            | Method::WPia { .. }
+            | Method::Anderson { .. } => false,
+        }
+    }
+
+    /// The error of a method that [needs symmetry](Self::needs_symmetry), on a matrix that has none because of this vertex.
+    pub fn refused_at(self, vertex: usize) -> Error {
+        let others = Method::ALL.into_iter().filter(|method| !method.needs_symmetry());
+        Error::Unsymmetric { vertex, method: self.name(), others: others.map(Method::name).collect() }
+    }
+
     /// The same in another vertex order, where the method sweeps in one.
     pub fn in_order(self, order: Option<&'a [u32]>) -> Self {
         match self {
@@ -298,7 +332,8 @@ pub struct Solution {
 }
 
 /// Solves `A V = P` from V = P, on a stored matrix or without one. A set-up that fails (a singular matrix, a breakdown, a
-/// factorization of a matrix that is not [stored](System::stored)) is an outcome with the start as its history, and V = P.
+/// factorization of a matrix that is not [stored](System::stored), a matrix [without
+/// symmetry](crate::assemble::GeneralSystem) that the method [needs](Method::needs_symmetry)) is an outcome with the start as its history, and V = P.
 ///
 /// # Panics
 /// If there is not one point a vertex, or an order names a vertex that the system lacks.
@@ -402,7 +437,16 @@ pub fn run_from<S: System>(
 type Prepared<'a> = (Box<dyn WarmStart + 'a>, Option<usize>);
 
 fn prepare<'a, S: System>(system: &'a S, points: &'a [DVec3], method: Method<'a>) -> Result<Prepared<'a>, Failure> {
+    if method.needs_symmetry() && matches!(system.stored(), Some(Entries::Rows(_))) {
+        return Err(without_symmetry(method));
+    }
     let stored = || system.stored().ok_or_else(|| without_entries(method));
+    let symmetric = || -> Result<&'a LimitSystem, Failure> {
+        match stored()? {
+            Entries::Factors(system) => Ok(system),
+            Entries::Rows(_) => Err(without_symmetry(method)),
+        }
+    };
     let bounds = system.bounds();
     let jacobi_omega = |omega: Option<f64>| {
         omega.unwrap_or_else(|| 2.0 / (bounds.jacobi_lambda_min.max(0.0) + bounds.jacobi_lambda_max))
@@ -413,10 +457,16 @@ fn prepare<'a, S: System>(system: &'a S, points: &'a [DVec3], method: Method<'a>
         interval.unwrap_or_else(|| (bounds.lambda_min.max(LOWEST * bounds.lambda_max), bounds.lambda_max))
     };
     let iterate: Box<dyn WarmStart + 'a> = match method {
-        Method::Lu => return direct(system, points, SparseLu::new(stored()?)?),
-        Method::Cholesky => return direct(system, points, Cholesky::new(&stored()?.m, CholeskyForm::Llt)?),
-        Method::Ldlt => return direct(system, points, Cholesky::new(&stored()?.m, CholeskyForm::Ldlt)?),
-        Method::SecondCholesky => return direct(system, points, SecondOpinion::new(&stored()?.m)?),
+        Method::Lu => {
+            let factors = match stored()? {
+                Entries::Factors(system) => SparseLu::new(system)?,
+                Entries::Rows(a) => SparseLu::of_rows(a)?,
+            };
+            return direct(system, points, factors);
+        }
+        Method::Cholesky => return direct(system, points, Cholesky::new(&symmetric()?.m, CholeskyForm::Llt)?),
+        Method::Ldlt => return direct(system, points, Cholesky::new(&symmetric()?.m, CholeskyForm::Ldlt)?),
+        Method::SecondCholesky => return direct(system, points, SecondOpinion::new(&symmetric()?.m)?),
         Method::Jacobi { omega } => Box::new(Jacobi::new(system, points, jacobi_omega(omega))),
         Method::Thall => Box::new(Jacobi::new(system, points, THALL_OMEGA)),
         Method::GaussSeidel { order } => Box::new(Sor::new(system, points, 1.0, order)),
@@ -438,7 +488,7 @@ fn prepare<'a, S: System>(system: &'a S, points: &'a [DVec3], method: Method<'a>
         Method::PcgJacobi => cg(system, points, Preconditioner::jacobi(system)),
         Method::PcgSsor { omega } => cg(system, points, Preconditioner::Ssor { omega }),
         Method::PcgIc0 => {
-            let factor = IncompleteCholesky::new(&stored()?.m)?;
+            let factor = IncompleteCholesky::new(&symmetric()?.m)?;
             cg(system, points, Preconditioner::IncompleteCholesky(factor))
         }
     };
@@ -450,6 +500,14 @@ fn without_entries(method: Method) -> Failure {
     Failure {
         outcome: Outcome::Breakdown,
         detail: format!("{method} factors the matrix, and this system does not store it: assemble a LimitSystem"),
+    }
+}
+
+/// A method for symmetric matrices is asked of one that is not.
+fn without_symmetry(method: Method) -> Failure {
+    Failure {
+        outcome: Outcome::Breakdown,
+        detail: format!("{method} needs a symmetric M, and no diagonal makes this matrix symmetric"),
     }
 }
 

@@ -8,10 +8,20 @@ use glam::DVec3;
 use super::iteration::Errors;
 use crate::assemble::bounds::SpectralBounds;
 use crate::assemble::weights::Point;
-use crate::assemble::{LimitSystem, Operator};
+use crate::assemble::{Csr, GeneralSystem, LimitSystem, Operator};
 use crate::parallel;
 
-/// The matrix A of a limit system: A = H·M with H = diag(weights) positive and M symmetric.
+/// Stored matrices: what factorizations need.
+#[derive(Clone, Copy, Debug)]
+pub enum Entries<'a> {
+    /// A = H·M with both factors.
+    Factors(&'a LimitSystem),
+    /// The rows of an A without symmetry.
+    Rows(&'a Csr),
+}
+
+/// The matrix A of a limit system: A = H·M with H = diag(weights) positive and M symmetric, or an A
+/// [without symmetry](GeneralSystem), for which H = I.
 pub trait System: Sync {
     /// The number of unknown points N.
     fn len(&self) -> usize;
@@ -35,8 +45,8 @@ pub trait System: Sync {
         self.bounds().lambda_max
     }
 
-    /// The stored matrices, where there are any: what factorizations need.
-    fn stored(&self) -> Option<&LimitSystem> {
+    /// The stored matrices, where there are any.
+    fn stored(&self) -> Option<Entries<'_>> {
         None
     }
 
@@ -74,13 +84,40 @@ impl System for LimitSystem {
         self.bounds
     }
 
-    fn stored(&self) -> Option<&LimitSystem> {
-        Some(self)
+    fn stored(&self) -> Option<Entries<'_>> {
+        Some(Entries::Factors(self))
     }
 
     #[inline]
     fn row<P: Point>(&self, i: usize, x: &[P]) -> P {
         self.a.row_times(i, x)
+    }
+}
+
+impl System for GeneralSystem {
+    fn len(&self) -> usize {
+        self.matrix().len()
+    }
+
+    fn weights(&self) -> &[f64] {
+        GeneralSystem::weights(self)
+    }
+
+    fn diagonal(&self) -> &[f64] {
+        GeneralSystem::diagonal(self)
+    }
+
+    fn bounds(&self) -> SpectralBounds {
+        GeneralSystem::bounds(self)
+    }
+
+    fn stored(&self) -> Option<Entries<'_>> {
+        Some(Entries::Rows(self.matrix()))
+    }
+
+    #[inline]
+    fn row<P: Point>(&self, i: usize, x: &[P]) -> P {
+        self.matrix().row_times(i, x)
     }
 }
 

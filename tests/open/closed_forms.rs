@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 use limitlab::analysis::dense;
 use limitlab::assemble::Stages;
+use limitlab::mesh::generate::{disc, triangle};
 use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Faces, Mesh, Surface};
 use limitlab::schemes::Scheme;
@@ -97,35 +98,20 @@ fn bands() {
     }
 }
 
-/// A vertex and n triangles about it, or n quads.
-fn disc(n: u32, size: u32) -> Mesh {
-    let rim = (size - 2) * n;
-    let mut faces = Faces::default();
-    for k in 0..n {
-        let corners = (0..size - 1).map(|j| 1 + ((size - 2) * k + j) % rim);
-        faces.push(&std::iter::once(0).chain(corners).collect::<Vec<_>>());
-    }
-    let point = |k: u32| match k {
-        0 => DVec3::Z,
-        k => DVec3::new((TAU * f64::from(k) / f64::from(rim)).cos(), (TAU * f64::from(k) / f64::from(rim)).sin(), 0.0),
-    };
-    Mesh::new((0..=rim).map(point).collect(), faces)
-}
-
 #[test]
 fn fans_and_discs() {
     for n in [3, 4, 5, 6, 9, 20] {
-        let x = f64::from(n);
+        let x = n as f64;
         let cosine = (TAU / x).cos();
         let part = 0.625 - (0.375 + 0.25 * cosine).powi(2);
         // The neighbours together have part/(part + 3/8) of the limit.
         let by_loop = 0.375 / (0.375 + part);
         let by_sqrt3 = 1.0 / (1.0 + 3.0 * (4.0 - 2.0 * cosine) / 9.0);
         for (scheme, own) in [(Scheme::Loop, by_loop), (Scheme::Sqrt3, by_sqrt3)] {
-            let all = std::iter::once(own).chain(cycle(scheme, n as usize)).collect();
+            let all = std::iter::once(own).chain(cycle(scheme, n)).collect();
             hold(&open(disc(n, 3), Boundary::EdgeOnly), scheme, all, 1e-7);
         }
-        let all = std::iter::once(x / (x + 5.0)).chain(cycle(Scheme::CatmullClark, 2 * n as usize)).collect();
+        let all = std::iter::once(x / (x + 5.0)).chain(cycle(Scheme::CatmullClark, 2 * n)).collect();
         hold(&open(disc(n, 4), Boundary::EdgeOnly), Scheme::CatmullClark, all, 1e-7);
     }
 }
@@ -135,26 +121,12 @@ fn fans_and_discs() {
 #[test]
 fn triangles() {
     for m in [2, 3, 4, 7, 10] {
-        let number = |a: usize, b: usize| (a * (2 * m + 3 - a) / 2 + b) as u32;
-        let mut faces = Faces::default();
-        let mut points = Vec::new();
-        for a in 0..=m {
-            for b in 0..=m - a {
-                points.push(DVec3::new(a as f64, b as f64, (a * b) as f64));
-                if a + b < m {
-                    faces.push(&[number(a, b), number(a + 1, b), number(a, b + 1)]);
-                }
-                if a + b + 1 < m {
-                    faces.push(&[number(a + 1, b), number(a + 1, b + 1), number(a, b + 1)]);
-                }
-            }
-        }
         let t = TAU / (3 * m) as f64;
         let inner = (1..m).flat_map(|a| (1..m - a).map(move |b| (a as f64, b as f64)));
         let inner = inner
             .map(|(a, b)| 0.5 + ((t * (2.0 * a + b)).cos() + (t * (a + 2.0 * b)).cos() + (t * (a - b)).cos()) / 6.0);
         let inner: Vec<f64> = inner.collect();
-        let surface = open(Mesh::new(points, faces), Boundary::EdgeOnly);
+        let surface = open(triangle(m), Boundary::EdgeOnly);
         for scheme in [Scheme::Loop, Scheme::Sqrt3] {
             hold(&surface, scheme, inner.iter().copied().chain(cycle(scheme, 3 * m)).collect(), 1e-6);
         }

@@ -5,19 +5,19 @@ use limitlab::Error;
 use limitlab::analysis::comparison::with_spectrum;
 use limitlab::analysis::singularity::Singularity;
 use limitlab::analysis::spectrum::spectrum;
-use limitlab::assemble::{LimitSystem, Stages};
+use limitlab::assemble::{LimitSystem, StagedOperator, Stages};
 use limitlab::interpolate::normals::{Rotation, rotate_rings};
-use limitlab::interpolate::zheng_cai::{self, PhaseOne};
 use limitlab::interpolate::{Interpolator, Options, Tolerance, interpolate, limit_points, staged};
 use limitlab::mesh::features::{Rule, Tags};
 use limitlab::mesh::generate::union;
 use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Faces, Mesh, Surface};
 use limitlab::schemes::Scheme;
+use limitlab::solvers::local_update::Editor;
 use limitlab::solvers::{Method, Outcome, Stop};
 use nalgebra::{DMatrix, DVector};
 
-use super::{open, random_creased, random_points, random_semi_sharp};
+use super::{grid, open, random_creased, random_points, random_semi_sharp};
 use crate::common::meshes::built_in;
 
 /// By dense elimination on the whole matrix.
@@ -103,6 +103,72 @@ fn points_that_move_are_followed() {
         assert_eq!(interpolator.solve(&points, &mut control, &stop).outcome, Outcome::Converged);
         assert!(distance(&control, &dense(&stages, &points)) <= 1e-9);
     }
+}
+
+#[test]
+fn local_edits_on_curves_and_beside_them_are_full_solves() {
+    let stop = Stop { tolerance: 1e-12, max_iterations: 1000 };
+    for scheme in Scheme::ALL {
+        let mut tried = 0;
+        for seed in 0..400 {
+            let Some((surface, _)) = random_creased(scheme, seed) else { continue };
+            let stages = Stages::new(&surface, scheme, None).unwrap();
+            let (block, Some(features)) = (stages.block(), surface.features()) else { continue };
+            // What is nearly singular takes too long.
+            if block.len() < 3 || spectrum(block).unwrap().a.min < 0.02 {
+                continue;
+            }
+            let n = surface.len();
+            let operator = StagedOperator::new(&surface, scheme).unwrap();
+            // The curves are found where the start lacks them.
+            let mut start = dense(&stages, surface.positions());
+            operator.fixed().iter().for_each(|&c| start[c as usize] += DVec3::ONE);
+            let mut editor = Editor::staged(&operator, surface.positions().to_vec(), start);
+            editor.edit(&[], stop.tolerance, usize::MAX);
+            let rules = [Rule::Crease, Rule::Corner, Rule::Smooth];
+            let of = |rule: Rule| (0..n).filter(move |&v| features.rules()[v] == rule);
+            for (k, rule) in rules.into_iter().enumerate() {
+                for v in of(rule).take(2) {
+                    let moves = [(v as u32, editor.points()[v] + DVec3::new(0.3, 0.1 * k as f64, -0.2))];
+                    let edit = editor.edit(&moves, stop.tolerance, usize::MAX);
+                    assert!(edit.max_error <= stop.tolerance);
+                    let expected = dense(&stages, editor.points());
+                    for (w, (a, b)) in editor.control().iter().zip(&expected).enumerate() {
+                        let off = a.distance(*b);
+                        let least = if features.is_smooth(w) { 1e-9 } else { 1e-13 };
+                        assert!(off <= least, "{scheme}, seed {seed}, {rule:?} {v}, at {w}: {off:e}");
+                    }
+                }
+            }
+            // All at once: solved anew.
+            let moves: Vec<(u32, DVec3)> = (0..n as u32).zip(random_points(n, seed + 5)).collect();
+            editor.edit(&moves, stop.tolerance, usize::MAX);
+            assert!(distance(editor.control(), &dense(&stages, editor.points())) <= 1e-9, "{scheme}, seed {seed}");
+            tried += 1;
+            if tried == 12 {
+                break;
+            }
+        }
+        assert!(tried == 12, "{scheme}: {tried}");
+    }
+    // Far from the edit nothing is touched, on the curve neither; and many edits at once solve all anew.
+    let surface = open(grid(120, 110, false), Boundary::EdgeAndCorner);
+    let operator = StagedOperator::new(&surface, Scheme::CatmullClark).unwrap();
+    let mut control = Vec::new();
+    let mut interpolator = Interpolator::new(&surface, Scheme::CatmullClark, None).unwrap();
+    interpolator.solve(surface.positions(), &mut control, &stop);
+    let mut editor = Editor::staged(&operator, surface.positions().to_vec(), control);
+    let edit = editor.edit(&[(50, surface.positions()[50] + DVec3::Z)], 1e-9, usize::MAX);
+    assert!(!edit.anew && edit.touched < 1500, "{edit:?}");
+    let mut anew = Vec::new();
+    interpolator.solve(editor.points(), &mut anew, &stop);
+    assert!(distance(editor.control(), &anew) <= 1e-7);
+    let moved = editor.points().iter().map(|&p| p + DVec3::new(0.0, 0.0, (0.1 * p.x).sin()));
+    let moves: Vec<(u32, DVec3)> = (0..).zip(moved).collect();
+    let edit = editor.edit(&moves, 1e-9, usize::MAX);
+    assert!(edit.anew && edit.max_error <= 1e-9, "{edit:?}");
+    interpolator.solve(editor.points(), &mut anew, &stop);
+    assert!(distance(editor.control(), &anew) <= 1e-7);
 }
 
 /// Theorem: A is singular exactly where a component without boundary, crease and corner is singular by itself.
@@ -195,7 +261,7 @@ fn what_cannot_be_is_refused_by_name() {
     assert!(matches!(LimitSystem::new(&dart, Scheme::CatmullClark), Err(Error::Creased { .. })));
     let cholesky = Options { method: Some(Method::Cholesky), ..Options::default() };
     let refused = interpolate(&dart, Scheme::CatmullClark, &cholesky);
-    assert!(matches!(refused, Err(Error::Unsymmetric { vertex: 0, method: "cholesky" })));
+    assert!(matches!(refused, Err(Error::Unsymmetric { vertex: 0, method: "cholesky", .. })));
     let semi = cube.tagged(&Tags { creases: vec![([0, 1], 2.5)], ..Tags::default() }).unwrap();
     assert_eq!(semi.features().unwrap().count(Rule::SemiSharp), 2);
     assert!(matches!(Stages::new(&semi, Scheme::ZhengCai, None), Err(Error::SemiSharp { vertex: 0, .. })));
@@ -214,12 +280,45 @@ fn what_cannot_be_is_refused_by_name() {
     assert!(cube.tagged(&creases([0, 1], 0.0)).unwrap().features().is_none());
 }
 
+/// Of smooth vertices of open and creased meshes: all limit points stay, and the normals are those given.
+#[test]
+fn turned_rings_beside_curves_have_the_given_normals() {
+    for scheme in [Scheme::CatmullClark, Scheme::Loop, Scheme::Sqrt3] {
+        let (mut turned, refinement) = (0, scheme.refinement());
+        for seed in 0..40 {
+            let Some((surface, _)) = random_creased(scheme, seed) else { continue };
+            let Some(features) = surface.features() else { continue };
+            if surface.len() > 60 {
+                continue;
+            }
+            let before = refinement.limit_positions(&surface).unwrap();
+            let found = refinement.limit_normals(&surface).unwrap();
+            let lean = random_points(surface.len(), seed + 9);
+            let is_given = |v: usize| v % 3 != 2 && features.is_smooth(v) && found[v] != DVec3::ZERO;
+            let wanted: Vec<Option<DVec3>> =
+                (0..surface.len()).map(|v| is_given(v).then(|| found[v] + 0.4 * lean[v])).collect();
+            for levels in [1, 2] {
+                let rotation = Rotation { levels, ..Rotation::default() };
+                let result = rotate_rings(&surface, refinement, &wanted, rotation).unwrap();
+                let fine = refinement.refined(&result.surface).unwrap();
+                let limits = refinement.limit_positions(&fine).unwrap();
+                assert!(distance(&before, &limits[..surface.len()]) < 1e-12, "{scheme}, seed {seed}");
+                let after = refinement.limit_normals(&fine).unwrap();
+                for v in 0..surface.len() {
+                    let expected = wanted[v].map_or(found[v], |n| n.normalize());
+                    assert!(after[v].distance(expected) < 1e-9, "{scheme}, seed {seed}, vertex {v}");
+                    turned += usize::from(wanted[v].is_some());
+                }
+            }
+        }
+        assert!(turned > 200, "{scheme}: {turned}");
+    }
+}
+
 /// What has no rules for boundaries says so, and gives no wrong answer.
 #[test]
-fn pipelines_without_rules_for_boundaries_refuse_them() {
+fn rings_on_a_boundary_are_not_turned() {
     let surface = open(super::grid(5, 6, false), Boundary::EdgeAndCorner);
-    let refused = zheng_cai::auxiliary(&surface, None, &PhaseOne::default());
-    assert!(matches!(refused, Err(Error::Creased { .. })));
     let mut normals = vec![None; surface.len()];
     normals[8] = Some(DVec3::Z);
     let turn = |normals: &[Option<DVec3>]| {

@@ -13,7 +13,7 @@ use limitlab::mesh::{Faces, Mesh, Surface, Topology};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark, loop_scheme};
 
 use super::naive::{Creased, edge, faces_by_edge};
-use super::{grid, open, random_creased, random_points};
+use super::{grid, open, random_creased, random_points, random_semi_sharp};
 
 type Step = fn(&Creased) -> Creased;
 const SCHEMES: [(Scheme, Refinement, Step); 2] = [
@@ -21,23 +21,22 @@ const SCHEMES: [(Scheme, Refinement, Step); 2] = [
     (Scheme::Loop, Refinement::Loop, Creased::loop_step),
 ];
 
-/// As [`random_creased`], every second one with the darts that its corners hide.
-fn random_with_darts(scheme: Scheme, seed: u64) -> Option<(Surface, Tags)> {
+/// As [`random_creased`], every third one with the darts that its corners hide, every third one with semi-sharp tags.
+fn random_tagged(scheme: Scheme, seed: u64) -> Option<(Surface, Tags)> {
+    if seed % 3 == 2 {
+        return random_semi_sharp(scheme, seed);
+    }
     let (surface, mut tags) = random_creased(scheme, seed)?;
-    if seed % 2 == 1 {
+    if seed % 3 == 1 {
         return Some((surface, tags));
     }
     tags.corners.clear();
     Some((surface.tagged(&tags).unwrap(), tags))
 }
 
-/// The refined surface with all that is sharp tagged anew; `sharp` by its ends there.
-fn tagged_anew(fine: &Surface, sharp: impl Iterator<Item = [u32; 2]>, corners: impl Iterator<Item = u32>) -> Surface {
-    let tags = Tags {
-        boundary: fine.boundary(),
-        creases: sharp.map(|ends| (ends, 10.0)).collect(),
-        corners: corners.map(|v| (v, 10.0)).collect(),
-    };
+/// The refined surface with these tags.
+fn tagged_anew(fine: &Surface, creases: Vec<([u32; 2], f64)>, corners: Vec<(u32, f64)>) -> Surface {
+    let tags = Tags { boundary: fine.boundary(), creases, corners };
     Surface::examined(fine.mesh().clone(), None, fine.boundary()).unwrap().tagged(&tags).unwrap()
 }
 
@@ -54,25 +53,35 @@ fn hold_against_tags(coarse: &Surface, fine: &Surface) {
     let topology = coarse.topology();
     let numbers: BTreeMap<u32, u32> = topology.edge_sides().zip(coarse.len() as u32..).collect();
     let corners = coarse.faces().corners();
-    let halves = features.sharp_half_edges().iter().flat_map(|&c| {
+    let halves = |(c, s): (u32, f64)| {
         let face = coarse.faces().range(topology.incidence.face_of(c));
         let next = if c as usize + 1 == face.end { face.start } else { c as usize + 1 };
-        [[corners[c as usize], numbers[&c]], [numbers[&c], corners[next]]]
-    });
+        [([corners[c as usize], numbers[&c]], s), ([numbers[&c], corners[next]], s)]
+    };
+    let lowered = |list: &[(u32, f64)]| list.iter().map(|&(k, s)| (k, (s - 1.0).max(0.0))).collect::<Vec<_>>();
+    let sharp = features.sharp_half_edges().iter().map(|&c| (c, 10.0));
+    let creases = sharp.chain(lowered(features.semi_sharp_edges())).flat_map(halves).collect();
     let resting = (0..coarse.len() as u32).filter(|&v| features.rules()[v as usize] == Rule::Corner);
-    let anew = tagged_anew(fine, halves, resting);
+    let resting = resting.map(|v| (v, 10.0)).chain(lowered(features.semi_sharp_vertices())).collect();
+    let anew = tagged_anew(fine, creases, resting);
     assert!(fine.features() == anew.features());
-    let found = fine.features().unwrap();
-    assert_eq!(found.rules()[..coarse.len()], *features.rules());
+    let Some(found) = fine.features() else { return };
+    for (v, (before, after)) in features.rules().iter().zip(found.rules()).enumerate() {
+        assert!(before == after || (*before, *after) == (Rule::SemiSharp, Rule::Smooth), "vertex {v}");
+    }
     assert_eq!(found.creased_edges(), 2 * features.creased_edges());
 }
 
 #[test]
 fn a_step_is_the_one_by_hand_and_carries_features_over() {
-    for (scheme, refinement, step) in SCHEMES {
-        let (mut open, mut darts) = (0, 0);
-        for seed in 0..200 {
-            let Some((coarse, tags)) = random_with_darts(scheme, seed) else { continue };
+    let butterfly: (Scheme, Refinement, Step) = (Scheme::Loop, Refinement::Butterfly, Creased::butterfly);
+    for (scheme, refinement, step) in SCHEMES.into_iter().chain([butterfly]) {
+        let (mut open, mut darts, mut semi_sharp) = (0, 0, 0);
+        for seed in 0..300 {
+            let Some((coarse, tags)) = random_tagged(scheme, seed) else { continue };
+            if refinement.check(&coarse).is_err() {
+                continue;
+            }
             let by_hand = step(&Creased::of(&coarse, &tags));
             let fine = refinement.refined(&coarse).unwrap();
             assert_eq!(fine.mesh().faces, refinement.refine(&coarse).unwrap().faces);
@@ -97,8 +106,11 @@ fn a_step_is_the_one_by_hand_and_carries_features_over() {
             hold_against_tags(&fine, &refinement.refined(&fine).unwrap());
             open += usize::from(!coarse.is_closed());
             darts += coarse.features().map_or(0, |f| f.count(Rule::Dart));
+            semi_sharp += coarse.features().map_or(0, |f| f.semi_sharp_edges().len());
         }
-        assert!(open > 100 && darts > 50, "{scheme}: {open}, {darts}");
+        assert!(open > 100 && darts > 70, "{refinement}: {open}, {darts}");
+        let expected = refinement != Refinement::Butterfly;
+        assert_eq!(semi_sharp > 100, expected, "{refinement}: {semi_sharp}");
     }
 }
 
@@ -140,24 +152,29 @@ fn large_meshes_are_refined_as_small_ones() {
 #[test]
 fn limit_points_are_those_of_the_rows_and_stay_under_refinement() {
     for (scheme, refinement, _) in SCHEMES {
-        let mut darts = 0;
-        for seed in 0..200 {
-            let Some((coarse, _)) = random_with_darts(scheme, seed) else { continue };
+        let (mut darts, mut semi_sharp) = (0, 0);
+        for seed in 0..300 {
+            let Some((coarse, _)) = random_tagged(scheme, seed) else { continue };
             let limits = refinement.limit_positions(&coarse).unwrap();
-            let dart = coarse.features().map_or(0, |f| f.count(Rule::Dart));
-            if dart == 0 {
-                for (a, b) in limits.iter().zip(limit_points(&coarse, scheme).unwrap()) {
-                    assert!(a.distance(b) <= 1e-14, "{scheme}, seed {seed}");
+            for (a, b) in limits.iter().zip(limit_points(&coarse, scheme).unwrap()) {
+                assert!(a.distance(b) <= 1e-14, "{scheme}, seed {seed}");
+            }
+            darts += coarse.features().map_or(0, |f| f.count(Rule::Dart));
+            semi_sharp += coarse.features().map_or(0, |f| f.count(Rule::SemiSharp));
+            let mut finer = coarse;
+            // What is semi-sharp lives for three levels there.
+            for level in 1..4 {
+                if level > 1 && !finer.features().is_some_and(|f| f.is_semi_sharp()) {
+                    break;
+                }
+                finer = refinement.refined(&finer).unwrap();
+                for (v, (a, b)) in limits.iter().zip(refinement.limit_positions(&finer).unwrap()).enumerate() {
+                    let off = a.distance(b);
+                    assert!(off <= 1e-14, "{scheme}, seed {seed}, vertex {v}, level {level}: {off:e}");
                 }
             }
-            darts += dart;
-            let finer = refinement.limit_positions(&refinement.refined(&coarse).unwrap()).unwrap();
-            for (v, (a, b)) in limits.iter().zip(finer).enumerate() {
-                let off = a.distance(b);
-                assert!(off <= 1e-14, "{scheme}, seed {seed}, vertex {v}: {off:e}");
-            }
         }
-        assert!(darts > 50, "{darts}");
+        assert!(darts > 70 && semi_sharp > 150, "{darts}, {semi_sharp}");
     }
 }
 
@@ -189,10 +206,11 @@ fn fan(m: usize, triangles: bool, seed: u64) -> Mesh {
     Mesh::new(positions, Faces::from_lists((0..m as u32).map(face)))
 }
 
-/// The faces at vertex 0 after a step, twice as large: all that the next step there needs.
+/// The faces at vertex 0 after a step, twice as large, or after two of √3, three times: all that the next step there needs.
 fn next_star(refinement: Refinement, star: &Surface) -> Surface {
     let limit = refinement.limit_positions(star).unwrap()[0];
-    let fine = refinement.refine(star).unwrap();
+    let (steps, scale) = if refinement == Refinement::Sqrt3 { (2, 3.0) } else { (1, 2.0) };
+    let fine = refinement.refine_n(star, steps).unwrap();
     let mut number = vec![u32::MAX; fine.len()];
     let mut positions = Vec::new();
     let mut faces = Faces::default();
@@ -204,7 +222,7 @@ fn next_star(refinement: Refinement, star: &Surface) -> Surface {
             let old = *v as usize;
             if number[old] == u32::MAX {
                 number[old] = positions.len() as u32;
-                positions.push(2.0 * (fine.positions[old] - limit));
+                positions.push(scale * (fine.positions[old] - limit));
             }
             *v = number[old];
         }
@@ -267,6 +285,19 @@ fn normals_on_a_boundary_are_the_limits_of_those_of_the_faces() {
     };
     of(Refinement::CatmullClark, false, 3);
     of(Refinement::Loop, true, 5);
+    of(Refinement::Sqrt3, true, 5);
+}
+
+/// The vertices that are semi-sharp themselves, or at semi-sharp edges.
+fn at_semi_sharp(surface: &Surface) -> Vec<u32> {
+    let Some(features) = surface.features() else { return Vec::new() };
+    let (faces, corners) = (surface.faces(), surface.faces().corners());
+    let ends = features.semi_sharp_edges().iter().flat_map(|&(c, _)| {
+        let face = faces.range(surface.incidence().face_of(c));
+        let next = if c as usize + 1 == face.end { face.start } else { c as usize + 1 };
+        [corners[c as usize], corners[next]]
+    });
+    ends.chain(features.semi_sharp_vertices().iter().map(|s| s.0)).collect()
 }
 
 #[test]
@@ -274,12 +305,18 @@ fn normals_stay_under_refinement_and_are_none_where_there_are_several() {
     for (scheme, refinement, _) in SCHEMES {
         let mut held = [0; 4];
         for seed in 0..200 {
-            let Some((coarse, _)) = random_with_darts(scheme, seed) else { continue };
+            let Some((coarse, _)) = random_tagged(scheme, seed) else { continue };
             let before = refinement.limit_normals(&coarse).unwrap();
             let after = refinement.limit_normals(&refinement.refined(&coarse).unwrap()).unwrap();
             let mut star = Vec::new();
+            let semi_sharp = at_semi_sharp(&coarse);
             for (v, (a, b)) in before.iter().zip(after).enumerate() {
                 let rule = coarse.features().map_or(Rule::Smooth, |f| f.rules()[v]);
+                if rule != Rule::Corner && semi_sharp.contains(&(v as u32)) {
+                    // One after, where nothing semi-sharp is left.
+                    assert_eq!(*a, DVec3::ZERO);
+                    continue;
+                }
                 let is_boundary = !coarse.topology().star(coarse.faces(), v, &mut star);
                 let most = if scheme == Scheme::Loop { 5 } else { 3 };
                 let has_one = match rule {
@@ -328,16 +365,95 @@ fn the_surface_of_an_open_mesh_interpolates_it() {
     }
 }
 
+/// A grid of triangles over the unit lattice, its height that of a cubic.
+fn cubic_grid(p: usize, q: usize) -> (Surface, impl Fn(DVec3) -> f64) {
+    let cubic = |at: DVec3| {
+        let [x, y] = [at.x / 4.0, at.y / 4.0];
+        0.7 * x.powi(3) - 1.3 * x * x * y + 0.4 * x * y * y + 0.9 * y.powi(3) - 0.6 * x * x + 0.8 * x * y + y - 0.3
+    };
+    let mut mesh = grid(p, q, true);
+    for point in &mut mesh.positions {
+        point.z = cubic(*point);
+    }
+    let corners = [0, q - 1, (p - 1) * q, p * q - 1].map(|v| (v as u32, 10.0));
+    let tags = Tags { boundary: Boundary::EdgeOnly, corners: corners.to_vec(), ..Tags::default() };
+    (open(mesh, Boundary::EdgeOnly).tagged(&tags).unwrap(), cubic)
+}
+
+/// Along curves cubics are reproduced but next to corners, and inside where no stencil is cut; the lattice everywhere.
+#[test]
+fn butterfly_reproduces_cubics_along_the_boundary_and_lines_everywhere() {
+    let (p, q) = (9, 7);
+    let (coarse, cubic) = cubic_grid(p, q);
+    let fine = Refinement::Butterfly.refined(&coarse).unwrap();
+    let (mut curve, mut inside) = (0, 0);
+    for (e, c) in coarse.topology().edge_sides().enumerate() {
+        let face = coarse.faces().face(c as usize / 3);
+        let ends = [face[c as usize % 3], face[(c as usize + 1) % 3]].map(|v| coarse.positions()[v as usize]);
+        let point = fine.positions()[coarse.len() + e];
+        let middle = 0.5 * (ends[0] + ends[1]);
+        assert!((point - middle).truncate().length() < 1e-14, "{point}");
+        let [x, y] = [point.x, point.y];
+        let from_ends = |at: f64, count: usize| at.min(count as f64 - 1.0 - at);
+        let [dx, dy] = [from_ends(x, p), from_ends(y, q)];
+        let off = (point.z - cubic(point)).abs();
+        if dx == 0.0 || dy == 0.0 {
+            if dx.max(dy) > 1.0 {
+                assert!(off < 1e-14, "{point}: {off:e}");
+                curve += 1;
+            }
+        } else if dx.min(dy) >= 1.5 {
+            assert!(off < 1e-14, "{point}: {off:e}");
+            inside += 1;
+        }
+    }
+    assert_eq!(curve, 2 * (p - 3) + 2 * (q - 3));
+    assert!(inside > 50, "{inside}");
+}
+
+/// At smooth vertices, beside the boundary too, those of the faces in the limit; none at sharp ones.
+#[test]
+fn normals_of_interpolatory_schemes_are_limits_up_to_the_boundary() {
+    for refinement in [Refinement::Butterfly, Refinement::LabsikGreiner] {
+        let mut held = 0;
+        for seed in 0..60 {
+            let Some((coarse, _)) = random_creased(Scheme::Loop, seed) else { continue };
+            let Some(features) = coarse.features() else { continue };
+            if coarse.len() > 40 {
+                continue;
+            }
+            let before = refinement.limit_normals(&coarse).unwrap();
+            let fine = refinement.refined(&coarse).unwrap();
+            let after = refinement.limit_normals(&fine).unwrap();
+            for (v, a) in before.iter().enumerate() {
+                assert_eq!(*a != DVec3::ZERO, features.is_smooth(v), "{refinement}, seed {seed}, vertex {v}");
+                assert!(a.distance(after[v]) < 1e-9, "{refinement}, seed {seed}, vertex {v}");
+                held += usize::from(features.is_smooth(v));
+            }
+        }
+        assert!(held > 50, "{refinement}: {held}");
+    }
+}
+
 #[test]
 fn what_has_no_rules_is_refused() {
-    let mesh = grid(4, 4, true);
-    let surface = open(mesh.clone(), Boundary::EdgeOnly);
+    // One semi-sharp edge, and one dart at each of its ends.
+    let octahedron = Surface::new(limitlab::mesh::builtin::octahedron()).unwrap();
+    let tagged = |sharpness| {
+        let edge = [octahedron.faces().corners()[0], octahedron.faces().corners()[1]];
+        octahedron.tagged(&Tags { creases: vec![(edge, sharpness)], ..Tags::default() }).unwrap()
+    };
     for refinement in Refinement::ALL {
-        if matches!(refinement, Refinement::CatmullClark | Refinement::Loop) {
-            continue;
-        }
-        let message = refinement.refined(&surface).unwrap_err().to_string();
-        assert!(message.ends_with("use catmull-clark or loop"), "{message}");
+        let takes = |sharpness| match refinement.check(&tagged(sharpness)) {
+            Ok(()) => true,
+            Err(Error::Dart { .. }) => false,
+            Err(error) => panic!("{refinement}: {error}"),
+        };
+        let semi_sharp = refinement.check(&tagged(0.5));
+        let (darts, semi) = (takes(10.0), semi_sharp.is_ok());
+        let has_stars = matches!(refinement, Refinement::CatmullClark | Refinement::Loop);
+        assert_eq!((darts, semi), (has_stars || refinement == Refinement::Butterfly, has_stars), "{refinement}");
+        assert!(semi || matches!(semi_sharp, Err(Error::SemiSharp { .. })), "{refinement}");
     }
     // A boundary of vertices of valence 3 and more, without rules.
     let cube = limitlab::mesh::builtin::icosahedron();

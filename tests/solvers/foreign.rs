@@ -273,7 +273,8 @@ fn rates_are_predicted_where_rows_do_not_sum_to_1() {
     }
     // ω sweeps too: the thresholds are those of this matrix.
     let grids = vec![(Method::Pia, vec![0.01, 0.02, 0.03]), (Method::Jacobi { omega: None }, vec![0.5, 1.5])];
-    let found = sweep(&system, (&points, &points), &grids, None, &stop, rounding_floor(2.0), &|_| ()).unwrap();
+    let found =
+        sweep((&system, &spectrum), (&points, &points), &grids, None, &stop, rounding_floor(2.0), &|_| ()).unwrap();
     for row in &found.rows {
         let converges = row.predicted_rho < 1.0;
         assert_eq!(row.outcome == Outcome::Converged, converges, "{row:?}");

@@ -1,10 +1,9 @@
 //! Closed-form rates on regular tori, and what the data see of them.
 
 use limitlab::analysis::rate::observed_rate;
-use limitlab::analysis::spectrum::excited;
+use limitlab::analysis::spectrum::{excited, spectrum};
 use limitlab::analysis::sweep::{OmegaSweep, SweepRow, rounding_floor, sweep};
 use limitlab::analysis::symmetric::SymmetricForm;
-use limitlab::analysis::{Extremes, Spectrum};
 use limitlab::mesh::Mesh;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Errors, Method, Outcome, Solution, Stop};
@@ -71,7 +70,16 @@ fn torus_sweep(grid: &[f64]) -> OmegaSweep {
     let stop = Stop { tolerance: 1e-10 * mesh.diagonal(), max_iterations: 20_000 };
     let floor = rounding_floor(mesh.diagonal());
     let grids = [(JACOBI, grid.to_vec())];
-    sweep(&system, (&mesh.positions, &mesh.positions), &grids, None, &stop, floor, &|_| {}).unwrap()
+    sweep(
+        (&system, &spectrum(&system).unwrap()),
+        (&mesh.positions, &mesh.positions),
+        &grids,
+        None,
+        &stop,
+        floor,
+        &|_| {},
+    )
+    .unwrap()
 }
 
 /// On noisy points the constant vector, which has 9/4, is not excited; its neighbours in frequency are.
@@ -83,8 +91,8 @@ fn the_noisy_torus_is_best_at_four_fifths_and_diverges_where_an_excited_mode_gro
     let grid: Vec<f64> = (1..=190).map(|k| k as f64 / 200.0).filter(|w| *w >= 0.7).collect();
     let sweep = torus_sweep(&grid);
     let thresholds = sweep.thresholds[0];
-    assert!((thresholds.matrix.critical_omega() - 8.0 / 9.0).abs() < tol::ESTIMATE);
-    assert!((thresholds.matrix.optimal_omega() - 0.8).abs() < tol::ESTIMATE);
+    assert!((thresholds.critical_omega - 8.0 / 9.0).abs() < tol::ESTIMATE);
+    assert!((thresholds.optimal_omega - 0.8).abs() < tol::ESTIMATE);
     let data = thresholds.data.unwrap();
     assert!((data.critical_omega() - threshold).abs() < tol::ESTIMATE, "{}", data.critical_omega());
     for row in &sweep.rows {
@@ -121,7 +129,6 @@ fn the_best_omega_has_the_fewest_iterations_then_the_smallest_error() {
         errors: Errors { max, mean: 0.5 * max },
     };
     let (converged, pia) = (Outcome::Converged, Method::Pia);
-    let all = Extremes { min: 0.1, max: 1.0 };
     let rows = vec![
         row(pia, 0.9, converged, 30, 1e-12),
         row(pia, 1.0, converged, 20, 3e-11),
@@ -130,7 +137,7 @@ fn the_best_omega_has_the_fewest_iterations_then_the_smallest_error() {
         row(pia, 1.3, Outcome::MaxIterations, 10, 1e-13),
         row(JACOBI, 0.8, converged, 5, 1e-13),
     ];
-    let sweep = OmegaSweep { spectrum: Spectrum { a: all, jacobi: all }, thresholds: Vec::new(), rows };
+    let sweep = OmegaSweep { thresholds: Vec::new(), rows };
     assert_eq!(sweep.best(pia).map(|r| r.omega), Some(1.1));
     assert_eq!(sweep.best(JACOBI).map(|r| r.omega), Some(0.8));
     assert_eq!(sweep.best(Method::Sor { omega: 1.1, order: None }), None);

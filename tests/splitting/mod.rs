@@ -5,6 +5,7 @@ mod blend;
 mod maps;
 mod matrices;
 mod printed;
+mod sharp;
 
 use limitlab::analysis::splitting::LocalScheme;
 

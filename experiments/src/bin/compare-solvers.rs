@@ -5,12 +5,15 @@ use std::process::ExitCode;
 use clap::Parser;
 use serde_json::json;
 
-use limitlab::Result;
 use limitlab::analysis::comparison::{self, MethodRow};
-use limitlab::analysis::spectrum::spectrum;
+use limitlab::analysis::complex_spectrum::ComplexSpectrum;
+use limitlab::analysis::spectrum::{Spectra, spectrum};
 use limitlab::mesh::order::Order;
-use limitlab::solvers::Method;
-use limitlab_experiments::cli::{self, CommonFlags, List, MeshFlags, OutputFlags, Problem, Progress, StopFlags};
+use limitlab::solvers::{Method, System};
+use limitlab::{Error, Result};
+use limitlab_experiments::cli::{
+    self, CommonFlags, List, Matrix, MeshFlags, OutputFlags, Problem, Progress, StopFlags,
+};
 use limitlab_experiments::studies::comparison::{self as study, Asked};
 
 /// Runs every method on the same system from the same start V = P, and prints iterations, errors, observed and
@@ -18,6 +21,8 @@ use limitlab_experiments::studies::comparison::{self as study, Asked};
 ///
 /// A folder is taken for a system of anybody: M.mtx (symmetric positive definite), H.mtx (the positive diagonal of H; the
 /// identity if it is missing) and P.mtx (N×3, N×2 or N×1) of A V = P, A = H·M, as `assemble` writes them.
+///
+/// Where a mesh has darts or semi-sharp vertices, methods that need a symmetric M are left out, and the others run on all of A.
 #[derive(Parser)]
 #[command(name = "compare-solvers", version)]
 struct Arguments {
@@ -79,7 +84,6 @@ fn run(arguments: &Arguments) -> Result<()> {
 
 /// The rows, their errors in the units of the files.
 fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<MethodRow<'a>>> {
-    let system = problem.system();
     let asked = match &arguments.method {
         Some(list) => list.0.clone(),
         None => Method::ALL.into_iter().map(Asked::Method).chain([Asked::Auto]).collect(),
@@ -87,13 +91,26 @@ fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<Method
     let method = |asked: &Asked| if let Asked::Method(method) = *asked { Some(method) } else { None };
     let methods: Vec<Method> = asked.iter().filter_map(method).collect();
     let auto = asked.contains(&Asked::Auto);
-    let spectrum = spectrum(system)?;
-    let order_name = arguments.order.to_string();
-    let lines = comparison::entries(system, &spectrum, &methods, Some(&problem.order), &order_name)?;
-    let count = lines.len() + usize::from(auto);
-    let progress = Progress::new(&problem.subject.name, count, arguments.common.quiet);
-    let done = &mut || progress.step();
-    let mut rows = comparison::compare(system, &spectrum, problem.data(), &lines, &[], &problem.stop, done)?;
+    let progress = |lines| Progress::new(&problem.subject.name, lines + usize::from(auto), arguments.common.quiet);
+    let (progress, mut rows) = match problem.matrix() {
+        Matrix::Symmetric(system) => by_methods(problem, system, &spectrum(system)?, &methods, arguments, progress)?,
+        Matrix::General(system, vertex) => {
+            let (left_out, methods): (Vec<_>, Vec<_>) = methods.into_iter().partition(|method| method.needs_symmetry());
+            if let (Some(refused), true) = (left_out.first(), methods.is_empty() && !auto) {
+                return Err(Error::mesh(&problem.subject.name, refused.refused_at(vertex).to_string()));
+            }
+            if !left_out.is_empty() {
+                let names: Vec<&str> = left_out.iter().map(|method| method.name()).collect();
+                arguments.common.remark(format_args!(
+                    "{}: vertex {vertex} is a dart or semi-sharp, and no diagonal makes the matrix symmetric: left out {}",
+                    problem.subject.name,
+                    names.join(", ")
+                ));
+            }
+            let spectrum = ComplexSpectrum::new(system)?;
+            by_methods(problem, system, &spectrum, &methods, arguments, progress)?
+        }
+    };
     if auto {
         rows.push(study::auto_row(problem.auto()?));
         progress.step();
@@ -102,4 +119,21 @@ fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<Method
         *errors = *errors * problem.scale;
     }
     Ok(rows)
+}
+
+/// The rows of methods by name, and the progress with one step left for `auto`.
+fn by_methods<'a>(
+    problem: &'a Problem,
+    system: &impl System,
+    spectra: &(impl Spectra + Clone),
+    methods: &[Method<'a>],
+    arguments: &Arguments,
+    progress: impl FnOnce(usize) -> Progress,
+) -> Result<(Progress, Vec<MethodRow<'a>>)> {
+    let order_name = arguments.order.to_string();
+    let lines = comparison::entries(system, spectra, methods, Some(&problem.order), &order_name)?;
+    let progress = progress(lines.len());
+    let done = &mut || progress.step();
+    let rows = comparison::compare_entries(system, spectra, problem.data(), &lines, &problem.stop, done)?;
+    Ok((progress, rows))
 }

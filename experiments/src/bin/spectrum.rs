@@ -11,26 +11,28 @@ use limitlab::analysis::a_priori::{IterationCounts, Promise};
 use limitlab::analysis::dense;
 use limitlab::analysis::inertia::{Certificate, certify};
 use limitlab::analysis::singularity::{Singularity, SlowMode, modes};
-use limitlab::analysis::spectral_radius::{SpectralRadius, spectral_radius};
+use limitlab::analysis::spectral_radius::SpectralRadius;
 use limitlab::analysis::spectrum::{Estimate, Extremes, Spectrum, SpectrumEnds, ends, excited, mesh_ends};
 use limitlab::analysis::subspace_iteration::End;
 use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::assemble::LimitSystem;
 use limitlab::assemble::bounds::SpectralBounds;
+use limitlab::mesh::features::Features;
 use limitlab::solvers::direct::SINGULAR;
-use limitlab::solvers::method::{SOR_OMEGA, SSOR_OMEGA};
-use limitlab::solvers::ssor::symmetric_sweep;
-use limitlab::solvers::system::sweep;
 use limitlab::solvers::{Method, Stop, System};
 use limitlab_experiments::cli::{
     self, CommonFlags, Given, Input, MeshFlags, OutputFlags, Progress, StopFlags, Subject, number,
 };
 use limitlab_experiments::report::series::Bars;
 use limitlab_experiments::report::{Column, Columns, Figure, LinePlot, Rule, Table};
+use limitlab_experiments::studies::complex_spectrum::{ComplexFindings, radii_of_sweeps};
 
 /// The ends of the spectra of A and D⁻¹A and the spectral radius of each method's error matrix, with proven bounds
 /// beside them, and whether the system is singular. A folder is taken for a system of anybody, as `compare-solvers` does:
 /// then the bounds are those of its entries, and singular is what rounding cannot tell from it.
+///
+/// Where a mesh has darts or semi-sharp vertices, no diagonal makes A symmetric: all eigenvalues, which may be complex, are
+/// computed (up to 2000 vertices), without bounds, which are proven for symmetric matrices.
 #[derive(Parser)]
 #[command(name = "spectrum", version)]
 struct Arguments {
@@ -189,6 +191,10 @@ fn run(arguments: &Arguments) -> Result<()> {
             }
             None => {
                 let input = arguments.mesh.input(name, &arguments.common)?;
+                if input.surface.features().is_some_and(Features::has_stars) {
+                    results.push(complex(&input, arguments)?);
+                    continue;
+                }
                 (input.subject(), analyse(&input, arguments)?, input.surface.len())
             }
         };
@@ -211,6 +217,31 @@ fn run(arguments: &Arguments) -> Result<()> {
         results.push(json(&subject, &findings, n));
     }
     cli::finish(&results, &arguments.output, &arguments.common)
+}
+
+/// Writes what there is to say of a mesh with darts or semi-sharp vertices, and gives its JSON object.
+fn complex(input: &Input, arguments: &Arguments) -> Result<Value> {
+    let left_out = [("--modes", arguments.modes > 0), ("--certify", arguments.certify)];
+    for (flag, _) in left_out.into_iter().filter(|flag| flag.1) {
+        arguments.common.remark(format_args!(
+            "{}: {flag} is left out, as no diagonal makes the matrix symmetric where there are darts or semi-sharp vertices",
+            input.name
+        ));
+    }
+    let found = ComplexFindings::new(input, !arguments.no_sweeps).map_err(|e| input.named(e))?;
+    let subject = input.subject();
+    let out = &arguments.output.out;
+    for table in found.tables(&subject) {
+        table.write(out)?;
+        if !arguments.output.json {
+            cli::print(&table.to_markdown())?;
+        }
+    }
+    if arguments.full {
+        found.full_table(&subject).write(out)?;
+        found.figure(&subject).render()?.save(&out.join(format!("{}.png", subject.stem("spectrum-eigenvalues"))))?;
+    }
+    Ok(subject.json(found.json(arguments.full)))
 }
 
 /// All findings: from `acting`, and where entries are asked for, from `system`, which is the same with entries.
@@ -240,7 +271,8 @@ fn analyse_any(
         ));
     }
     progress.step();
-    let sweeps = system.filter(|_| !arguments.no_sweeps).map(radii_of_sweeps).transpose()?.unwrap_or_default();
+    let sweeps =
+        system.filter(|_| !arguments.no_sweeps).map(radii_of_sweeps::<LimitSystem>).transpose()?.unwrap_or_default();
     progress.step();
     let data = if arguments.no_data {
         [None; 2]
@@ -280,7 +312,7 @@ struct Parts<'a> {
 
 /// The smooth vertices of an open or creased mesh.
 fn analyse_stages(input: &Input, arguments: &Arguments) -> Result<Findings> {
-    let stages = input.symmetric_stages()?;
+    let stages = input.stages()?;
     let block = stages.block();
     let known = stages.known(input.surface.positions());
     let (right, start) = (stages.right_hand_side(&known), stages.restricted(&known));
@@ -340,19 +372,6 @@ fn analyse_given(given: &Given, arguments: &Arguments) -> Result<Findings> {
     let parts = Parts { name: &subject.name, bounds: system.bounds, verdict: None, stop, ends: &|| ends(system) };
     let found = analyse_any(Some(system), system, (points, points), parts, &progress, arguments);
     found.map_err(|e| limitlab::Error::mesh(&subject.name, e.to_string()))
-}
-
-fn radii_of_sweeps(system: &LimitSystem) -> Result<Vec<(Method<'static>, f64, SpectralRadius)>> {
-    let zero = vec![DVec3::ZERO; system.len()];
-    let sor = |omega| spectral_radius(system, |x| sweep(system, &zero, omega, 0..zero.len(), x));
-    let ssor = spectral_radius(system, |x| {
-        symmetric_sweep(system, &zero, SSOR_OMEGA, None, x);
-    })?;
-    Ok(vec![
-        (Method::GaussSeidel { order: None }, 1.0, sor(1.0)?),
-        (Method::Sor { omega: SOR_OMEGA, order: None }, SOR_OMEGA, sor(SOR_OMEGA)?),
-        (Method::Ssor { omega: SSOR_OMEGA, order: None }, SSOR_OMEGA, ssor),
-    ])
 }
 
 fn eigenvalue_table(subject: &Subject, found: &Findings, n: usize) -> Table {

@@ -1,25 +1,33 @@
 //! Splitting matrices of one extraordinary vertex: `splitting --valence A..B --scheme NAME`.
 
+use std::ops::RangeInclusive;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use serde_json::{Value, json};
 
-use limitlab::Result;
-use limitlab::analysis::splitting::{Condition, Crossing, LocalScheme, StarRow, VALENCES, rows};
+use limitlab::analysis::splitting::{
+    Condition, Crossing, LocalScheme, SharpRow, SharpVertex, StarRow, VALENCES, rows, sharp_rows,
+};
+use limitlab::{Error, Result};
 use limitlab_experiments::cli::{self, CommonFlags, OutputFlags, number};
 use limitlab_experiments::studies::splitting as study;
 
 /// Local splitting matrices, read off from the refinement rules: eigenvalues, limit and tangent masks with closed
 /// forms beside them, characteristic maps. For catmull-clark also what Thall prints, for sqrt3 also Lin and Luo's
-/// eigenvalue condition over α.
+/// eigenvalue condition over α. With --at, the same at vertices that are not smooth, under catmull-clark and loop: on a
+/// boundary, on a crease with half of the faces on each side, at a corner of a boundary, at a dart.
 #[derive(Parser)]
 #[command(name = "splitting", version)]
 struct Arguments {
-    /// Valences from A to B, both included, or a single one; within 3..100
+    /// Valences from A to B, both included, or a single one; within 3..100, on a boundary, where it is the number of faces,
+    /// 1..100
     #[arg(long, value_name = "A..B", default_value = "3..12")]
-    valence: Valences,
+    valence: String,
+    /// The vertex: smooth, boundary, crease, corner or dart
+    #[arg(long, value_name = "KIND", default_value = "smooth")]
+    at: At,
     /// catmull-clark, loop, doo-sabin (at a face), sqrt3 or labsik-greiner
     #[arg(long, value_name = "NAME", default_value = "catmull-clark")]
     scheme: String,
@@ -32,42 +40,104 @@ struct Arguments {
     common: CommonFlags,
 }
 
-/// A range of valences with both ends.
-#[derive(Clone, Debug)]
-struct Valences(Vec<usize>);
+/// What is at the middle of the star; `None` is a smooth vertex.
+#[derive(Clone, Copy, Debug)]
+struct At(Option<SharpVertex>);
 
-impl std::str::FromStr for Valences {
-    type Err = String;
+impl std::str::FromStr for At {
+    type Err = Error;
 
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let (first, last) = text.split_once("..").unwrap_or((text, text));
-        let valence = |text: &str| match text.parse::<usize>() {
-            Ok(n) if VALENCES.contains(&n) => Ok(n),
-            _ => Err(format!("valences are whole numbers in {}..{}, not {text:?}", VALENCES.start(), VALENCES.end())),
-        };
-        let (first, last) = (valence(first)?, valence(last)?);
-        if first > last {
-            return Err(format!("{first}..{last} is empty: the first valence is not above the last"));
-        }
-        Ok(Valences((first..=last).collect()))
+    fn from_str(name: &str) -> Result<Self> {
+        Ok(At(if name == "smooth" { None } else { Some(name.parse()?) }))
     }
+}
+
+/// A range of valences with both ends.
+fn valences(text: &str, all: &RangeInclusive<usize>) -> std::result::Result<Vec<usize>, String> {
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    let valence = |text: &str| match text.parse::<usize>() {
+        Ok(n) if all.contains(&n) => Ok(n),
+        _ => Err(format!("valences are whole numbers in {}..{}, not {text:?}", all.start(), all.end())),
+    };
+    let (first, last) = (valence(first)?, valence(last)?);
+    if first > last {
+        return Err(format!("{first}..{last} is empty: the first valence is not above the last"));
+    }
+    Ok((first..=last).collect())
 }
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let scheme = match LocalScheme::new(&arguments.scheme, arguments.alpha) {
-        Ok(scheme) => scheme,
-        Err(error) => Arguments::command().error(ErrorKind::InvalidValue, error).exit(),
-    };
+    let refuse = |what: String| -> ! { Arguments::command().error(ErrorKind::InvalidValue, what).exit() };
+    let scheme = LocalScheme::new(&arguments.scheme, arguments.alpha).unwrap_or_else(|error| refuse(error.to_string()));
+    let At(vertex) = arguments.at;
+    if let Some(vertex) = vertex
+        && let Err(error) = vertex.require_rules(scheme)
+    {
+        refuse(error.to_string());
+    }
+    let range = vertex.map_or(VALENCES, SharpVertex::valences);
+    let valences = valences(&arguments.valence, &range).unwrap_or_else(|what| refuse(what));
     cli::exit(|| {
         arguments.common.apply()?;
         arguments.output.prepare()?;
-        run(&arguments, scheme)
+        match vertex {
+            None => run(&arguments, scheme, &valences),
+            Some(vertex) => run_sharp(&arguments, (scheme, vertex), &valences),
+        }
     })
 }
 
-fn run(arguments: &Arguments, scheme: LocalScheme) -> Result<()> {
-    let valences = &arguments.valence.0;
+/// At a vertex that is not smooth.
+fn run_sharp(arguments: &Arguments, (scheme, vertex): (LocalScheme, SharpVertex), valences: &[usize]) -> Result<()> {
+    let rows = sharp_rows(scheme, vertex, valences)?;
+    let tables = study::sharp_tables(scheme, vertex, &rows);
+    for table in &tables {
+        table.write(&arguments.output.out)?;
+    }
+    if !arguments.output.json {
+        cli::print(&tables[0].to_markdown())?;
+    }
+    let object = json!({
+        "scheme": scheme.name(),
+        "at": vertex.name(),
+        "rows": rows.iter().map(sharp_json).collect::<Vec<_>>(),
+    });
+    cli::finish(&[object], &arguments.output, &arguments.common)
+}
+
+fn sharp_json(row: &SharpRow) -> Value {
+    let numbers = |v: &[f64]| v.iter().map(|&x| number(x)).collect::<Vec<_>>();
+    json!({
+        "valence": row.valence,
+        "positions": row.positions,
+        "eigenvalues": row.eigenvalues.iter().map(|z| number(z.re)).collect::<Vec<_>>(),
+        "eigenvalues_imaginary": row.eigenvalues.iter().map(|z| number(z.im)).collect::<Vec<_>>(),
+        "eigenvalue_error": row.eigenvalue_error.map(number),
+        "limit_mask": numbers(&row.masks[0].weights),
+        "limit_mask_error": number(row.limit_mask_error),
+        "tangent_masks": row.masks[1..]
+            .iter()
+            .map(|mask| json!({
+                "name": mask.name,
+                "eigenvalue": number(mask.eigenvalue),
+                "weights": numbers(&mask.weights),
+                "residual": number(mask.residual),
+            }))
+            .collect::<Vec<_>>(),
+        "sectors": row
+            .sectors
+            .iter()
+            .map(|sector| json!({
+                "faces": sector.faces,
+                "modes": numbers(&sector.modes),
+                "tangent_plane": sector.tangent_plane,
+            }))
+            .collect::<Vec<_>>(),
+    })
+}
+
+fn run(arguments: &Arguments, scheme: LocalScheme, valences: &[usize]) -> Result<()> {
     let out = &arguments.output.out;
     let rows = rows(scheme, valences)?;
     let sampled = study::sampled(scheme, valences)?;

@@ -9,11 +9,13 @@ use clap::Parser;
 use serde_json::{Map, Value, json};
 
 use limitlab::Result;
+use limitlab::analysis::complex_spectrum::ComplexSpectrum;
+use limitlab::analysis::spectrum::spectrum;
 use limitlab::analysis::sweep::{OmegaSweep, rounding_floor, sweep};
 use limitlab::mesh::order::Order;
 use limitlab::solvers::Method;
 use limitlab_experiments::cli::{
-    self, CommonFlags, Grid, List, MeshFlags, OutputFlags, Problem, Progress, StopFlags, number,
+    self, CommonFlags, Grid, List, Matrix, MeshFlags, OutputFlags, Problem, Progress, StopFlags, number,
 };
 use limitlab_experiments::report::Table;
 use limitlab_experiments::studies::sweep as study;
@@ -131,23 +133,24 @@ fn sweep_one(
         sweep
     };
     let written = Mutex::new(Instant::now());
-    let found = sweep(
-        problem.system(),
-        problem.data(),
-        &grids,
-        Some(&problem.order),
-        &problem.stop,
-        rounding_floor(problem.diagonal()),
-        &|so_far| {
-            progress.step();
-            let mut written = written.lock().unwrap_or_else(PoisonError::into_inner);
-            if written.elapsed() >= PAUSE {
-                // If this fails, so does the end, which says it.
-                let _ = write(&in_units_of_files(so_far.clone()));
-                *written = Instant::now();
-            }
-        },
-    )?;
+    let done = |so_far: &OmegaSweep| {
+        progress.step();
+        let mut written = written.lock().unwrap_or_else(PoisonError::into_inner);
+        if written.elapsed() >= PAUSE {
+            // If this fails, so does the end, which says it.
+            let _ = write(&in_units_of_files(so_far.clone()));
+            *written = Instant::now();
+        }
+    };
+    let (data, order, stop) = (problem.data(), Some(&problem.order[..]), &problem.stop);
+    let floor = rounding_floor(problem.diagonal());
+    let found = match problem.matrix() {
+        Matrix::Symmetric(system) => sweep((system, &spectrum(system)?), data, &grids, order, stop, floor, &done)?,
+        Matrix::General(system, _) => {
+            let spectrum = ComplexSpectrum::new(system)?;
+            sweep((system, &spectrum), data, &grids, order, stop, floor, &done)?
+        }
+    };
     Ok(in_units_of_files(found))
 }
 
@@ -164,8 +167,8 @@ fn json(problem: &Problem, arguments: &Arguments, sweep: &OmegaSweep, table: &Ta
     }
     for t in &sweep.thresholds {
         let name = t.method.name();
-        critical.insert(name.into(), number(t.matrix.critical_omega()));
-        optimal.insert(name.into(), number(t.matrix.optimal_omega()));
+        critical.insert(name.into(), number(t.critical_omega));
+        optimal.insert(name.into(), number(t.optimal_omega));
         let data = t.data.map_or(Value::Null, |d| number(d.critical_omega()));
         critical_data.insert(name.into(), data);
     }

@@ -358,25 +358,6 @@ impl Input {
         flags.rule(self.surface.diagonal(), self.frame.scale()).map_err(|what| Error::mesh(&self.name, what))
     }
 
-    /// The same, of a mesh whose block is symmetric.
-    ///
-    /// # Errors
-    /// Darts and semi-sharp vertices.
-    pub fn symmetric_stages(&self) -> Result<Stages> {
-        let stages = self.stages()?;
-        match stages.stars() {
-            None => Ok(stages),
-            Some(stars) => Err(Error::mesh(
-                &self.name,
-                format!(
-                    "vertex {} is a dart or semi-sharp: no diagonal makes the matrix symmetric there, as the methods and spectra \
-                     of this program need it; make it a corner, or use interpolate",
-                    stars.vertices()[0]
-                ),
-            )),
-        }
-    }
-
     /// The number of vertices of the file.
     pub fn file_len(&self) -> usize {
         self.welded.as_ref().map_or(self.surface.len(), |(place, _)| place.len())

@@ -9,7 +9,7 @@ mod progress;
 
 pub use input::{Input, MeshFlags, STAND_IN_NOISE, subdivision_of};
 pub use json::print_json;
-pub use problem::{Given, Problem, Subject};
+pub use problem::{Given, Matrix, Problem, Subject};
 pub use process::{exit, say};
 pub use progress::Progress;
 

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::input::{all_fields, plain};
 use super::{CommonFlags, Input, MeshFlags, StopFlags};
 use limitlab::assemble::matrix_market::{self, is_missing};
-use limitlab::assemble::{LimitSystem, Stages};
+use limitlab::assemble::{GeneralSystem, LimitSystem, Stages};
 use limitlab::error::{Error, Result};
 use limitlab::interpolate::{interpolate, solve_stored};
 use limitlab::mesh::features::Rule;
@@ -53,6 +53,12 @@ impl Input {
     fn size(&self) -> String {
         let whole = format!("{} vertices, {} faces", self.surface.len(), self.surface.faces().len());
         let Some(features) = self.surface.features() else { return whole };
+        if features.has_stars() {
+            let [darts, semi_sharp] = [Rule::Dart, Rule::SemiSharp].map(|rule| features.count(rule));
+            return format!(
+                "{whole}; the system of all vertices, {darts} darts and {semi_sharp} semi-sharp ones among them"
+            );
+        }
         let [smooth, curves, corners] = [Rule::Smooth, Rule::Crease, Rule::Corner].map(|rule| features.count(rule));
         format!("{whole}; the system of the {smooth} smooth vertices, after {curves} on curves and {corners} corners")
     }
@@ -107,15 +113,26 @@ pub struct Problem {
 /// Where a system comes from.
 enum Source {
     Mesh(Surface, Scheme, Box<Stages>),
+    /// With darts or semi-sharp vertices, and the first of these.
+    Unsymmetric(Surface, Scheme, Box<GeneralSystem>, usize),
     Folder(Box<LimitSystem>),
 }
 
+/// The system of a problem.
+pub enum Matrix<'a> {
+    /// Of an open or creased mesh, that of its smooth vertices.
+    Symmetric(&'a LimitSystem),
+    /// Of all vertices of a mesh, where no diagonal makes it symmetric, and a vertex that is to blame.
+    General(&'a GeneralSystem, usize),
+}
+
 impl Problem {
-    /// The system; of an open or creased mesh, that of its smooth vertices.
-    pub fn system(&self) -> &LimitSystem {
+    /// The system.
+    pub fn matrix(&self) -> Matrix<'_> {
         match &self.source {
-            Source::Mesh(_, _, stages) => stages.block(),
-            Source::Folder(system) => system,
+            Source::Mesh(_, _, stages) => Matrix::Symmetric(stages.block()),
+            Source::Unsymmetric(_, _, system, vertex) => Matrix::General(system, *vertex),
+            Source::Folder(system) => Matrix::Symmetric(system),
         }
     }
 
@@ -130,7 +147,9 @@ impl Problem {
     /// As [`interpolate`].
     pub fn auto(&self) -> Result<Solution> {
         match &self.source {
-            Source::Mesh(surface, scheme, _) => interpolate(surface, *scheme, &self.stop.into()),
+            Source::Mesh(surface, scheme, _) | Source::Unsymmetric(surface, scheme, ..) => {
+                interpolate(surface, *scheme, &self.stop.into())
+            }
             Source::Folder(system) => Ok(solve_stored(system, &self.points, &self.stop)),
         }
     }
@@ -138,7 +157,7 @@ impl Problem {
     /// The diagonal of the bounding box of the points.
     pub fn diagonal(&self) -> f64 {
         match &self.source {
-            Source::Mesh(surface, ..) => surface.diagonal(),
+            Source::Mesh(surface, ..) | Source::Unsymmetric(surface, ..) => surface.diagonal(),
             Source::Folder(_) => diagonal(&self.points),
         }
     }
@@ -221,15 +240,25 @@ impl MeshFlags {
 }
 
 fn of_mesh(input: Input, stop: &StopFlags, order: Order) -> Result<Problem> {
-    let stages = input.symmetric_stages()?;
+    let stages = input.stages()?;
     let known = stages.known(input.surface.positions());
+    let points = input.surface.positions();
+    let all = order.order(input.surface.mesh(), input.surface.incidence());
+    let (points, start, order) = match stages.stars() {
+        // All vertices at once.
+        Some(_) => (points.to_vec(), points.to_vec(), all),
+        None => (stages.right_hand_side(&known), stages.restricted(&known), stages.order(&all)),
+    };
     Ok(Problem {
         stop: input.stop(stop)?,
         subject: input.subject(),
-        points: stages.right_hand_side(&known),
-        start: stages.restricted(&known),
-        order: stages.order(&order.order(input.surface.mesh(), input.surface.incidence())),
+        points,
+        start,
+        order,
         scale: input.frame.scale(),
-        source: Source::Mesh(input.surface, input.scheme, Box::new(stages)),
+        source: match stages.stars().map(|stars| stars.vertices()[0] as usize) {
+            Some(vertex) => Source::Unsymmetric(input.surface, input.scheme, Box::new(stages.whole()), vertex),
+            None => Source::Mesh(input.surface, input.scheme, Box::new(stages)),
+        },
     })
 }

@@ -1,5 +1,6 @@
 //! Tables and figures that more than one program makes.
 
 pub mod comparison;
+pub mod complex_spectrum;
 pub mod splitting;
 pub mod sweep;

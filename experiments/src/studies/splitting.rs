@@ -5,8 +5,8 @@ use limitlab::Result;
 use limitlab::analysis::splitting::row::MAP_ROUNDS;
 use limitlab::analysis::splitting::thall::{MaskOrientation, Membership, PrintedNumber};
 use limitlab::analysis::splitting::{
-    Condition, Crossing, LocalScheme, SplittingMatrix, StarRow, ThallTables, characteristic_map, condition_over_alpha,
-    crossings, thall_tables,
+    Condition, Crossing, LocalScheme, SharpMask, SharpRow, SharpVertex, SplittingMatrix, StarRow, ThallTables,
+    characteristic_map, condition_over_alpha, crossings, thall_tables,
 };
 
 /// Lin and Luo's Fig. 8; where none of them is asked for, the first few are drawn.
@@ -59,6 +59,71 @@ pub fn tables(
         tables.push(crossing_table(valences, &sampled.crossings));
     }
     Ok(tables)
+}
+
+/// The tables about one scheme's local matrices at vertices that are not smooth, the summary first.
+pub fn sharp_tables(scheme: LocalScheme, vertex: SharpVertex, rows: &[SharpRow]) -> [Table; 3] {
+    let stem = format!("{}-{vertex}", stem(scheme));
+    let modulus = |k: usize| move |row: &SharpRow| row.eigenvalues.get(k).map(|z| z.norm());
+    let mode = |k: usize| {
+        move |row: &SharpRow| {
+            let all = row.sectors.iter().filter_map(|sector| sector.modes.get(k));
+            all.copied().max_by(f64::total_cmp)
+        }
+    };
+    let faces = |row: &SharpRow| row.sectors.iter().map(|s| s.faces.to_string()).collect::<Vec<_>>().join("+");
+    let planes = |row: &SharpRow| row.sectors.iter().map(|s| yes(s.tangent_plane)).collect::<Vec<_>>().join(", ");
+    let residual = |row: &SharpRow| row.masks.iter().map(|mask| mask.residual).fold(0.0, f64::max);
+    let columns = Columns::<SharpRow>::new()
+        .col(Column::key("valence"), |r| r.valence)
+        .col(Column::text("faces"), faces)
+        .col(Column::text("size"), |r| r.eigenvalues.len())
+        .col(Column::number("lambda_1_modulus", 1e-9, 10), modulus(1))
+        .col(Column::number("lambda_2_modulus", 1e-9, 10), modulus(2))
+        .col(Column::number("lambda_3_modulus", 1e-9, 10), modulus(3))
+        .col(Column::number("across_1", 1e-9, 10), mode(0))
+        .col(Column::number("across_2", 1e-9, 10), mode(1))
+        .col(Column::number("eigenvalue_error", 1e-2, 2).floor(1e-12), |r| r.eigenvalue_error)
+        .col(Column::number("limit_mask_vertex", 1e-9, 6), |r| r.masks[0].weights[0])
+        .col(Column::number("limit_mask_error", 1e-2, 2).floor(1e-12), |r| r.limit_mask_error)
+        .col(Column::number("residual_left", 1e-2, 2).floor(1e-12), residual)
+        .col(Column::text("tangent_plane"), planes);
+    let title = format!("Splitting matrices of {scheme} at a {vertex} vertex");
+    let mut summary = columns.table(stem.clone(), title, rows);
+    summary.note(
+        "Each matrix is read off from the refinement of unit vectors on a star with sharp edges. `faces` are those of each sector \
+         between two sharp edges, `across_1` and `across_2` the largest eigenvalues of the inside of a sector: a crease or boundary \
+         has a tangent plane on that side if the second is below ½, a corner if it is a single face, a dart if two real \
+         eigenvalues lead. Errors are the largest deviations from the closed forms (at a dart the limit mask is held against the row \
+         of A), `residual_left` is the largest entry of Sᵀw − λw over all masks w.",
+    );
+    let columns = Columns::<(&SharpRow, usize)>::new()
+        .col(Column::key("valence"), |&(row, _)| row.valence)
+        .col(Column::key("index"), |&(_, i)| i)
+        .col(Column::number("real", 1e-7, 10), |&(row, i)| row.eigenvalues[i].re)
+        .col(Column::number("imaginary", 1e-7, 10), |&(row, i)| row.eigenvalues[i].im);
+    let title = format!("Eigenvalues of the splitting matrices of {scheme} at a {vertex} vertex");
+    let indices: Vec<_> = rows.iter().flat_map(|row| (0..row.eigenvalues.len()).map(move |i| (row, i))).collect();
+    let mut eigenvalues = columns.table(format!("{stem}-eigenvalues"), title, &indices);
+    eigenvalues.note("All of them with their multiplicities, by falling modulus.");
+    let columns = Columns::<(&SharpRow, &SharpMask, usize)>::new()
+        .col(Column::key("valence"), |&(row, ..)| row.valence)
+        .col(Column::key("mask"), |&(_, mask, _)| mask.name)
+        .col(Column::key("position"), |&(row, _, i)| row.positions[i].clone())
+        .col(Column::number("eigenvalue", 1e-9, 8), |&(_, mask, _)| mask.eigenvalue)
+        .col(Column::number("weight", 1e-9, 8).floor(1e-12), |&(_, mask, i)| mask.weights[i]);
+    let title = format!("Limit and tangent masks of {scheme} at a {vertex} vertex");
+    let weights: Vec<_> = rows
+        .iter()
+        .flat_map(|row| row.masks.iter().flat_map(move |mask| (0..mask.weights.len()).map(move |i| (row, mask, i))))
+        .collect();
+    let mut masks = columns.table(format!("{stem}-masks"), title, &weights);
+    masks.note(
+        "Positions: v the vertex, e_j the ends of its edges counter-clockwise from the sharp one e0, f_j the opposite corner of the \
+         quad between e_j and e_{j+1}. Limit masks have sum 1, tangent masks ±1 as their \
+         largest weight.",
+    );
+    [summary, eigenvalues, masks]
 }
 
 /// All pictures with the stems of their files.

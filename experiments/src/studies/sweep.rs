@@ -23,12 +23,7 @@ pub fn table(id: String, title: String, about: String, sweep: &OmegaSweep) -> Ta
     for t in &sweep.thresholds {
         let mut text = format!(
             "{}: eigenvalues in [{:.6}, {:.6}], ω_crit = {:.6}, ω_opt = {:.6} with ρ = {:.6}",
-            t.method,
-            t.matrix.min,
-            t.matrix.max,
-            t.matrix.critical_omega(),
-            t.matrix.optimal_omega(),
-            t.matrix.radius(t.matrix.optimal_omega())
+            t.method, t.ends.min, t.ends.max, t.critical_omega, t.optimal_omega, t.optimal_rho
         );
         if let Some(data) = t.data {
             text += &format!(
@@ -100,9 +95,7 @@ pub fn plot(title: String, methods: &[Method<'static>], sweep: &OmegaSweep) -> F
     }
     for t in &sweep.thresholds {
         if matches!(t.method, Method::Jacobi { .. }) {
-            for (at, label) in
-                [(t.matrix.optimal_omega(), "Jacobi ω_{opt}"), (t.matrix.critical_omega(), "Jacobi ω_{crit}")]
-            {
+            for (at, label) in [(t.optimal_omega, "Jacobi ω_{opt}"), (t.critical_omega, "Jacobi ω_{crit}")] {
                 iterations.vertical_lines.push(Rule::new(at, label));
                 rates.vertical_lines.push(Rule::new(at, ""));
             }

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod contract;
+mod darts;
 mod metadata;
 #[cfg(target_os = "linux")]
 mod process;

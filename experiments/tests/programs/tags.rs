@@ -116,6 +116,73 @@ fn tags_of_a_file_are_told_at_their_line() {
     assert!(line.contains("a.obj, line 10: edge 0–5 is not in the mesh"), "{line}");
 }
 
+/// A dome of 6 × 7 vertices, of triangles, its corners with one triangle or two.
+fn dome() -> String {
+    let (p, q) = (6, 7);
+    let height = |i: usize, j: usize| 0.2 * (i * (p - 1 - i)) as f64 + 0.1 * ((i * j) % 3) as f64;
+    let points = (0..p * q).map(|k| format!("v {} {} {}\n", k / q, k % q, height(k / q, k % q)));
+    let faces = (0..p - 1).flat_map(|i| (0..q - 1).map(move |j| i * q + j + 1)).map(|a| {
+        let [b, c, d] = [a + q, a + q + 1, a + 1];
+        format!("f {a} {b} {c}\nf {a} {c} {d}\n")
+    });
+    points.chain(faces).collect()
+}
+
+#[test]
+fn surfaces_of_open_triangle_meshes_pass_through_their_points() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("dome.obj"), dome()).unwrap();
+    // Along a row inside, from boundary to boundary.
+    let crease: String = (0..6).map(|j| format!("{} {} 10\n", 21 + j, 22 + j)).collect();
+    fs::write(folder.path().join("row.txt"), crease).unwrap();
+    let given = io::read(&folder.path().join("dome.obj")).unwrap().mesh;
+    let all_stay = ["butterfly", "labsik-greiner"].map(|name| ["--method", name]);
+    for creases in [&[][..], &["--creases", "row.txt"]] {
+        for levels in ["1", "2", "3"] {
+            let by_sqrt3 = ["--scheme", "sqrt3", "--limit", "--tol", "1e-12"];
+            let ways = all_stay.iter().map(|way| &way[..]).chain([&["--alpha", "1"][..], &by_sqrt3]);
+            for way in ways {
+                let more = [way, creases, &["--subdivide", levels, "--write-normals", "--json"]].concat();
+                let output = run_on(INTERPOLATE, folder.path(), "dome.obj", &more);
+                assert_done(&output, &format!("{more:?}"));
+                assert_eq!(json(&output)["boundary"], 22);
+                let found = io::read(&folder.path().join("result.obj")).unwrap();
+                let factor = if way.contains(&"butterfly") { 4 } else { 3_usize };
+                assert_eq!(found.mesh.faces.len(), given.faces.len() * factor.pow(levels.parse().unwrap()));
+                for (a, b) in found.mesh.positions.iter().zip(&given.positions) {
+                    assert!(a.distance(*b) < 1e-10, "{more:?}: {a} {b}");
+                }
+            }
+        }
+    }
+    // Blended with the scheme that approximates, only those marked stay.
+    let more = ["--alpha", "0", "--vertices", "0,3,17", "--subdivide", "3", "--limit"];
+    assert_done(&run_on(INTERPOLATE, folder.path(), "dome.obj", &more), "alpha");
+    let found = io::read(&folder.path().join("result.obj")).unwrap().mesh;
+    for (v, (a, b)) in found.positions.iter().zip(&given.positions).enumerate() {
+        // A crease vertex between two that lie straight beside it stays too, and so do corners.
+        let stays = [0, 3, 17].contains(&v);
+        assert!(!stays || a == b, "vertex {v}");
+        assert!(v != 16 || a.distance(*b) > 1e-3, "vertex {v}: {a}");
+    }
+    // A normal at a sharp vertex is refused before anything is solved.
+    fs::write(folder.path().join("n.txt"), "17 0 0 1\n2 0 0 1\n").unwrap();
+    let more = ["--scheme", "loop", "--subdivide", "2", "--normals", "n.txt", "--max-iter", "1"];
+    let line = assert_refused(&run_on(INTERPOLATE, folder.path(), "dome.obj", &more), "sharp");
+    assert!(line.contains("vertex 2 is sharp"), "{line}");
+    // A dart has no rule by √3.
+    fs::write(folder.path().join("row.txt"), "21 22 10\n22 23 10\n").unwrap();
+    let more = ["--method", "labsik-greiner", "--creases", "row.txt", "--subdivide", "2"];
+    let line = assert_refused(&run_on(INTERPOLATE, folder.path(), "dome.obj", &more), "dart");
+    assert!(line.contains("vertex 23 is a dart") && line.contains("make it a corner"), "{line}");
+    let more = ["--method", "butterfly", "--creases", "row.txt", "--subdivide", "2"];
+    assert_done(&run_on(INTERPOLATE, folder.path(), "dome.obj", &more), "dart");
+    // The fairest surface: by name, before the work.
+    let more = ["--method", "halstead"];
+    let line = assert_refused(&run_on(INTERPOLATE, folder.path(), "dome.obj", &more), "halstead");
+    assert!(line.contains("natural boundaries"), "{line}");
+}
+
 #[test]
 fn tags_go_through_welding() {
     let folder = tempdir().unwrap();
@@ -135,4 +202,61 @@ fn tags_go_through_welding() {
     fs::write(folder.path().join("a.obj"), format!("{quads}t crease 2/1/0 6 4 10\n")).unwrap();
     let line = assert_refused(&run_on(INTERPOLATE, folder.path(), "a.obj", &["--weld"]), "no edge");
     assert!(line.contains("a.obj, line 11: edge 6–4 is not in the mesh"), "{line}");
+}
+
+/// Surfaces of open and creased meshes; what a refinement has no rule for is refused before a system is solved.
+#[test]
+fn surfaces_of_sharp_meshes_are_written_or_refused_before_the_work() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("a.usda"), open_scene("catmullClark", "")).unwrap();
+    fs::write(folder.path().join("top.txt"), top_of_cube()).unwrap();
+    let torus = limitlab::mesh::builtin::builtin("torus:8x6").unwrap();
+    let face = torus.faces.face(0);
+    let semi_sharp: String = (0..3).map(|k| format!("{} {} 1.5\n", face[k], face[k + 1])).collect();
+    fs::write(folder.path().join("semi.txt"), semi_sharp).unwrap();
+    fs::write(folder.path().join("dart.txt"), top_of_cube().lines().next().unwrap()).unwrap();
+    let surface = |mesh: &str, flags: &[&str]| {
+        let output =
+            run_on(INTERPOLATE, folder.path(), mesh, &[&["--limit", "--write-normals", "--json"], flags].concat());
+        assert_done(&output, mesh);
+        let made = io::read(&folder.path().join("result.obj")).unwrap().mesh;
+        assert_eq!(json(&output)["surface"]["vertices"], made.len());
+        made
+    };
+    for scheme in ["nasri", "zheng-cai", "mid-edge"] {
+        // Eight corners, two points of each of six sides, four corners that rest; two faces, seven quads, six at vertices.
+        let made = surface("a.usda", &["--scheme", scheme, "--subdivide", "1"]);
+        assert_eq!((made.len(), made.faces.len()), (8 + 12 + 4, 2 + 7 + 6), "{scheme}");
+        let top = surface("cube", &["--scheme", scheme, "--subdivide", "2", "--creases", "top.txt"]);
+        assert!(top.positions.iter().all(|p| p.is_finite()));
+    }
+    let two_phase = ["--method", "two-phase", "--shape-handle", "0.7", "--subdivide", "1"];
+    assert_eq!(surface("a.usda", &two_phase).len(), 24);
+    // Sharpness 1.5 is gone after two levels; vertices keep their numbers.
+    for levels in ["0", "1", "2", "3"] {
+        let flags = ["--scheme", "catmull-clark", "--subdivide", levels, "--creases", "semi.txt"];
+        let made = surface("torus:8x6", &flags);
+        for (p, q) in torus.positions.iter().zip(&made.positions) {
+            assert!(p.distance(*q) < 1e-9, "{levels} levels: {p} {q}");
+        }
+    }
+    // One iteration would not do, and be told instead.
+    let refused = |mesh: &str, flags: &[&str]| {
+        let flags = [&["--method", "pia", "--max-iter", "1"], flags].concat();
+        assert_refused(&run_on(INTERPOLATE, folder.path(), mesh, &flags), mesh)
+    };
+    let line = refused("cube", &["--scheme", "nasri", "--creases", "dart.txt", "--subdivide", "1"]);
+    assert!(line.contains("is a dart") && line.contains("make it a corner"), "{line}");
+    let line = refused("torus:8x6", &["--scheme", "mid-edge", "--creases", "semi.txt", "--subdivide", "1"]);
+    assert!(line.contains("is semi-sharp"), "{line}");
+    let points: String = (0..16).map(|k| format!("v {} {} {}\n", k / 4, k % 4, k * k % 7)).collect();
+    let corner = |k: usize| k + k / 3 + 1;
+    let pairs = (0..9).map(corner).map(|v| format!("f {v} {} {}\nf {v} {} {}\n", v + 4, v + 5, v + 5, v + 1));
+    let triangles = points + &pairs.collect::<String>();
+    fs::write(folder.path().join("t.obj"), triangles).unwrap();
+    let line = refused("t.obj", &["--scheme", "sqrt3", "--subdivide", "1"]);
+    assert!(line.ends_with("use --scheme catmull-clark, loop, nasri, zheng-cai or mid-edge"), "{line}");
+    fs::write(folder.path().join("n.txt"), "1 0 0 1\n").unwrap();
+    let line = refused("t.obj", &["--scheme", "zheng-cai", "--normals", "n.txt", "--subdivide", "1"]);
+    assert!(line.contains("vertex 1 is sharp"), "{line}");
 }

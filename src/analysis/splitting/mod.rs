@@ -8,7 +8,8 @@
 //! - [`characteristic`]: characteristic maps, and whether they are regular and injective;
 //! - [`condition`]: Lin & Luo's eigenvalue condition over α;
 //! - [`thall`]: the matrices, masks and tables that Thall prints, against computed ones;
-//! - [`row`]: all of it for one valence, as plain numbers.
+//! - [`row`]: all of it for one valence, as plain numbers;
+//! - [`sharp`]: the same at boundary, crease, corner and dart vertices.
 //!
 //! ```
 //! use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
@@ -25,6 +26,7 @@ pub mod condition;
 pub mod matrix;
 pub mod row;
 pub mod scheme;
+pub mod sharp;
 pub mod spectrum;
 pub mod star;
 pub mod thall;
@@ -36,6 +38,7 @@ pub use condition::{Condition, Crossing, condition_over_alpha, crossings};
 pub use matrix::SplittingMatrix;
 pub use row::{StarRow, rows};
 pub use scheme::{LocalScheme, VALENCES};
+pub use sharp::{SharpMask, SharpRow, SharpSector, SharpVertex, sharp_rows};
 pub use spectrum::{Eigenspace, Mode, distance_to_space};
 pub use star::Layout;
 pub use thall::{ThallTables, thall_tables};
@@ -43,6 +46,11 @@ pub use thall::{ThallTables, thall_tables};
 /// By falling modulus, then real part, then imaginary part.
 fn sort(values: &mut [Complex<f64>]) {
     values.sort_by(falling);
+}
+
+fn largest_difference(a: &[Complex<f64>], b: &[Complex<f64>]) -> f64 {
+    let pairs = a.iter().zip(b);
+    pairs.map(|(x, y)| (x - y).norm()).fold(0.0, f64::max)
 }
 
 fn falling(a: &Complex<f64>, b: &Complex<f64>) -> std::cmp::Ordering {

@@ -4,6 +4,7 @@ use nalgebra::{Complex, DVector};
 use rayon::prelude::*;
 
 use super::characteristic::{Check, characteristic_map};
+use super::largest_difference;
 use super::matrix::SplittingMatrix;
 use super::scheme::LocalScheme;
 use super::spectrum::distance_to_space;
@@ -92,11 +93,6 @@ fn row(scheme: LocalScheme, valence: usize) -> Result<StarRow> {
         },
         eigenvalues,
     })
-}
-
-fn largest_difference(a: &[Complex<f64>], b: &[Complex<f64>]) -> f64 {
-    let pairs = a.iter().zip(b);
-    pairs.map(|(x, y)| (x - y).norm()).fold(0.0, f64::max)
 }
 
 /// The first ring's weights against the formula's, and those of further rings against 0.

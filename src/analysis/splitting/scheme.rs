@@ -121,7 +121,7 @@ impl LocalScheme {
         }
     }
 
-    fn step(self, surface: &Surface) -> Result<Mesh> {
+    pub(super) fn step(self, surface: &Surface) -> Result<Mesh> {
         match self {
             LocalScheme::CatmullClark => catmull_clark::refine(surface),
             LocalScheme::Loop => loop_scheme::refine(surface),
@@ -136,7 +136,7 @@ impl LocalScheme {
     }
 
     /// Where the half-edge `root` from the middle is found after a step; of √3 turned clockwise by half a sector.
-    fn root_after_step(self, root: u32) -> u32 {
+    pub(super) fn root_after_step(self, root: u32) -> u32 {
         match self {
             LocalScheme::CatmullClark => 4 * root,
             LocalScheme::Loop => 12 * (root / 3) + 3 * (root % 3),

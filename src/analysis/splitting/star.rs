@@ -198,12 +198,13 @@ impl Layout {
                 if i > 1 {
                     along = walker.straight(along, half)?;
                 }
-                let columns = if self == Layout::Triangles { i - 1 } else { reach };
-                let corner = |j| if self == Layout::Triangles { i - j } else { i };
-                visit(corner(0), 0, walker.end(along));
+                visit(i, 0, walker.end(along));
+                // Only through inner vertices: the last ring may lie on a boundary.
+                let columns = if self == Layout::Triangles { reach - i } else { reach };
                 if columns > 0 {
                     let left = walker.clockwise(walker.topology.twin(along)?)?;
-                    walker.line(left, half, columns, |j, v| visit(corner(j), j, v))?;
+                    let left = if self == Layout::Triangles { walker.clockwise(left)? } else { left };
+                    walker.line(left, half, columns, |j, v| visit(i, j, v))?;
                 }
             }
             spoke = if self == Layout::QuadsAboutFace {

@@ -71,10 +71,14 @@ impl Fairness {
     /// A mesh that is not closed, has creases or corners, or is too large.
     pub fn new(surface: &Surface) -> Result<Self> {
         match surface.features() {
-            _ if !surface.is_closed() => {
+            None if !surface.is_closed() => {
                 return Err(Error::Open { edges: surface.boundary_edges(), scheme: "fair interpolation" });
             }
-            Some(_) => return Err(Error::Creased { what: "fair interpolation" }),
+            Some(_) => {
+                let what =
+                    "fair interpolation, which has no energies of patches beside natural boundaries and creases,";
+                return Err(Error::Creased { what });
+            }
             None => {}
         }
         let fine = Refinement::CatmullClark.refined_n(surface, LEVELS)?;

@@ -12,6 +12,7 @@ use super::surface::refine_n;
 use crate::analysis::splitting::Layout;
 use crate::interpolate::thall::angle;
 use crate::mesh::{Faces, Mesh, Surface};
+use crate::schemes::thirds::curve_limits;
 use crate::schemes::{Refinement, Tangents, sqrt3};
 use crate::{Error, Result};
 
@@ -34,7 +35,8 @@ pub struct Limits {
     pub positions: Vec<DVec3>,
     /// Zero where the surface has no tangent plane: a star whose normal modes shrink no faster than its tangential
     /// ones comes to a point. That is so at valence 3 for α > 0.80, at others for α near 2, and in degenerate stars.
-    /// Within about 3 % of such an α (in the ratio of the two) 40 rounds cannot tell, and it is zero as well.
+    /// Within about 3 % of such an α (in the ratio of the two) 40 rounds cannot tell, and it is zero as well. At sharp
+    /// vertices it is not computed, and zero.
     pub normals: Vec<DVec3>,
 }
 
@@ -61,17 +63,30 @@ pub struct Limits {
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn limits(surface: &Surface, alpha: &[f64]) -> Result<Limits> {
-    let (fine, alpha) = refine_n(surface, alpha, 2)?;
+    let features = surface.features();
     let count = surface.len();
+    if features.is_some_and(|f| f.is_midway()) {
+        let (next, alpha) = refine_n(surface, alpha, 1)?;
+        let mut found = limits(&next, &alpha)?;
+        found.positions.truncate(count);
+        found.normals.truncate(count);
+        return Ok(found);
+    }
+    let on_curves = curve_limits(surface, alpha, ROUNDS);
+    let (fine, alpha) = refine_n(surface, alpha, 2)?;
+    let is_smooth = |v: usize| features.is_none_or(|f| f.is_smooth(v));
     let valence = |v: usize| fine.incidence().face_count(v);
-    let largest = (0..count).map(valence).max().unwrap_or(0);
+    let largest = (0..count).filter(|&v| is_smooth(v)).map(valence).max().unwrap_or(0);
     let mut present = vec![false; largest + 1];
-    for v in 0..count {
+    for v in (0..count).filter(|&v| is_smooth(v)) {
         present[valence(v)] = true;
     }
     let rounds: Vec<Option<Round>> =
         (0..=largest).map(|n| present[n].then(|| Round::new(n)).transpose()).collect::<Result<_>>()?;
     let at = |v: usize, work: &mut Work| -> Result<(DVec3, DVec3)> {
+        if !is_smooth(v) {
+            return Ok((surface.positions()[v], DVec3::ZERO));
+        }
         let n = valence(v);
         let Some(round) = &rounds[n] else {
             return Err(Error::Computation(format!("no star of valence {n}")));
@@ -89,7 +104,10 @@ pub fn limits(surface: &Surface, alpha: &[f64]) -> Result<Limits> {
     };
     let found: Vec<(DVec3, DVec3)> =
         (0..count).into_par_iter().map_init(Work::default, |work, v| at(v, work)).collect::<Result<_>>()?;
-    let (positions, normals) = found.into_iter().unzip();
+    let (mut positions, normals): (Vec<DVec3>, _) = found.into_iter().unzip();
+    for (v, point) in on_curves {
+        positions[v] = point;
+    }
     Ok(Limits { positions, normals })
 }
 

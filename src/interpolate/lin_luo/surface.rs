@@ -26,7 +26,7 @@ pub fn choose(interpolated: &[bool], elsewhere: f64) -> Vec<f64> {
 pub fn refine_n(surface: &Surface, alpha: &[f64], levels: usize) -> Result<(Surface, Vec<f64>)> {
     let (mut surface, mut alpha) = (surface.clone(), alpha.to_vec());
     for level in 1..=levels {
-        (surface, alpha) = if level < levels {
+        (surface, alpha) = if level < levels || surface.features().is_some() {
             unified_sqrt3::refined(&surface, &alpha)?
         } else {
             let (last, parameters) = unified_sqrt3::refine(&surface, &alpha)?;

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::cholesky::faer_pattern;
 use super::{Factorization, failed, room};
-use crate::assemble::LimitSystem;
+use crate::assemble::{Csr, LimitSystem};
 use crate::solvers::iteration::{Failure, Outcome};
 
 /// A factored by faer, sequentially. The supernodal variant always: the simplicial one panics on a vanishing
@@ -28,14 +28,29 @@ impl SparseLu {
     /// [`Outcome::Singular`] if A is structurally singular, [`Outcome::Breakdown`] when memory or 32-bit indices
     /// do not suffice.
     pub fn new(system: &LimitSystem) -> Result<Self, Failure> {
-        let broken = |why: &dyn std::fmt::Display| failed("LU", Outcome::Breakdown, why);
-        // A copy of the values, and factors with as many entries at the least: nothing cancels.
-        room("LU", "a factorization of a matrix", system.m.values().len(), 24)?;
+        enough_room(&system.m)?;
         // Column j of A holds h_i m_ij: row j of M, weighted by the column's H.
         let m = &system.m;
         let values: Vec<f64> =
             m.pattern().columns().iter().zip(m.values()).map(|(&i, &m)| system.h[i as usize] * m).collect();
-        let pattern = faer_pattern(m);
+        Self::of_columns(m, &values)
+    }
+
+    /// Factors the matrix A with these rows.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn of_rows(a: &Csr) -> Result<Self, Failure> {
+        enough_room(a)?;
+        let columns = a.transpose();
+        Self::of_columns(&columns, columns.values())
+    }
+
+    /// Entry k of column j is `values[k]`, in the pattern of the rows of `pattern`.
+    fn of_columns(pattern: &Csr, values: &[f64]) -> Result<Self, Failure> {
+        let n = pattern.len();
+        let broken = |why: &dyn std::fmt::Display| failed("LU", Outcome::Breakdown, why);
+        let pattern = faer_pattern(pattern);
         let params = LuSymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
@@ -47,7 +62,7 @@ impl SparseLu {
         symbolic
             .factorize_numeric_lu(
                 &mut numeric,
-                SparseColMatRef::new(pattern, &values),
+                SparseColMatRef::new(pattern, values),
                 Par::Seq,
                 MemStack::new(&mut memory),
                 Default::default(),
@@ -58,8 +73,13 @@ impl SparseLu {
             })?;
         let scratch =
             MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(3, Par::Seq)).map_err(|e| broken(&e))?;
-        Ok(SparseLu { symbolic, numeric, right_hand_sides: Mat::zeros(m.len(), 3), scratch })
+        Ok(SparseLu { symbolic, numeric, right_hand_sides: Mat::zeros(n, 3), scratch })
     }
+}
+
+/// A copy of the values, and factors with as many entries at the least: nothing cancels.
+fn enough_room(matrix: &Csr) -> Result<(), Failure> {
+    room("LU", "a factorization of a matrix", matrix.values().len(), 24)
 }
 
 impl Factorization for SparseLu {

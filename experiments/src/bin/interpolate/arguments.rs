@@ -51,7 +51,8 @@ pub struct Arguments {
 /// What is asked of the surface.
 #[derive(Args)]
 pub struct ShapeFlags {
-    /// Refine the control mesh K times by the scheme and write the surface
+    /// Refine the control mesh K times by the scheme and write the surface; by mid-edge, where there are boundaries or
+    /// creases, two steps each time
     #[arg(long, value_name = "K", default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=12))]
     pub subdivide: u8,
     /// Push the vertices that are written to their limit points

@@ -17,6 +17,7 @@ use glam::DVec3;
 
 use limitlab::Result;
 use limitlab::error::Error;
+use limitlab::interpolate::surface::check;
 use limitlab::mesh::features::Tags;
 use limitlab::mesh::file_tags::Subdivision;
 use limitlab::mesh::{Mesh, io};
@@ -27,7 +28,7 @@ use limitlab_experiments::cli::{self, subdivision_of};
 use arguments::{Arguments, Choice, conflict};
 use control::control_mesh;
 use summary::print_summary;
-use surfaces::{fairest, keeping, leave, refine, require_finite, unified};
+use surfaces::{fairest, keeping, leave, refine, request, require_finite, unified};
 use vertex_options::VertexOptions;
 
 fn main() -> ExitCode {
@@ -98,7 +99,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         Choice::Keeping(scheme) => scheme,
         _ => input.scheme.refinement(),
     };
-    refinement.check_size(input.surface.mesh(), arguments.shape.subdivide.into()).map_err(|e| input.named(e))?;
+    refinement.check_size(&input.surface, arguments.shape.subdivide.into()).map_err(|e| input.named(e))?;
     let per_vertex = VertexOptions::read(&arguments.shape, &input)?;
     let named = |e: Error| match e {
         Error::Io { .. } | Error::Parse { .. } | Error::Memory { .. } => e,
@@ -109,8 +110,10 @@ fn run(arguments: &Arguments) -> Result<()> {
         (None, Choice::Halstead) => fairest(arguments, &input, &per_vertex).map_err(named)?,
         (None, Choice::Keeping(scheme)) => keeping(arguments, &input, scheme).map_err(named)?,
         (None, _) => {
+            let request = request(arguments, &per_vertex);
+            check(&input.surface, input.scheme, &request).map_err(named)?;
             let control = control_mesh(arguments, &input, &per_vertex)?;
-            refine(arguments, &input, &per_vertex, control).map_err(named)?
+            refine(&input, &request, control).map_err(named)?
         }
     };
     leave(&input.frame, &mut result);

@@ -28,10 +28,10 @@ pub struct Finished {
     pub seconds: Seconds,
 }
 
-pub fn refine(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions, control: Control) -> Result<Finished> {
-    let start = Instant::now();
+/// What is asked of the surface of a control mesh.
+pub fn request<'a>(arguments: &Arguments, per_vertex: &'a VertexOptions) -> SurfaceOptions<'a> {
     let flags = &arguments.shape;
-    let request = SurfaceOptions {
+    SurfaceOptions {
         levels: flags.subdivide.into(),
         limit: flags.limit,
         normals: flags.write_normals,
@@ -41,10 +41,14 @@ pub fn refine(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions, 
             tolerance: flags.normal_tolerance.to_radians(),
             levels: flags.normal_levels.into(),
         },
-    };
+    }
+}
+
+pub fn refine(input: &Input, request: &SurfaceOptions, control: Control) -> Result<Finished> {
+    let start = Instant::now();
     let points = input.surface.positions();
     let control_surface = input.surface.with_positions(control.points);
-    let made = surface(control_surface, input.scheme, points, &request)?;
+    let made = surface(control_surface, input.scheme, points, request)?;
     let mut seconds = control.seconds;
     seconds.subdivide = start.elapsed().as_secs_f64();
     Ok(Finished {

@@ -30,10 +30,12 @@ impl VertexOptions {
         let file = flags.normals.as_deref();
         let normals = file.map(|p| vertex_data::normals(p, n)).transpose()?;
         let mut normals = normals.map(|normals| input.joined(normals, None));
+        let features = input.surface.features();
+        let is_shaped = |v: usize| is_interpolated(v) && features.is_none_or(|features| features.is_smooth(v));
         if let Some(normals) = normals.as_mut().filter(|n| n.iter().all(Option::is_some)) {
-            // A file with a normal for every vertex means those that are interpolated.
+            // A file with a normal for every vertex means those that can have one.
             for (v, normal) in normals.iter_mut().enumerate() {
-                *normal = normal.filter(|_| is_interpolated(v));
+                *normal = normal.filter(|_| is_shaped(v));
             }
         }
         let text = flags.shape_handle.as_deref();
@@ -41,7 +43,7 @@ impl VertexOptions {
         let mut handles = handles.map(|handles| input.joined(handles, 1.0));
         if text.is_some_and(|t| t.parse::<f64>().is_ok()) {
             for (v, handle) in handles.iter_mut().flatten().enumerate() {
-                *handle = if is_interpolated(v) { *handle } else { 1.0 };
+                *handle = if is_shaped(v) { *handle } else { 1.0 };
             }
         }
         let text = flags.alpha.as_deref();

@@ -3,10 +3,13 @@
 mod claims;
 mod context;
 mod corpus;
+mod creases;
+mod darts;
 mod figures;
 mod line_preconditioner;
 mod methods;
 mod omega;
+mod open_decay;
 mod open_meshes;
 mod orders;
 mod pia;
@@ -16,6 +19,7 @@ mod sparsity;
 mod splitting;
 mod thall;
 mod valences;
+mod whole;
 mod zheng_cai;
 
 use std::path::PathBuf;
@@ -63,7 +67,7 @@ struct Arguments {
 }
 
 /// All items, in the order in which they run.
-const ITEMS: [Item; 16] = [
+const ITEMS: [Item; 17] = [
     pia::TABLE1,
     thall::ITERATIONS,
     zheng_cai::SECTION_3_5,
@@ -77,6 +81,7 @@ const ITEMS: [Item; 16] = [
     popping::POPPING,
     ripples::RIPPLES,
     open_meshes::OPEN_MESHES,
+    darts::DARTS,
     figures::ALL,
     claims::LEDGER,
     claims::FINDINGS,

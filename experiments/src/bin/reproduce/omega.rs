@@ -1,7 +1,7 @@
 //! ω sweeps: iterations and rates over ω, with the predicted thresholds and optima.
 
 use limitlab::Result;
-use limitlab::analysis::spectrum::Extremes;
+use limitlab::analysis::spectrum::spectrum;
 use limitlab::analysis::sweep::{OmegaSweep, Thresholds, rounding_floor, sweep};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::method::SOR_OMEGA;
@@ -37,10 +37,6 @@ impl Row<'_> {
         self.found.thresholds.iter().find(|t| t.method == self.method)
     }
 
-    fn matrix(&self) -> Option<Extremes> {
-        self.thresholds().map(|t| t.matrix)
-    }
-
     fn first_divergence(&self) -> Option<f64> {
         let mut rows = self.found.rows.iter();
         rows.find(|r| r.method == self.method && r.outcome == Outcome::Diverged).map(|r| r.omega)
@@ -64,15 +60,15 @@ fn run(context: &mut Context) -> Result<()> {
         .col(Column::key("mesh"), |r| r.subject.name.clone())
         .col(Column::key("scheme"), |r| r.scheme.name())
         .col(Column::key("method"), |r| r.method.name())
-        .col(Column::number("omega_critical", 1e-6, 6), |r| r.matrix().map(|m| m.critical_omega()))
+        .col(Column::number("omega_critical", 1e-6, 6), |r| r.thresholds().map(|t| t.critical_omega))
         .col(Column::number("omega_critical_data", 1e-4, 6), |r| {
             r.thresholds().and_then(|t| t.data).map(|d| d.critical_omega())
         })
         .col(Column::number("omega_first_divergence", 1e-9, 4), Row::first_divergence)
-        .col(Column::number("omega_optimal", 1e-6, 6), |r| r.matrix().map(|m| m.optimal_omega()))
+        .col(Column::number("omega_optimal", 1e-6, 6), |r| r.thresholds().map(|t| t.optimal_omega))
         .col(Column::number("omega_best_on_grid", 0.051, 4), |r| r.found.best(r.method).map(|b| b.omega))
         .col(Column::count("iterations_best"), |r| r.found.best(r.method).map(|b| b.iterations))
-        .col(Column::number("rho_optimal", 1e-6, 4), |r| r.matrix().map(|m| m.radius(m.optimal_omega())))
+        .col(Column::number("rho_optimal", 1e-6, 4), |r| r.thresholds().map(|t| t.optimal_rho))
         .table(SWEEPS.id, SWEEPS.title, &rows);
     summary.note(
         "Tolerance 10⁻¹⁰ of the bounding box's diagonal, start V = P. `omega_critical` = 2/λ_max is the threshold of \
@@ -90,7 +86,8 @@ fn one(context: &mut Context, subject: &Subject, scheme: Scheme) -> Result<Omega
     let size = subject.surface.diagonal();
     let stop = Stop { tolerance: TOLERANCE * size, max_iterations: LIMIT };
     let points = subject.surface.positions();
-    let found = sweep(&system, (points, points), &grids, None, &stop, rounding_floor(size), &|_| {})?;
+    let found =
+        sweep((&system, &spectrum(&system)?), (points, points), &grids, None, &stop, rounding_floor(size), &|_| {})?;
     let stem = format!("{}--{}-{scheme}", SWEEPS.id, subject.name.replace([':', ' '], "-"));
     let title = format!("{} under {scheme}", subject.name);
     let about = format!(

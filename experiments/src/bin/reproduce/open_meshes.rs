@@ -1,20 +1,26 @@
 //! Open and creased meshes: the stages of their systems, spectra and proven bounds of the smooth vertices, iterations
-//! predicted and made.
+//! predicted and made; decay of the inverse around creases.
 
 use limitlab::Result;
 use limitlab::analysis::spectrum::{Spectrum, spectrum};
 use limitlab::assemble::Stages;
 use limitlab::error::Error;
 use limitlab::interpolate::{Options, Tolerance, interpolate, limit_points, staged};
-use limitlab::mesh::features::{Rule, Tags};
+use limitlab::mesh::features::{Rule, SHARP, Tags};
+use limitlab::mesh::noise::add_noise;
+use limitlab::mesh::order::inverse;
 use limitlab::mesh::validate::Boundary;
-use limitlab::mesh::{Faces, Mesh, Surface};
+use limitlab::mesh::{Faces, Mesh, Surface, builtin};
 use limitlab::schemes::Scheme;
-use limitlab::solvers::{Method, Solution, Stop};
-use limitlab_experiments::report::{Column, Columns};
+use limitlab::solvers::{Method, Report, Solution, Stop};
+use limitlab_experiments::cli::STAND_IN_NOISE;
+use limitlab_experiments::report::{Column, Columns, Figure, SparsityPlot};
 
 use crate::context::{Context, Item, Subject};
 use crate::corpus;
+use crate::creases::{closed_loop, knot, rims, split_cube, torus_loop};
+use crate::open_decay;
+use crate::whole::Whole;
 
 pub const OPEN_MESHES: Item =
     Item { id: "open-meshes", title: "Open and creased meshes: spectra of the smooth vertices, iterations", run };
@@ -103,7 +109,163 @@ fn run(context: &mut Context) -> Result<()> {
          largest distance of a limit point from its vertex over the diagonal, on curves and corners too, by rows that no \
          solver has seen.",
     );
-    context.table(table)
+    context.table(table)?;
+    // The same on any meshes.
+    if context.real() {
+        return Ok(());
+    }
+    context.table(open_decay::table(context.quick)?)?;
+    creased(context)
+}
+
+/// A creased mesh made here, under Catmull-Clark.
+struct Creased {
+    subject: Subject,
+    stages: Stages,
+    /// Of all of A.
+    rho: f64,
+    imaginary: f64,
+    pia: Report,
+    thall: Report,
+    gauss_seidel: Report,
+    auto: Report,
+    off: f64,
+}
+
+impl Creased {
+    fn new((name, closed, tags): (&str, Mesh, Tags)) -> Result<Self> {
+        let surface = Surface::new(closed)?.into_tagged(&tags)?;
+        let scheme = Scheme::CatmullClark;
+        let stages = Stages::new(&surface, scheme, None)?;
+        let whole = Whole::of(&stages);
+        let all = whole.eigenvalues()?;
+        let size = surface.diagonal();
+        let stop = Stop { tolerance: TOLERANCE * size, max_iterations: LIMIT };
+        let by = |method| whole.run(surface.positions(), method, &stop);
+        let auto = interpolate(&surface, scheme, &Options::from(stop))?;
+        let limits = limit_points(&surface.with_positions(auto.points), scheme)?;
+        let distances = limits.iter().zip(surface.positions()).map(|(a, b)| a.distance(*b));
+        Ok(Creased {
+            rho: all.iter().map(|z| (1.0 - z).norm()).fold(0.0, f64::max),
+            imaginary: all.iter().map(|z| z.im.abs()).fold(0.0, f64::max),
+            pia: by(Method::Pia),
+            thall: by(Method::Thall),
+            gauss_seidel: by(Method::GaussSeidel { order: None }),
+            auto: auto.report,
+            off: distances.fold(0.0, f64::max) / size,
+            stages,
+            subject: Subject { name: name.into(), surface },
+        })
+    }
+}
+
+/// A cube, a torus and a knot with creases, corners, darts and semi-sharp edges.
+fn creased_meshes() -> Vec<(&'static str, Mesh, Tags)> {
+    let tagged = |creases: Vec<_>, corners: &[u32]| {
+        let corners = corners.iter().map(|&v| (v, SHARP)).collect();
+        Tags { creases, corners, ..Tags::default() }
+    };
+    let torus = || builtin::torus(16, 12);
+    let around = |j: u32, sharpness: f64| closed_loop(torus_loop(16, 12, j), sharpness);
+    let (rings, sides) = (48, 6);
+    let along = |j: u32, sharpness: f64| closed_loop(torus_loop(rings, sides, j), sharpness);
+    // From smooth to as good as sharp and back.
+    let ramp = |j: u32| -> Vec<_> {
+        let sharpness = |i: usize| 4.0 * (1.0 - (i as f64 - 23.5).abs() / 24.0);
+        along(j, 0.0).into_iter().enumerate().map(|(i, (edge, _))| (edge, sharpness(i))).collect()
+    };
+    let knot = || knot(rings as usize, sides as usize);
+    let part = |edges: Vec<([u32; 2], f64)>| edges.into_iter().take(10).collect::<Vec<_>>();
+    let both = |[a, b]: [Vec<([u32; 2], f64)>; 2]| [a, b].concat();
+    vec![
+        ("cube, two rims", split_cube(), tagged(rims(SHARP), &[])),
+        ("cube, two rims of sharpness 1.5", split_cube(), tagged(rims(1.5), &[])),
+        ("torus:16x12, two loops, corners", torus(), tagged(both([around(0, SHARP), around(6, SHARP)]), &[0, 48, 6])),
+        (
+            "torus:16x12, creases between darts",
+            torus(),
+            tagged(both([part(around(0, SHARP)), part(around(6, SHARP))]), &[]),
+        ),
+        ("torus:16x12, loops of sharpness 1 and 2.5", torus(), tagged(both([around(0, 1.0), around(6, 2.5)]), &[])),
+        ("knot, two loops", knot(), tagged(both([along(0, SHARP), along(3, SHARP)]), &[])),
+        (
+            "knot, creases between darts, a corner",
+            knot(),
+            tagged(both([part(along(0, SHARP)), part(along(3, SHARP))]), &[30]),
+        ),
+        ("knot, a ramp of sharpness 0 to 4", knot(), tagged(ramp(0), &[])),
+    ]
+}
+
+fn creased(context: &mut Context) -> Result<()> {
+    let mut meshes = creased_meshes();
+    if context.quick {
+        meshes.truncate(QUICK);
+    }
+    for (_, mesh, _) in &mut meshes {
+        add_noise(mesh, STAND_IN_NOISE.amplitude, STAND_IN_NOISE.seed);
+    }
+    let rows = meshes.into_iter().map(Creased::new).collect::<Result<Vec<Creased>>>()?;
+    let count = |rule| move |r: &Creased| r.subject.surface.features().map_or(0, |f| f.count(rule)).to_string();
+    let table = Columns::<Creased>::new()
+        .col(Column::key("mesh"), |r| r.subject.name.clone())
+        .col(Column::text("smooth"), |r| r.stages.block().len().to_string())
+        .col(Column::text("on_curves"), count(Rule::Crease))
+        .col(Column::text("curves"), |r| r.subject.surface.features().map_or(0, |f| f.curves().len()).to_string())
+        .col(Column::text("corners"), count(Rule::Corner))
+        .col(Column::text("darts"), count(Rule::Dart))
+        .col(Column::text("semi_sharp"), count(Rule::SemiSharp))
+        .col(Column::number("pia_rho", 1e-6, 4), |r| Some(r.rho))
+        .col(Column::number("largest_im", 1e-4, 2).floor(1e-6), |r| Some(r.imaginary))
+        .col(Column::count("pia"), |r| r.pia.iterations)
+        .col(Column::count("thall"), |r| r.thall.iterations)
+        .col(Column::count("gauss_seidel"), |r| r.gauss_seidel.iterations)
+        .col(Column::count("auto"), |r| r.auto.iterations)
+        .col(Column::text("status"), |r| r.auto.outcome.name())
+        .col(Column::number("auto_error", 1.0, 2).floor(TOLERANCE), |r| Some(r.off));
+    let title = "Creased meshes made here: vertices by their rule, all of A, iterations";
+    let mut table = table.table(format!("{}--creased", OPEN_MESHES.id), title, &rows);
+    table.note(
+        "Under Catmull-Clark. `pia_rho` is the spectral radius of I − A and `largest_im` the largest |Im λ|, of all of \
+         A: it is not symmetric where there are curves, nor similar to a symmetric matrix where there are darts or \
+         irregular semi-sharp edges. PIA, Thall's ω = ½ and Gauss-Seidel (file order) run on all vertices together \
+         from V = P, corners and curves too, to 10⁻¹⁰ of the bounding box's diagonal.",
+    );
+    context.table(table)?;
+    if context.quick { Ok(()) } else { blocks(context) }
+}
+
+/// The pattern of A in file order, and with corners first, then curves, then the smooth vertices.
+fn blocks(context: &Context) -> Result<()> {
+    let (rings, sides) = (48, 6);
+    let creases = [0, 3].map(|j| closed_loop(torus_loop(rings, sides, j), SHARP)).concat();
+    let corners = [0, 16 * sides, 24 * sides + 3].map(|v| (v, SHARP)).to_vec();
+    let mesh = knot(rings as usize, sides as usize);
+    let surface = Surface::new(mesh)?.into_tagged(&Tags { creases, corners, ..Tags::default() })?;
+    let matrix = Stages::new(&surface, Scheme::CatmullClark, None)?.matrix();
+    let mut order: Vec<u32> = (0..surface.len() as u32).collect();
+    let file = inverse(&order);
+    if let Some(features) = surface.features() {
+        // Along the curves, one after the other.
+        let mut place = vec![usize::MAX; surface.len()];
+        features.curves().iter().flat_map(|c| &c.vertices).enumerate().for_each(|(k, &v)| place[v as usize] = k);
+        let block = |v: u32| match features.rules()[v as usize] {
+            Rule::Corner => 0,
+            Rule::Crease => 1,
+            Rule::Smooth | Rule::Dart | Rule::SemiSharp => 2,
+        };
+        order.sort_by_key(|&v| (block(v), place[v as usize]));
+    }
+    let plot = |caption: &str, place: &[u32]| {
+        let row = |i: usize| matrix.row(i).map(move |(j, _)| (place[i], place[j]));
+        SparsityPlot::new(caption, matrix.len(), (0..matrix.len()).flat_map(row))
+    };
+    let panels = [plot("file order", &file), plot("corners, curves, smooth vertices", &inverse(&order))];
+    let figure = Figure { width: 560, height: 310, ..Figure::row(panels) };
+    context.figure(
+        &format!("{}--blocks", OPEN_MESHES.id),
+        &figure.title("A of a knot with two creases and three corners under catmull-clark"),
+    )
 }
 
 /// The open models.

@@ -5,15 +5,16 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 use nalgebra::DMatrix;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use limitlab::Result;
 use limitlab::analysis::dense;
 use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
 use limitlab::assemble::LimitSystem;
-use limitlab::mesh::{Mesh, Surface, builtin, generate, random};
+pub use limitlab::mesh::random::random_points;
+use limitlab::mesh::validate::Boundary;
+use limitlab::mesh::{Mesh, Surface, builtin, features::Tags, generate, random};
+use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, Outcome, Solution, Stop, run, run_watched};
 
 use crate::context::{Context, Subject};
@@ -24,6 +25,8 @@ pub const RANDOM_MESHES: usize = 300;
 pub const RANDOM_VERTICES: usize = 120;
 /// The most vertices of [`Lab::subjects`].
 const MODEL_VERTICES: usize = 3000;
+/// Random meshes with holes and creases of [`Lab::creased`], of each kind of faces.
+const CREASED_MESHES: usize = 60;
 
 /// A run of the program as the claims see it, with the random meshes made once.
 pub struct Lab<'a> {
@@ -31,11 +34,22 @@ pub struct Lab<'a> {
     polygons: OnceCell<Vec<Subject>>,
     triangles: OnceCell<Vec<Subject>>,
     subjects: OnceCell<Vec<Subject>>,
+    creased: [OnceCell<Vec<Subject>>; 2],
+    semi_sharp: [OnceCell<Vec<Subject>>; 2],
+    open: OnceCell<Vec<Subject>>,
 }
 
 impl<'a> Lab<'a> {
     pub fn new(context: &'a Context) -> Self {
-        Lab { context, polygons: OnceCell::new(), triangles: OnceCell::new(), subjects: OnceCell::new() }
+        Lab {
+            context,
+            polygons: OnceCell::new(),
+            triangles: OnceCell::new(),
+            subjects: OnceCell::new(),
+            creased: Default::default(),
+            semi_sharp: Default::default(),
+            open: OnceCell::new(),
+        }
     }
 
     /// Closed polygon meshes at random, all valences at least 3: spheres, tori, sums and unions of those, duals,
@@ -47,6 +61,52 @@ impl<'a> Lab<'a> {
     /// Closed triangle meshes at random.
     pub fn triangles(&self) -> &[Subject] {
         self.triangles.get_or_init(|| small("random-triangles", random::random_triangulation))
+    }
+
+    /// Open and creased meshes at random without darts, of faces on which the scheme is defined.
+    pub fn creased(&self, scheme: Scheme) -> &[Subject] {
+        let make = || self.with_features("random-creased", scheme, random::random_creased);
+        self.creased[usize::from(scheme.needs_triangles())].get_or_init(make)
+    }
+
+    /// The same with darts and semi-sharp edges and vertices.
+    pub fn semi_sharp(&self, scheme: Scheme) -> &[Subject] {
+        let make = || self.with_features("random-semi-sharp", scheme, random::random_semi_sharp);
+        self.semi_sharp[usize::from(scheme.needs_triangles())].get_or_init(make)
+    }
+
+    /// From the closed meshes at random, the k-th by the seed k.
+    fn with_features(
+        &self,
+        name: &str,
+        scheme: Scheme,
+        make: fn(&Mesh, u64) -> Option<(Surface, Tags)>,
+    ) -> Vec<Subject> {
+        let closed = if scheme.needs_triangles() { self.triangles() } else { self.polygons() };
+        let made = (0..).zip(closed).filter_map(|(seed, subject)| {
+            let (surface, _) = make(subject.surface.mesh(), seed)?;
+            // Some meshes are left as they were.
+            surface.features().is_some().then(|| Subject { name: format!("{name}:{seed}"), surface })
+        });
+        made.take(CREASED_MESHES).collect()
+    }
+
+    /// The open real models, none where these are not at hand, by either rule of the boundary; of at most
+    /// [`MODEL_VERTICES`] vertices.
+    pub fn open_models(&self) -> Result<&[Subject]> {
+        if self.open.get().is_none() {
+            let mut found = Vec::new();
+            if self.context.real() {
+                for file in self.context.files("open")? {
+                    for boundary in [Boundary::EdgeAndCorner, Boundary::EdgeOnly] {
+                        found.push(self.context.read(&file, boundary)?);
+                    }
+                }
+                found.retain(|subject| subject.surface.len() <= MODEL_VERTICES);
+            }
+            return Ok(self.open.get_or_init(|| found));
+        }
+        Ok(self.open.get().map_or(&[], Vec::as_slice))
     }
 
     /// The closed real models, or stand-ins of several kinds, of at most [`MODEL_VERTICES`] vertices.
@@ -85,12 +145,6 @@ pub fn exact(name: &str) -> Result<Subject> {
 /// A closed mesh of quads in which vertices `n` and n + 1 have valence n.
 pub fn quad_star(n: usize) -> Mesh {
     generate::quad_split(&builtin::bipyramid(n))
-}
-
-/// Points without any structure, one a vertex.
-pub fn random_points(n: usize, seed: u64) -> Vec<DVec3> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    (0..n).map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))).collect()
 }
 
 /// max ‖a_i − b_i‖

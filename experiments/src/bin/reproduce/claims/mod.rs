@@ -4,12 +4,14 @@
 //! - [`finding`]: numbers, thresholds, verdicts;
 //! - [`lab`]: the meshes and small tools that claims share;
 //! - one file a paper, and beside it one each for subjects of their own: [`thall`], [`zheng_cai`], [`pia`], [`lin_luo`];
+//! - [`open`]: what two of them leave to open meshes;
 //! - [`findings`]: the page on what is settled and what is wrong, filled with the ledger's numbers.
 
 mod finding;
 mod findings;
 mod lab;
 mod lin_luo;
+mod open;
 mod pia;
 mod pia_catmull_clark;
 mod thall;
@@ -69,7 +71,9 @@ const PAPERS: [(char, &str); 4] = [
 
 /// All claims in the order of the ledger.
 pub fn all() -> impl Iterator<Item = &'static Claim> {
-    [thall::CLAIMS, thall_masks::CLAIMS, zheng_cai::CLAIMS, pia::CLAIMS, lin_luo::CLAIMS].into_iter().flatten()
+    let zheng_cai = [zheng_cai::CLAIMS, open::ZHENG_CAI];
+    let pia = [pia::CLAIMS, open::PIA];
+    [thall::CLAIMS, thall_masks::CLAIMS].into_iter().chain(zheng_cai).chain(pia).chain([lin_luo::CLAIMS]).flatten()
 }
 
 pub fn find(id: &str) -> Option<&'static Claim> {

@@ -11,11 +11,11 @@ use limitlab::schemes::Scheme;
 use limitlab::schemes::catmull_clark::{refine, refine_in_place};
 use limitlab::solvers::{Method, Outcome};
 
-use super::Claim;
 use super::finding::{Evidence, Finding};
 use super::lab::{
     Lab, distance, each, ends, exact, iterates, largest, limit_by_powers, random_points, smallest, solve_random,
 };
+use super::{Claim, thall_surfaces};
 
 const ROUNDING: f64 = 1e-12;
 
@@ -106,7 +106,7 @@ pub const CLAIMS: &[Claim] = &[
         place: "§2.7",
         printed: "Freezing vertices and edges of the initial mesh is suspected to produce undesirable artifacts.",
         slow: false,
-        check: creases,
+        check: thall_surfaces::frozen_creases,
     },
     Claim {
         id: "T30",
@@ -387,12 +387,6 @@ fn index_map(_: &Lab) -> Result<Finding> {
         ),
         Evidence::above("smallest such distance without the map", unmapped, 0.01),
     ]))
-}
-
-fn creases(_: &Lab) -> Result<Finding> {
-    Ok(Finding::not_reproducible(
-        "Needs creases and boundaries, which the meshes and schemes here do not have: all are closed and smooth.",
-    ))
 }
 
 fn not_sor(lab: &Lab) -> Result<Finding> {

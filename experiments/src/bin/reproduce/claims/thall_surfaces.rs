@@ -1,4 +1,4 @@
-//! Thall's surfaces: irregular faces, error metrics, normals and attributes (T12–T17).
+//! Thall's surfaces: irregular faces, error metrics, normals and attributes (T12–T17), frozen creases (T29).
 
 use glam::{DQuat, DVec3};
 
@@ -9,11 +9,13 @@ use limitlab::interpolate::thall::{
     AttributeRule, MedialAtom, medial_shifts, normal_deviations, refine_attributes, scaled_distances,
 };
 use limitlab::mesh::Surface;
+use limitlab::mesh::features::{SHARP, Tags};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
 use limitlab::solvers::{Method, Stop, run};
 
 use super::finding::{Evidence, Finding};
 use super::lab::{Lab, distance, each, exact, largest, median, random_points};
+use crate::creases::{Artifacts, Crease, closed_loop, torus_loop};
 
 const CC: Scheme = Scheme::CatmullClark;
 
@@ -204,4 +206,48 @@ pub fn attributes(_: &Lab) -> Result<Finding> {
         Evidence::at_most("the same in the limit, values interpolated first", distance(&limits, &values), 1e-9),
     ])
     .remark("The paper expects some creep of interpolated values too: that of the iterations left out."))
+}
+
+pub fn frozen_creases(_: &Lab) -> Result<Finding> {
+    const LEVELS: usize = 5;
+    let subject = exact("torus:10x8")?;
+    let size = subject.surface.diagonal();
+    let tags = Tags { creases: closed_loop(torus_loop(10, 8, 2), SHARP), ..Tags::default() };
+    let [resting, averaged, solved] = Crease::ALL.map(|crease| {
+        let control = crease.control(&subject.surface, &tags)?;
+        Artifacts::new(&control, subject.surface.positions(), LEVELS)
+    });
+    let (resting, averaged, solved) = (resting?, averaged?, solved?);
+    Ok(Finding::reproduced(vec![
+        Evidence::above(
+            "vertices that rest: turn of the crease at a vertex in degrees, torus:10x8",
+            resting.turn,
+            10.0,
+        ),
+        Evidence::above("the same: angle between facets on one side of it, in degrees", resting.jump, 10.0),
+        Evidence::above(
+            "vertices averaged along the crease: distance of a limit point from its vertex over L",
+            averaged.gap / size,
+            1e-3,
+        ),
+        Evidence::shown("the same: turn in degrees", averaged.turn),
+        Evidence::at_most(
+            "vertices solved for: distance of a limit point from its vertex over L",
+            solved.gap / size,
+            1e-9,
+        ),
+        Evidence::below("the same: turn in degrees, after 5 refinements", solved.turn, 2.0),
+        Evidence::below(
+            "the same: angle between facets on one side, in degrees, after 5 refinements",
+            solved.jump,
+            5.0,
+        ),
+        Evidence::shown("vertices that rest: distance of a limit point from its vertex over L", resting.gap / size),
+    ])
+    .remark(
+        "Frozen vertices that rest give a polygon with a kink in the surface at each, on both sides; frozen ones that \
+         are averaged along the crease give a smooth curve that misses them. With the crease rules in the matrix there \
+         is neither: (1, 4, 1)/6 along the crease first, then the smooth vertices. The picture is \
+         `figures--thall-creases.png`.",
+    ))
 }

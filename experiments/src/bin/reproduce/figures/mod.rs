@@ -3,6 +3,7 @@
 //! A picture is `figures--NAME.png`; the table `figures` says what each shows, on which mesh, and how far the surface
 //! is from the points.
 
+mod creases;
 mod curves;
 mod doo_sabin;
 mod errors;
@@ -52,6 +53,8 @@ fn run(context: &mut Context) -> Result<()> {
         doo_sabin::with_normals(&mut album)?;
         doo_sabin::scaled_faces(&mut album)?;
         doo_sabin::with_handles(&mut album)?;
+        creases::frozen(&mut album)?;
+        creases::same_points(&mut album)?;
         curves::relation(&mut album)?;
         curves::samples(&mut album)?;
         curves::stencils(&mut album)?;
