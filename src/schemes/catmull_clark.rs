@@ -11,9 +11,7 @@ use super::refined::{self, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Circulant, Definition, PaperNames, SingularSet};
 use super::sharp::{self, Across};
-use super::star::{
-    Circle, Tangents, across, centroid, for_each_star, require_closed, require_room, require_rules, sides, twin,
-};
+use super::star::{Circle, Tangents, across, centroid, for_each_star, require_room, require_rules, sides};
 use crate::Result;
 use crate::mesh::edge_numbers::EdgeNumbers;
 use crate::mesh::incidence::{next_in, prev_in};
@@ -105,7 +103,7 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
             [c, across(topology, c)].map(|c| old[corners[c as usize] as usize] + centers[incidence.face_of(c)]);
         0.25 * one + 0.25 * other
     });
-    sharp::set_refined(&mut positions, surface, &edges);
+    sharp::set_refined(&mut positions, surface, &edges, |v| old[v]);
     positions.append(&mut centers);
     Ok(Mesh::new(positions, split(surface, &edges)))
 }
@@ -117,15 +115,20 @@ pub(super) fn refined_topology(surface: &Surface, refined: &Mesh) -> Topology {
 
 /// One step by Thall's in-place rule (Eq. 20 and 22): first the points of faces and edges, then each old vertex
 /// from its new neighbours alone, ((n²−3n) v + Σ_j (4 e'_j − f'_j))/n², written over its old place. The result is
-/// that of [`refine`] up to rounding, numbered alike; the only array of points is that of the result. (The
-/// middle line of the printed Eq. 22 has −(1/n²)v for −(1/n)v; its last line, used here, is right.)
+/// that of [`refine`] up to rounding, numbered alike; the only array of points is that of the result, but for the old
+/// places of vertices that are not smooth. (The middle line of the printed Eq. 22 has −(1/n²)v for −(1/n)v; its last line,
+/// used here, is right.)
 ///
 /// # Errors
-/// As [`refine`]; a mesh with sharp edges or vertices.
+/// As [`refine`].
 pub fn refine_in_place(mut surface: Surface) -> Result<Mesh> {
-    require_closed(&surface)?;
+    require_rules(&surface)?;
     require_room(surface.mesh(), 4)?;
     let mut points = surface.take_positions();
+    let mut sharp: Vec<(usize, DVec3)> = Vec::new();
+    if let Some(features) = surface.features() {
+        sharp.extend((0..points.len()).filter(|&v| !features.is_smooth(v)).map(|v| (v, points[v])));
+    }
     let (mesh, topology) = (surface.mesh(), surface.topology());
     let numbers = topology.edge_numbers();
     let (vertices, edges) = (topology.incidence.vertices(), topology.edges());
@@ -136,7 +139,7 @@ pub fn refine_in_place(mut surface: Surface) -> Result<Mesh> {
         points[vertices + edges + f] = centroid(&points, face);
     }
     for (e, c) in topology.edge_sides().enumerate() {
-        let t = twin(topology, c);
+        let t = across(topology, c);
         let ends = points[corners[c as usize] as usize] + points[corners[t as usize] as usize];
         points[vertices + e] = 0.25 * (ends + points[face_point(c)] + points[face_point(t)]);
     }
@@ -147,6 +150,7 @@ pub fn refine_in_place(mut surface: Surface) -> Result<Mesh> {
             star.iter().map(|&c| 4.0 * points[vertices + numbers.of(c) as usize] - points[face_point(c)]).sum();
         points[v] = ((n * n - 3.0 * n) * points[v] + neighbors) / (n * n);
     }
+    sharp::set_refined(&mut points, &surface, &numbers, |v| sharp[sharp.partition_point(|s| s.0 < v)].1);
     let faces = split(&surface, &numbers);
     Ok(Mesh::new(points, faces))
 }

@@ -200,7 +200,7 @@ pub fn limit_positions(rule: CornerRule, surface: &Surface) -> Result<Vec<DVec3>
         *limit /= topology.incidence.face_count(v) as f64;
     }
     if let Some(features) = surface.features() {
-        sharp::set_vertices(&mut limits, surface.positions(), features, QUADRATIC);
+        sharp::set_vertices(&mut limits, |v| surface.positions()[v], features, QUADRATIC);
     }
     Ok(limits)
 }

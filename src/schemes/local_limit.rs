@@ -271,12 +271,12 @@ impl StarOf {
     }
 
     /// Where a step takes the vertex; `smooth` is where it would go if all edges and itself were smooth.
-    pub(super) fn vertex_point(&self, points: &[DVec3], smooth: DVec3) -> DVec3 {
-        let own = points[self.vertex];
+    pub(super) fn vertex_point(&self, point: impl Fn(usize) -> DVec3, smooth: DVec3) -> DVec3 {
+        let own = point(self.vertex);
         let by_rule = |steps: usize| match self.star.rule(steps) {
             StepRule::Corner => own,
             StepRule::Crease => {
-                let along = self.star.crease(steps).into_iter().map(|j| points[self.ends[j] as usize]);
+                let along = self.star.crease(steps).into_iter().map(|j| point(self.ends[j] as usize));
                 0.75 * own + 0.125 * along.sum::<DVec3>()
             }
             StepRule::Smooth | StepRule::Dart => smooth,

@@ -111,7 +111,7 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
         });
         one + other
     });
-    sharp::set_refined(&mut positions, surface, &edges);
+    sharp::set_refined(&mut positions, surface, &edges, |v| old[v]);
     Ok(Mesh::new(positions, split_in_four(mesh, &edges)))
 }
 

@@ -1,7 +1,7 @@
 //! Sharp edges and vertices under Catmull-Clark and Loop, whose curves are cubic B-splines: what a step, limit points and
-//! tangents are there; and what other schemes share. A smooth vertex has all of its faces, so that everything is computed as on a closed mesh first, and
-//! then set anew at the few places that are sharp. Values that the first pass gives to the ends of incomplete stars are
-//! finite and mean nothing.
+//! tangents are there; and what other schemes share. A smooth vertex has all of its faces, so that everything is computed as
+//! on a closed mesh first, and then set anew at the few places that are sharp. Values that the first pass gives to the ends of
+//! incomplete stars are finite and mean nothing.
 
 use std::f64::consts::PI;
 
@@ -17,21 +17,26 @@ use crate::parallel;
 
 /// Sets the points of sharp edges, creases and corners after a step: (v + w)/2 for an edge, (a + 6v + b)/8 for a crease
 /// vertex with the neighbours a and b along its curve; corners rest; what is semi-sharp blends these with the smooth points.
-/// `positions` are those of the old vertices, then one for each edge, then others. O(N), and O(k) by one thread for k
-/// vertices on curves and at semi-sharp edges.
-pub(super) fn set_refined(positions: &mut [DVec3], surface: &Surface, edges: &EdgeNumbers) {
+/// `positions` are those of the old vertices, then one for each edge, then others; `old(v)` is where a vertex that is not smooth
+/// was. O(N), and O(k) by one thread for k vertices on curves and at semi-sharp edges.
+pub(super) fn set_refined(
+    positions: &mut [DVec3],
+    surface: &Surface,
+    edges: &EdgeNumbers,
+    old: impl Fn(usize) -> DVec3 + Sync,
+) {
     let Some(features) = surface.features() else { return };
-    let (old, faces, topology) = (surface.positions(), surface.faces(), surface.topology());
-    let (vertices, others) = positions.split_at_mut(surface.len());
-    set_vertices(vertices, old, features, 0.125);
+    let (faces, topology) = (surface.faces(), surface.topology());
+    let (vertices, others) = positions.split_at_mut(topology.incidence.vertices());
+    set_vertices(vertices, &old, features, 0.125);
     for v in features.at_semi_sharp(surface) {
         let v = v as usize;
         // On a curve `vertices[v]` is no smooth point any more, and no rule there asks for one.
-        vertices[v] = StarOf::new(surface, features, v).vertex_point(old, vertices[v]);
+        vertices[v] = StarOf::new(surface, features, v).vertex_point(&old, vertices[v]);
     }
     let (corners, sharp) = (faces.corners(), features.sharp_half_edges());
     let midpoint = |c: u32| {
-        let ends = [c, topology.incidence.next(faces, c)].map(|c| old[corners[c as usize] as usize]);
+        let ends = [c, topology.incidence.next(faces, c)].map(|c| old(corners[c as usize] as usize));
         0.5 * (ends[0] + ends[1])
     };
     for &(c, sharpness) in features.semi_sharp_edges() {
@@ -49,14 +54,14 @@ pub(super) fn set_refined(positions: &mut [DVec3], surface: &Surface, edges: &Ed
 }
 
 /// Sets `w a + (1 − 2w) v + w b` on curves, v at corners.
-pub(super) fn set_vertices(points: &mut [DVec3], old: &[DVec3], features: &Features, w: f64) {
+pub(super) fn set_vertices(points: &mut [DVec3], old: impl Fn(usize) -> DVec3 + Sync, features: &Features, w: f64) {
     let rules = features.rules();
     parallel::change(points, |v, point| {
         if rules[v] == Rule::Corner {
-            *point = old[v];
+            *point = old(v);
         }
     });
-    features.for_each_crease(|v, [a, b]| points[v] = (1.0 - 2.0 * w) * old[v] + w * (old[a] + old[b]));
+    features.for_each_crease(|v, [a, b]| points[v] = (1.0 - 2.0 * w) * old(v) + w * (old(a) + old(b)));
 }
 
 /// Sets the limit points of curves, `w a + (1 − 2w) v + w b`, of corners, and under schemes with rules for stars those of
@@ -64,7 +69,7 @@ pub(super) fn set_vertices(points: &mut [DVec3], old: &[DVec3], features: &Featu
 pub(super) fn set_limits(limits: &mut [DVec3], surface: &Surface, w: f64, rule: Option<StarRule>) {
     let Some(features) = surface.features() else { return };
     let points = surface.positions();
-    set_vertices(limits, points, features, w);
+    set_vertices(limits, |v| points[v], features, w);
     let Some(rule) = rule else { return };
     let darts = features.with_rule(Rule::Dart);
     for v in darts.into_iter().chain(features.at_semi_sharp(surface).into_iter().map(|v| v as usize)) {

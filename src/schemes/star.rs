@@ -50,18 +50,6 @@ pub(crate) fn require_no_dart(surface: &Surface, scheme: &'static str) -> Result
     }
 }
 
-/// Refuses a boundary, and creases, naming the schemes that have rules for them.
-pub(crate) fn require_closed(surface: &Surface) -> Result<()> {
-    require_rules(surface)?;
-    match surface.features() {
-        Some(_) => Err(Error::NotOffered {
-            what: "only refinements with rules for sharp edges take boundaries, creases and corners".into(),
-            schemes: &["catmull-clark", "loop", "nasri", "zheng-cai", "mid-edge"],
-        }),
-        None => Ok(()),
-    }
-}
-
 /// Refuses a mesh with a face that is no triangle, naming the first such face, and a boundary without rules.
 pub(crate) fn require_triangles(surface: &Surface, scheme: &'static str) -> Result<()> {
     require_rules(surface)?;
@@ -100,7 +88,7 @@ pub(crate) fn refuse<T>(what: String) -> Result<T> {
     Err(Error::mesh("mesh", what))
 }
 
-/// The opposite half-edge in a mesh that [`require_closed`] has let pass.
+/// The opposite half-edge in a closed mesh.
 pub(crate) fn twin(topology: &Topology, c: u32) -> u32 {
     topology.twin(c).expect("a closed mesh has every twin")
 }

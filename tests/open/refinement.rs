@@ -102,6 +102,12 @@ fn a_step_is_the_one_by_hand_and_carries_features_over() {
             for (ours, theirs) in fine.faces().iter().zip(by_hand.mesh.faces.iter()) {
                 assert!(ours.iter().map(|&v| place[v as usize]).eq(theirs.iter().copied()), "{scheme}, seed {seed}");
             }
+            if refinement == Refinement::CatmullClark {
+                let in_place = catmull_clark::refine_in_place(coarse.clone()).unwrap();
+                assert_eq!(in_place.faces, *fine.faces());
+                let off = crate::common::meshes::distance(&in_place.positions, fine.positions());
+                assert!(off < 1e-13, "seed {seed}, in place: {off:e}");
+            }
             hold_against_tags(&coarse, &fine);
             hold_against_tags(&fine, &refinement.refined(&fine).unwrap());
             open += usize::from(!coarse.is_closed());
