@@ -27,6 +27,9 @@ pub fn krylov(scale: f64) -> f64 {
     EPS.sqrt() * scale
 }
 
+/// Points of size 1 by weights in single precision, after a few steps.
+pub const SINGLE: f64 = 1e-6;
+
 /// Rates fitted to histories of tens to hundreds of iterations.
 pub const RATE: f64 = 5e-3;
 

@@ -9,6 +9,7 @@ mod naive;
 mod refinement;
 mod rows;
 mod thirds;
+mod witness;
 
 use glam::DVec3;
 use limitlab::mesh::features::Tags;
