@@ -63,11 +63,12 @@ pub struct Constraints<'a> {
 }
 
 impl Constraints<'_> {
-    /// Normals, and handles other than 1, at smooth vertices only.
+    /// Normals, and handles other than 1, at smooth vertices only of a surface, or of one whose first vertices are refined.
     pub(super) fn check_smooth(&self, surface: &Surface) -> Result<()> {
         let Some(features) = surface.features() else { return Ok(()) };
         let is_shaped = |v: usize| {
-            self.normals.is_some_and(|normals| normals[v].is_some()) || self.handles.is_some_and(|s| s[v] != 1.0)
+            let has_normal = self.normals.and_then(|normals| *normals.get(v)?).is_some();
+            has_normal || self.handles.and_then(|s| s.get(v)).is_some_and(|&s| s != 1.0)
         };
         match (0..surface.len()).find(|&v| is_shaped(v) && !features.is_smooth(v)) {
             None => Ok(()),

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::boundary::Boundary;
 use super::defect::counted;
-use super::features::{Features, Rule, Tags};
+use super::features::{Features, Rule, SHARP, Tags};
 use super::numbering::Numbering;
 use super::space_filling::{along_curve, is_scattered};
 use super::validate::{Validation, boundary_remark, validate};
@@ -161,6 +161,20 @@ impl Surface {
         let Surface { mesh, connectivity } = self;
         let connectivity = Connectivity { boundary: tags.boundary, features, ..Arc::unwrap_or_clone(connectivity) };
         Ok(Surface { mesh, connectivity: Arc::new(connectivity) })
+    }
+
+    /// The tags that give these [features](Self::features): sharp edges with two faces, corners, what is semi-sharp, and
+    /// the boundary. Those of a refined mesh are on its own edges. O(N).
+    pub fn tags(&self) -> Tags {
+        let boundary = self.boundary();
+        let Some(features) = self.features() else { return Tags { boundary, ..Tags::default() } };
+        let (faces, topology) = (self.faces(), self.topology());
+        let ends = |c: u32| [c, topology.incidence.next(faces, c)].map(|c| faces.corners()[c as usize]);
+        let sharp = features.sharp_half_edges().iter().filter(|&&c| topology.twin(c).is_some()).map(|&c| (c, SHARP));
+        let creases = sharp.chain(features.semi_sharp_edges().iter().copied()).map(|(c, s)| (ends(c), s)).collect();
+        let resting = features.with_rule(Rule::Corner).into_iter().map(|v| (v as u32, SHARP));
+        let corners = resting.chain(features.semi_sharp_vertices().iter().copied()).collect();
+        Tags { boundary, creases, corners }
     }
 
     /// The same faces with other points.

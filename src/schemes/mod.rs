@@ -48,7 +48,7 @@ mod ring;
 mod scheme;
 mod sharp;
 pub mod sqrt3;
-mod star;
+pub(crate) mod star;
 pub(crate) mod thirds;
 pub mod unified_sqrt3;
 mod zheng_cai;

@@ -50,6 +50,7 @@ fn hold_against_tags(coarse: &Surface, fine: &Surface) {
         return;
     };
     assert_eq!(fine.boundary(), coarse.boundary());
+    assert!(fine.tagged(&fine.tags()).unwrap().features() == fine.features());
     let topology = coarse.topology();
     let numbers: BTreeMap<u32, u32> = topology.edge_sides().zip(coarse.len() as u32..).collect();
     let corners = coarse.faces().corners();

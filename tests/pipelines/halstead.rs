@@ -1,16 +1,23 @@
-//! Fair interpolation: constraints, minimality, affine maps, singular meshes, errors per iteration.
+//! Fair interpolation of closed, open and creased meshes: constraints, minimality, energies in closed form and by
+//! differences, affine maps, singular meshes, errors per iteration.
+
+use std::collections::BTreeSet;
 
 use glam::DVec3;
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::halstead::{Fairness, LEVELS, Weights, fit, follow};
 use limitlab::interpolate::zheng_cai::Constraints;
-use limitlab::mesh::{Surface, builtin};
+use limitlab::interpolate::{Options, interpolate};
+use limitlab::mesh::features::{Rule, Tags};
+use limitlab::mesh::validate::Boundary;
+use limitlab::mesh::{Faces, Mesh, Surface, builtin};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
-use limitlab::solvers::{Method, Outcome, Stop, run};
+use limitlab::solvers::{Method, Outcome, Stop};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::common::pipelines::{distance, noisy, noisy_surface};
+use crate::open::{grid, open, random_creased};
 
 /// All points, nothing else.
 const ALL: Constraints = Constraints { interpolated: None, normals: None, handles: None };
@@ -28,10 +35,41 @@ fn limits_and_normals(surface: &Surface, originals: usize) -> (Vec<DVec3>, Vec<D
 
 const MESHES: [&str; 4] = ["torus:4x5", "icosahedron", "irregular-poly:30", "cube"];
 
+fn rule(surface: &Surface, v: usize) -> Rule {
+    surface.features().map_or(Rule::Smooth, |features| features.rules()[v])
+}
+
+fn creased(surface: &Surface, walk: &[u32]) -> Surface {
+    let creases = walk.windows(2).map(|side| ([side[0], side[1]], 10.0)).collect();
+    surface.tagged(&Tags { boundary: surface.boundary(), creases, corners: Vec::new() }).unwrap()
+}
+
+/// The closed ones; a grid with corners, and with one-face vertices on its curve; creases around a tube, around a face, and
+/// from a boundary to itself.
+fn surfaces() -> Vec<(String, Surface)> {
+    let closed = MESHES.map(|name| (name.to_owned(), noisy_surface(name)));
+    let torus = noisy_surface("torus:4x5");
+    let [kept, smooth] = [Boundary::EdgeAndCorner, Boundary::EdgeOnly].map(|rule| open(grid(4, 5, false), rule));
+    let sharp = [
+        ("tube", creased(&torus, &[0, 1, 2, 3, 4, 0])),
+        ("face", creased(&noisy_surface("cube"), &[4, 5, 7, 6, 4])),
+        ("halves", creased(&kept, &[5, 6, 7, 8, 9])),
+        ("grid", kept),
+        ("edge-only", smooth),
+    ];
+    closed.into_iter().chain(sharp.map(|(name, surface)| (name.to_owned(), surface))).collect()
+}
+
+/// As [`surfaces`], and random ones.
+fn many_surfaces() -> Vec<(String, Surface)> {
+    let random =
+        (0..16).filter_map(|seed| Some((format!("seed {seed}"), random_creased(Scheme::CatmullClark, seed)?.0)));
+    surfaces().into_iter().chain(random).collect()
+}
+
 #[test]
 fn the_fit_meets_points_and_normals() {
-    for name in MESHES {
-        let surface = noisy_surface(name);
+    for (name, surface) in surfaces() {
         let fairness = Fairness::new(&surface).unwrap();
         let plain = fit(&fairness, surface.positions(), &ALL, Weights::default()).unwrap();
         let (limits, before) = limits_and_normals(&plain.surface, surface.len());
@@ -39,7 +77,10 @@ fn the_fit_meets_points_and_normals() {
         let wanted: Vec<Option<DVec3>> = before
             .iter()
             .enumerate()
-            .map(|(v, n)| (v % 2 == 0).then(|| *n + 0.3 * DVec3::new((v as f64).sin(), 0.5, (v as f64).cos())))
+            .map(|(v, n)| {
+                (v % 2 == 0 && rule(&surface, v) == Rule::Smooth)
+                    .then(|| *n + 0.3 * DVec3::new((v as f64).sin(), 0.5, (v as f64).cos()))
+            })
             .collect();
         let wishes = Constraints { normals: Some(&wanted), ..ALL };
         let with = fit(&fairness, surface.positions(), &wishes, Weights::default()).unwrap();
@@ -54,15 +95,16 @@ fn the_fit_meets_points_and_normals() {
     }
 }
 
-/// The energies by differences of limit points on a fine grid, over the same part of the surface: all but the
-/// quarters beside extraordinary vertices.
+/// The energies by differences of limit points at the corners of small quads, over the same part of the surface: all but
+/// the quarters beside extraordinary vertices. Nothing is taken from beyond a boundary or crease.
 #[test]
 fn energies_are_those_of_second_differences() {
     const DEEPER: usize = 4;
     // In units of the quads of the first refinement.
     let h = 0.5f64.powi((LEVELS + DEEPER) as i32 - 1);
-    for name in ["cube", "tetrahedron", "bipyramid:5"] {
-        let surface = noisy_surface(name);
+    let small = ["cube", "tetrahedron", "bipyramid:5"].map(|name| (name.to_owned(), noisy_surface(name)));
+    let sharp = many_surfaces().into_iter().filter(|(_, surface)| surface.features().is_some());
+    for (name, surface) in sharp.chain(small) {
         let fairness = Fairness::new(&surface).unwrap();
         let mut fine = fairness.fine.clone();
         let mut counted = vec![true; fine.faces().len()];
@@ -71,32 +113,39 @@ fn energies_are_those_of_second_differences() {
             counted = counted.iter().flat_map(|&c| [c; 4]).collect();
             fine = Refinement::CatmullClark.refined(&fine).unwrap();
             if level == 0 {
-                for (counted, face) in counted.iter_mut().zip(fine.faces().iter()) {
-                    *counted = face.iter().all(|&v| fine.incidence().face_count(v as usize) == 4);
+                let around = Around::new(&fine);
+                for (f, counted) in counted.iter_mut().enumerate() {
+                    *counted = fine.faces().range(f).all(|c| around.is_regular(c as u32));
                 }
             }
         }
         let limits = catmull_clark::limit_positions(&fine).unwrap();
-        let corners = fine.faces().corners();
-        let at = |c: u32| limits[corners[c as usize] as usize];
-        let mut star = Vec::new();
+        let around = Around::new(&fine);
+        let at = |c: u32| limits[fine.faces().corners()[c as usize] as usize];
+        let incidence = fine.incidence();
+        let next = |c: u32| incidence.next(fine.faces(), c);
+        let prev = |c: u32| incidence.prev(fine.faces(), c);
         let (mut thin_plate, mut membrane) = (0.0, 0.0);
-        for (v, &here) in limits.iter().enumerate() {
-            fine.topology().star(fine.faces(), v, &mut star);
-            // Each face around it gives a quarter of its area.
-            let faces = star.iter().filter(|&&c| counted[fine.incidence().face_of(c)]).count();
-            if faces == 0 {
-                continue;
+        for f in (0..fine.faces().len()).filter(|&f| counted[f]) {
+            let first = fine.faces().range(f).start as u32;
+            let [a, b, c, d] = [0, 1, 2, 3].map(|k| at(first + k));
+            let [u, v, uv] = [(b - a + c - d) / 2.0, (d - a + c - b) / 2.0, a - b + c - d];
+            // Along each direction of the quad, at those of its corners where the surface goes on.
+            let mut second = [(DVec3::ZERO, 0.0); 2];
+            for k in 0..4 {
+                let c = first + k as u32;
+                let back = around.counter_clockwise(c).map(|c| at(prev(c)) + at(next(first + k as u32)));
+                let ahead = around.clockwise(c).map(|c| at(next(c)) + at(prev(first + k as u32)));
+                for (direction, ends) in [(k % 2, back), ((k + 1) % 2, ahead)] {
+                    if let Some(ends) = ends {
+                        second[direction].0 += ends - 2.0 * at(c);
+                        second[direction].1 += 1.0;
+                    }
+                }
             }
-            assert_eq!(star.len(), 4);
-            let next = |c: u32| fine.incidence().next(fine.faces(), c);
-            let [e, n, w, s] = [0, 1, 2, 3].map(|k| at(next(star[k])));
-            let [ne, nw, sw, se] = [0, 1, 2, 3].map(|k| at(next(next(star[k]))));
-            let [uu, vv, uv] = [e - 2.0 * here + w, n - 2.0 * here + s, (ne - nw + sw - se) / 4.0];
-            let [u, v] = [(e - w) / 2.0, (n - s) / 2.0];
-            let area = 0.25 * faces as f64 * h * h;
-            thin_plate += area * (uu.length_squared() + 2.0 * uv.length_squared() + vv.length_squared()) / h.powi(4);
-            membrane += area * (u.length_squared() + v.length_squared()) / (h * h);
+            let [uu, vv] = second.map(|(sum, count)| sum / count);
+            thin_plate += (uu.length_squared() + 2.0 * uv.length_squared() + vv.length_squared()) / (h * h);
+            membrane += u.length_squared() + v.length_squared();
         }
         let found = fairness.energies_of(&surface).unwrap();
         assert!((found.thin_plate / thin_plate - 1.0).abs() < 0.01, "{name}: {} {thin_plate}", found.thin_plate);
@@ -104,17 +153,98 @@ fn energies_are_those_of_second_differences() {
     }
 }
 
+/// The corners about a vertex as far as no sharp edge lies between them.
+struct Around<'a> {
+    surface: &'a Surface,
+    sharp: BTreeSet<u32>,
+}
+
+impl<'a> Around<'a> {
+    fn new(surface: &'a Surface) -> Self {
+        let firsts = surface.features().map_or(&[][..], |features| features.sharp_half_edges());
+        let sides = firsts.iter().flat_map(|&c| [Some(c), surface.topology().twin(c)]);
+        Around { surface, sharp: sides.flatten().collect() }
+    }
+
+    fn clockwise(&self, c: u32) -> Option<u32> {
+        self.surface.topology().clockwise(self.surface.faces(), c).filter(|_| !self.sharp.contains(&c))
+    }
+
+    fn counter_clockwise(&self, c: u32) -> Option<u32> {
+        let other = self.surface.topology().counter_clockwise(self.surface.faces(), c)?;
+        (!self.sharp.contains(&self.surface.incidence().prev(self.surface.faces(), c))).then_some(other)
+    }
+
+    /// Whether four faces meet smoothly, two along a curve, or one at a corner.
+    fn is_regular(&self, c: u32) -> bool {
+        let mut faces = 1;
+        let mut last = c;
+        while let Some(other) = self.counter_clockwise(last).filter(|&other| other != c) {
+            (last, faces) = (other, faces + 1);
+        }
+        if self.counter_clockwise(last).is_none() {
+            let mut last = c;
+            while let Some(other) = self.clockwise(last) {
+                (last, faces) = (other, faces + 1);
+            }
+        }
+        let regular = match rule(self.surface, self.surface.faces().corners()[c as usize] as usize) {
+            Rule::Smooth => 4,
+            Rule::Crease => 2,
+            Rule::Corner => 1,
+            Rule::Dart | Rule::SemiSharp => unreachable!("they are refused"),
+        };
+        faces == regular
+    }
+}
+
+/// Splines on a grid of 3 × 2 quads, with its parameters u = 2x and v = 2y, whose energies are known.
+#[test]
+fn splines_with_natural_ends_have_their_energies_in_closed_form() {
+    let mut mesh = grid(4, 3, false);
+    mesh.positions.iter_mut().for_each(|p| p.z = 0.0);
+    let flat = open(mesh, Boundary::EdgeAndCorner);
+    // From boundary to boundary along x = 1.
+    for (surface, is_creased) in [(flat.clone(), false), (creased(&flat, &[3, 4, 5]), true)] {
+        let fairness = Fairness::new(&surface).unwrap();
+        let energies = |height: &dyn Fn(f64, f64) -> f64| {
+            let points = fairness.fine.positions().iter().map(|p| DVec3::Z * height(p.x, p.y));
+            let found = fairness.energies(&points.collect::<Vec<_>>());
+            [found.thin_plate, found.membrane]
+        };
+        let near = |found: [f64; 2], expected: [f64; 2]| {
+            let close = found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12);
+            assert!(close, "{found:?} for {expected:?}, creased: {is_creased}");
+        };
+        near(energies(&|_, _| 1.0), [0.0, 0.0]);
+        near(energies(&|x, _| x), [0.0, 6.0]);
+        // uv/4, on [0, 6] × [0, 4].
+        near(energies(&|x, y| x * y), [2.0 * 24.0 / 16.0, (6.0 * 64.0 + 4.0 * 216.0) / 3.0 / 16.0]);
+        // Bent at the knots u = 2 and u = 4: S_uu is 1 there, 0 at all others, and linear between. On the curve there is no
+        // bend, each side being flat.
+        let bent = |at: f64| energies(&|x, _| (x - at).max(0.0))[0];
+        assert!((bent(2.0) - 4.0 / 3.0).abs() < 1e-12, "{}", bent(2.0));
+        assert!((bent(1.0) - if is_creased { 0.0 } else { 4.0 / 3.0 }).abs() < 1e-12, "{}", bent(1.0));
+        // What is flat stays so.
+        let tilted = |p: &DVec3| DVec3::new(p.x, p.y, 0.3 * p.x - 0.7 * p.y + 1.0);
+        let points: Vec<DVec3> = surface.positions().iter().map(tilted).collect();
+        let fair = fit(&fairness, &points, &ALL, Weights::default()).unwrap();
+        assert!(fair.surface.positions().iter().all(|p| (p.z - tilted(p).z).abs() < SOLVED));
+        assert!(fairness.energies_of(&surface.with_positions(points)).unwrap().thin_plate.abs() < 1e-12);
+    }
+}
+
 /// xᵀKx is least among all x that meet the points: the derivative along every direction in the null space of the
 /// limit masks vanishes, and the interpolating control mesh of the given faces, where there is one, costs more.
 #[test]
 fn the_fit_is_the_fairest() {
-    for (name, weights) in MESHES.iter().zip([
+    let weights = [
         Weights::default(),
         Weights { thin_plate: 1.0, membrane: 0.01 },
         Weights { thin_plate: 0.0, membrane: 1.0 },
         Weights::default(),
-    ]) {
-        let surface = noisy_surface(name);
+    ];
+    for ((name, surface), weights) in many_surfaces().into_iter().zip(weights.into_iter().cycle()) {
         let fairness = Fairness::new(&surface).unwrap();
         let best = fit(&fairness, surface.positions(), &ALL, weights).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(11);
@@ -123,11 +253,17 @@ fn the_fit_is_the_fairest() {
             for p in step.positions_mut() {
                 *p = DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
             }
-            // The own weight n/(n+5) takes the limit of each original vertex to zero; rings are disjoint.
+            // The own weight takes the limit of each original vertex to zero; rings are disjoint.
             let limits = catmull_clark::limit_positions(&step).unwrap();
             for (v, limit) in limits[..surface.len()].iter().enumerate() {
                 let n = step.incidence().face_count(v) as f64;
-                step.positions_mut()[v] -= (n + 5.0) / n * *limit;
+                let own = match rule(&surface, v) {
+                    Rule::Smooth => n / (n + 5.0),
+                    Rule::Crease => 2.0 / 3.0,
+                    Rule::Corner => 1.0,
+                    Rule::Dart | Rule::SemiSharp => unreachable!("they are refused"),
+                };
+                step.positions_mut()[v] -= *limit / own;
             }
             let gradient = |k: &limitlab::assemble::Csr| -> f64 {
                 (0..step.len()).map(|i| step.positions()[i].dot(k.row_times(i, best.surface.positions()))).sum()
@@ -137,14 +273,13 @@ fn the_fit_is_the_fairest() {
             let scale = best.energies.weighted(weights) + fairness.energies(step.positions()).weighted(weights);
             assert!(slope.abs() < SOLVED * scale, "{name} {slope:e} {scale:e}");
         }
-        let system = LimitSystem::new(&surface, Scheme::CatmullClark).unwrap();
-        let solution = run(&system, surface.positions(), Method::Lu, &Stop { tolerance: 1e-12, max_iterations: 10 });
+        let solution = interpolate(&surface, Scheme::CatmullClark, &Options::default()).unwrap();
         if solution.report.outcome == Outcome::Converged {
             let control = surface.with_positions(solution.points);
             let other = fairness.energies_of(&control).unwrap();
             assert!(best.energies.weighted(weights) <= other.weighted(weights), "{name}");
         } else {
-            assert_eq!(*name, "cube");
+            assert_eq!(name, "cube");
         }
     }
 }
@@ -189,12 +324,30 @@ fn weights_and_normals_without_sense_are_errors() {
     assert!(text.contains("no vertex"), "{text}");
 }
 
+/// Vertices without a patch or a mask are refused by name, and so are normals where the surface has none.
+#[test]
+fn what_has_no_energy_is_refused_by_name() {
+    let refused = |surface: &Surface| Fairness::new(surface).unwrap_err().to_string();
+    let flat = open(grid(4, 5, false), Boundary::EdgeAndCorner);
+    assert!(refused(&creased(&flat, &[5, 6, 7])).starts_with("vertex 7 is a dart"));
+    let semi_sharp = Tags { boundary: flat.boundary(), creases: vec![([6, 7], 1.5)], corners: Vec::new() };
+    assert!(refused(&flat.tagged(&semi_sharp).unwrap()).starts_with("vertex 6 is semi-sharp"));
+    let torus = builtin::builtin("torus:4x5").unwrap();
+    let pierced = Mesh::new(torus.positions, Faces::from_lists(torus.faces.iter().skip(1)));
+    assert!(refused(&open(pierced, Boundary::AsInterior)).contains("close the holes"));
+    let fairness = Fairness::new(&flat).unwrap();
+    let mut normals = vec![None; flat.len()];
+    (normals[4], normals[6]) = (Some(DVec3::Z), Some(DVec3::Z));
+    let wishes = Constraints { normals: Some(&normals), ..ALL };
+    let error = fit(&fairness, flat.positions(), &wishes, Weights::default()).unwrap_err();
+    assert!(error.to_string().contains("vertex 4 is sharp"), "{error}");
+}
+
 /// With fewer points the surface is fairer, still meets those, and is determined: at an optimum the energy's gradient
 /// is a combination of the constraints, so no admissible direction lowers it.
 #[test]
 fn a_subset_is_met_by_a_fairer_surface() {
-    for name in MESHES {
-        let surface = noisy_surface(name);
+    for (name, surface) in surfaces() {
         let fairness = Fairness::new(&surface).unwrap();
         let weights = Weights::default();
         let all = fit(&fairness, surface.positions(), &ALL, weights).unwrap();

@@ -177,10 +177,53 @@ fn surfaces_of_open_triangle_meshes_pass_through_their_points() {
     assert!(line.contains("vertex 23 is a dart") && line.contains("make it a corner"), "{line}");
     let more = ["--method", "butterfly", "--creases", "row.txt", "--subdivide", "2"];
     assert_done(&run_on(INTERPOLATE, folder.path(), "dome.obj", &more), "dart");
-    // The fairest surface: by name, before the work.
-    let more = ["--method", "halstead"];
+    let more = ["--method", "halstead", "--creases", "row.txt"];
     let line = assert_refused(&run_on(INTERPOLATE, folder.path(), "dome.obj", &more), "halstead");
-    assert!(line.contains("natural boundaries"), "{line}");
+    assert!(line.contains("vertex 23 is a dart") && line.contains("make it a corner"), "{line}");
+}
+
+/// The fairest surface passes through the points of open and creased meshes, and its control mesh, two refinements down, goes
+/// with its own sharp edges and corners.
+#[test]
+fn the_fairest_surfaces_of_sharp_meshes_and_their_control_meshes() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("dome.obj"), dome()).unwrap();
+    let across: String = (0..6).map(|j| format!("{} {} 10\n", 21 + j, 22 + j)).collect();
+    let around: String = (0..8).map(|k| format!("{k} {} 10\n", (k + 1) % 8)).collect();
+    for (mesh, creases) in [("dome.obj", ""), ("dome.obj", &across[..]), ("torus:5x8", &around)] {
+        fs::write(folder.path().join("creases.txt"), creases).unwrap();
+        let tags = if creases.is_empty() { &[][..] } else { &["--creases", "creases.txt", "--corners", "corner.txt"] };
+        fs::write(folder.path().join("corner.txt"), "3 10\n").unwrap();
+        let given = match io::read(&folder.path().join(mesh)) {
+            Ok(loaded) => loaded.mesh,
+            Err(_) => limitlab::mesh::builtin::builtin(mesh).unwrap(),
+        };
+        let reaches = |points: &[glam::DVec3], what: &str| {
+            for (v, (a, b)) in points.iter().zip(&given.positions).enumerate() {
+                assert!(a.distance(*b) < 1e-9, "{mesh}, {what}, vertex {v}: {a} {b}");
+            }
+        };
+        let fairest = |output: &str, more: &[&str]| {
+            let flags = [&[mesh, "-o", output, "--method", "halstead"][..], tags, more].concat();
+            assert_done(&run(INTERPOLATE, folder.path(), &flags), mesh);
+            io::read(&folder.path().join(output)).unwrap()
+        };
+        reaches(&fairest("surface.obj", &["--subdivide", "3", "--limit"]).mesh.positions, "surface");
+        for cage in ["cage.usda", "cage.obj"] {
+            let control = fairest(cage, &[]);
+            assert_eq!(control.tags.creases.len(), 4 * creases.lines().count());
+            // What the file says is all that a reader knows.
+            let tags = control.tags;
+            let tags = limitlab::mesh::features::Tags {
+                boundary: tags.boundary.unwrap_or(Boundary::EdgeOnly),
+                creases: tags.creases.iter().map(|c| (c.ends, c.sharpness)).collect(),
+                corners: tags.corners.iter().map(|c| (c.vertex, c.sharpness)).collect(),
+            };
+            let surface = limitlab::mesh::Surface::examined(control.mesh, None, Boundary::EdgeOnly).unwrap();
+            let limits = limitlab::schemes::catmull_clark::limit_positions(&surface.tagged(&tags).unwrap()).unwrap();
+            reaches(&limits, cage);
+        }
+    }
 }
 
 #[test]

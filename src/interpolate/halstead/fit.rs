@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::energy::{Energies, Fairness, Weights};
+use super::energy::{Energies, Fairness, Row, SharpMasks, Weights};
 use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
 use crate::error::short;
@@ -43,7 +43,8 @@ const CHUNK: usize = 4096;
 
 /// Minimises xᵀKx, K the weighted forms of `fairness`, over the fine control points x, under the limit masks' equations
 /// at the interpolated vertices (all unless told), ℓ_v·x = P_v, and where a normal n is given under the tangent masks'
-/// (τ·x)·n = 0 for both tangents. The other vertices go where the surface is fairest.
+/// (τ·x)·n = 0 for both tangents. The other vertices go where the surface is fairest. On curves ℓ_v is ⅙(1, 4, 1), at
+/// corners 1.
 ///
 /// Solved by the Karush-Kuhn-Tucker system [K Cᵀ; C 0], symmetric and indefinite: with points alone one system of n + N
 /// unknowns for all three coordinates; with normals, which couple them, one of 3n + 3N + 2·(normals). A positive membrane
@@ -53,8 +54,8 @@ const CHUNK: usize = 4096;
 ///
 /// # Errors
 /// Weights that are negative, not finite, or without a membrane part; a component without an interpolated vertex, which
-/// could be anywhere; a normal without direction, or at a vertex that is not interpolated; shape handles, which scale
-/// faces of Doo-Sabin surfaces; a factorization that breaks down or misses the constraints.
+/// could be anywhere; a normal without direction, or at a vertex that is sharp or not interpolated; shape handles, which
+/// scale faces of Doo-Sabin surfaces; a factorization that breaks down or misses the constraints.
 ///
 /// # Panics
 /// If there is not one point, and one entry in each list of `wishes`, for each original vertex of the mesh that
@@ -77,6 +78,7 @@ pub fn fit(fairness: &Fairness, points: &[DVec3], wishes: &Constraints, weights:
             schemes: &["zheng-cai", "nasri"],
         });
     }
+    wishes.check_smooth(&fairness.fine)?;
     require_anchors(fairness, wishes, points.len())?;
     let normals = wishes.normals.map(unit_normals).transpose()?;
     let normals = normals.filter(|n| n.iter().any(Option::is_some));
@@ -128,21 +130,25 @@ fn require_anchors(fairness: &Fairness, wishes: &Constraints, originals: usize) 
     }
 }
 
-type Row = Vec<(u32, f64)>;
-
 /// The masks of the original vertices as rows over the fine control points.
 struct Rings {
     limits: Vec<Row>,
-    /// Cosine and sine.
+    /// Cosine and sine; none of sharp vertices.
     tangents: Vec<[Row; 2]>,
 }
 
 impl Rings {
     fn new(fairness: &Fairness, originals: usize) -> Self {
         let fine = &fairness.fine;
+        let sharp = SharpMasks::new(fine);
         let mut star = Vec::new();
         let mut rings = Rings { limits: Vec::with_capacity(originals), tangents: Vec::with_capacity(originals) };
         for v in 0..originals {
+            if let Some(row) = sharp.of(v, 1.0 / 6.0) {
+                rings.limits.push(row);
+                rings.tangents.push(Default::default());
+                continue;
+            }
             fine.topology().star(fine.faces(), v, &mut star);
             rings.limits.push(limit_row(fine, v, &star));
             rings.tangents.push(tangent_rows(fine, &star));

@@ -125,12 +125,15 @@ fn run(arguments: &Arguments) -> Result<()> {
     }
     let made = &result.made;
     let (normals, levels) = (made.normals.as_deref(), arguments.shape.subdivide);
-    // The surface itself is its faces; refined control meshes have other edges than the tags.
+    // The surface itself is its faces.
     let is_control = !arguments.shape.limit && levels == 0;
     let subdivision = if is_control { subdivision_of(input.scheme) } else { Subdivision::None };
-    // The fairest control mesh is refined too.
-    let has_edges = is_control && made.surface.len() == input.surface.len();
-    let tags = if has_edges { input.file_tags() } else { Cow::Owned(Tags::default()) };
+    // The fairest control mesh is refined, and has other edges than the file.
+    let tags = match (is_control, made.surface.len() == input.surface.len()) {
+        (true, true) => input.file_tags(),
+        (true, false) => Cow::Owned(made.surface.tags()),
+        (false, _) => Cow::Owned(Tags::default()),
+    };
     let write = |mesh: &Mesh, normals: Option<&[DVec3]>| {
         io::write_control(&arguments.output, mesh, normals, subdivision, &tags)
     };
