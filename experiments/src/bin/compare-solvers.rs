@@ -1,20 +1,27 @@
 //! Every method on the same system, start, norm and tolerance: `compare-solvers [MESH|SYSTEM_DIR…]`.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
+use nalgebra::Complex;
 use serde_json::json;
 
 use limitlab::analysis::comparison::{self, MethodRow};
 use limitlab::analysis::complex_spectrum::ComplexSpectrum;
+use limitlab::analysis::dense;
 use limitlab::analysis::spectrum::{Spectra, spectrum};
+use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::mesh::order::Order;
+use limitlab::output::check_target;
 use limitlab::solvers::{Method, System};
 use limitlab::{Error, Result};
 use limitlab_experiments::cli::{
     self, CommonFlags, List, Matrix, MeshFlags, OutputFlags, Problem, Progress, StopFlags,
 };
 use limitlab_experiments::studies::comparison::{self as study, Asked};
+use limitlab_experiments::studies::page::{self, Measured};
 
 /// Runs every method on the same system from the same start V = P, and prints iterations, errors, observed and
 /// predicted rate, and the seconds of set-up and solve apart.
@@ -35,6 +42,10 @@ struct Arguments {
     /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
+    /// Write an interactive page of one mesh or folder to this file too: curves of convergence, an ω sweep, the spectrum, the
+    /// surfaces with the errors of every method; it needs a browser and no network
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
     #[command(flatten)]
     mesh: MeshFlags,
     #[command(flatten)]
@@ -47,6 +58,10 @@ struct Arguments {
 
 fn main() -> ExitCode {
     let mut arguments = Arguments::parse();
+    if let (Some(_), several @ 2..) = (&arguments.html, arguments.meshes.len()) {
+        let what = format!("--html makes a page of one mesh, and {several} are named: run the program once for each");
+        Arguments::command().error(ErrorKind::ArgumentConflict, what).exit();
+    }
     cli::exit(|| {
         arguments.common.apply()?;
         arguments.mesh.or_built_in(&mut arguments.meshes, &["torus:32x32"]);
@@ -59,10 +74,13 @@ fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     }
     arguments.output.prepare()?;
+    if let Some(path) = &arguments.html {
+        check_target(path)?;
+    }
     let mut results = Vec::new();
     for name in &arguments.meshes {
         let problem = arguments.mesh.problem(name, &arguments.stop, arguments.order, &arguments.common)?;
-        let rows = compare(&problem, arguments)?;
+        let Compared { rows, refused, measured } = compare(&problem, arguments)?;
         let about = format!(
             "{}; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:e} ({}).",
             problem.subject.size,
@@ -74,6 +92,10 @@ fn run(arguments: &Arguments) -> Result<()> {
         table.write(&arguments.output.out)?;
         let figure = study::figure(problem.subject.title.clone(), problem.subject.unit, &rows);
         figure.render()?.save(&arguments.output.out.join(format!("{stem}.png")))?;
+        if let (Some(path), Some(measured)) = (&arguments.html, measured) {
+            page::page(&problem, measured, &rows, refused)?.write(path)?;
+            arguments.common.remark(format_args!("interactive page: {}", path.display()));
+        }
         if !arguments.output.json {
             cli::print(&table.to_markdown())?;
         }
@@ -82,8 +104,17 @@ fn run(arguments: &Arguments) -> Result<()> {
     cli::finish(&results, &arguments.output, &arguments.common)
 }
 
-/// The rows, their errors in the units of the files.
-fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<MethodRow<'a>>> {
+/// What comes of one mesh or folder.
+struct Compared<'a> {
+    /// Their errors in the units of the files.
+    rows: Vec<MethodRow<'a>>,
+    /// Which methods were left out, and why.
+    refused: Option<String>,
+    /// For the page, if one was asked for.
+    measured: Option<Measured>,
+}
+
+fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Compared<'a>> {
     let asked = match &arguments.method {
         Some(list) => list.0.clone(),
         None => Method::ALL.into_iter().map(Asked::Method).chain([Asked::Auto]).collect(),
@@ -91,9 +122,16 @@ fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<Method
     let method = |asked: &Asked| if let Asked::Method(method) = *asked { Some(method) } else { None };
     let methods: Vec<Method> = asked.iter().filter_map(method).collect();
     let auto = asked.contains(&Asked::Auto);
-    let progress = |lines| Progress::new(&problem.subject.name, lines + usize::from(auto), arguments.common.quiet);
-    let (progress, mut rows) = match problem.matrix() {
-        Matrix::Symmetric(system) => by_methods(problem, system, &spectrum(system)?, &methods, arguments, progress)?,
+    let mut refused = None;
+    let (mut rows, measured) = match problem.matrix() {
+        Matrix::Symmetric(system) => {
+            let eigenvalues = |_: &_| {
+                let all = (system.len() <= dense::LARGEST).then(|| dense::eigenvalues(system)).transpose()?;
+                let complex = |all: Vec<f64>| all.into_iter().map(Complex::from).collect();
+                Ok(all.map(|all| [complex(all.a), complex(all.jacobi)]))
+            };
+            by_methods(problem, system, &spectrum(system)?, eigenvalues, (&methods, auto), arguments)?
+        }
         Matrix::General(system, vertex) => {
             let (left_out, methods): (Vec<_>, Vec<_>) = methods.into_iter().partition(|method| method.needs_symmetry());
             if let (Some(refused), true) = (left_out.first(), methods.is_empty() && !auto) {
@@ -101,39 +139,51 @@ fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Vec<Method
             }
             if !left_out.is_empty() {
                 let names: Vec<&str> = left_out.iter().map(|method| method.name()).collect();
-                arguments.common.remark(format_args!(
-                    "{}: vertex {vertex} is a dart or semi-sharp, and no diagonal makes the matrix symmetric: left out {}",
-                    problem.subject.name,
+                let what = format!(
+                    "vertex {vertex} is a dart or semi-sharp, and no diagonal makes the matrix symmetric: left out {}",
                     names.join(", ")
-                ));
+                );
+                arguments.common.remark(format_args!("{}: {what}", problem.subject.name));
+                refused = Some(what);
             }
-            let spectrum = ComplexSpectrum::new(system)?;
-            by_methods(problem, system, &spectrum, &methods, arguments, progress)?
+            let eigenvalues = |spectrum: &ComplexSpectrum| {
+                let of = |form| spectrum.eigenvalues(form).map(<[_]>::to_vec);
+                Ok(of(SymmetricForm::A).zip(of(SymmetricForm::Jacobi)).map(<[_; 2]>::from))
+            };
+            by_methods(problem, system, &ComplexSpectrum::new(system)?, eigenvalues, (&methods, auto), arguments)?
         }
     };
-    if auto {
-        rows.push(study::auto_row(problem.auto()?));
-        progress.step();
-    }
     for errors in rows.iter_mut().flat_map(|row| &mut row.solution.report.history) {
         *errors = *errors * problem.scale;
     }
-    Ok(rows)
+    Ok(Compared { rows, refused, measured })
 }
 
-/// The rows of methods by name, and the progress with one step left for `auto`.
-fn by_methods<'a>(
+/// The rows of methods by name, and of `auto` if it is asked for; what the page needs beside them, with all `eigenvalues` of A
+/// and of D⁻¹A where there are not too many.
+fn by_methods<'a, S: System, K: Spectra + Clone + Sync>(
     problem: &'a Problem,
-    system: &impl System,
-    spectra: &(impl Spectra + Clone),
-    methods: &[Method<'a>],
+    system: &S,
+    spectra: &K,
+    eigenvalues: impl FnOnce(&K) -> Result<Option<[Vec<Complex<f64>>; 2]>>,
+    (methods, auto): (&[Method<'a>], bool),
     arguments: &Arguments,
-    progress: impl FnOnce(usize) -> Progress,
-) -> Result<(Progress, Vec<MethodRow<'a>>)> {
+) -> Result<(Vec<MethodRow<'a>>, Option<Measured>)> {
     let order_name = arguments.order.to_string();
     let lines = comparison::entries(system, spectra, methods, Some(&problem.order), &order_name)?;
-    let progress = progress(lines.len());
-    let done = &mut || progress.step();
-    let rows = comparison::compare_entries(system, spectra, problem.data(), &lines, &problem.stop, done)?;
-    Ok((progress, rows))
+    let progress = |steps| Progress::new(&problem.subject.name, steps, arguments.common.quiet);
+    let of_rows = progress(lines.len() + usize::from(auto));
+    let done = &mut || of_rows.step();
+    let mut rows = comparison::compare_entries(system, spectra, problem.data(), &lines, &problem.stop, done)?;
+    if auto {
+        rows.push(study::auto_row(problem.auto()?));
+        of_rows.step();
+    }
+    drop(of_rows);
+    if arguments.html.is_none() {
+        return Ok((rows, None));
+    }
+    let of_page = progress(page::steps(&rows));
+    let measured = page::measure(problem, system, spectra, eigenvalues(spectra)?, &rows, &|| of_page.step())?;
+    Ok((rows, Some(measured)))
 }

@@ -136,6 +136,16 @@ impl Problem {
         }
     }
 
+    /// The mesh that the system is of, in units of [`scale`](Self::scale), its scheme, and the vertex of each row; `None` if
+    /// the k-th row is that of vertex k.
+    pub fn mesh(&self) -> Option<(&Surface, Scheme, Option<&[u32]>)> {
+        match &self.source {
+            Source::Mesh(surface, scheme, stages) => Some((surface, *scheme, stages.vertices())),
+            Source::Unsymmetric(surface, scheme, ..) => Some((surface, *scheme, None)),
+            Source::Folder(_) => None,
+        }
+    }
+
     /// The right-hand side, and the start of iterations.
     pub fn data(&self) -> (&[DVec3], &[DVec3]) {
         (&self.points, &self.start)

@@ -13,6 +13,7 @@
 //! - [`sparsity`]: the pattern of a sparse matrix;
 //! - [`render`]: pictures of meshes, points and vectors;
 //! - [`png`]: images and their files;
+//! - [`page`]: one HTML file with interactive plots and a view of surfaces;
 //! - [`index`]: the page that lists what a folder of reports holds.
 
 mod axis;
@@ -23,6 +24,7 @@ pub mod figure;
 mod frame;
 pub mod index;
 mod number;
+pub mod page;
 pub mod plot;
 pub mod png;
 pub mod render;

@@ -72,21 +72,25 @@ fn columns<'r>() -> Columns<'static, MethodRow<'r>> {
         .col(Column::time("seconds_solve"), |r| r.solution.solve_seconds)
 }
 
+/// Whether a row's errors have a place over iterations: those of direct methods and histories by corrections have none.
+pub(super) fn is_over_iterations(row: &MethodRow) -> bool {
+    !row.method.is_direct() && row.solution.report.history.len() == row.solution.report.iterations + 1
+}
+
+/// The method with its parameter.
+pub(super) fn label(row: &MethodRow) -> String {
+    match row.parameter.as_str() {
+        "" => row.method.to_string(),
+        parameter => format!("{} ({parameter})", row.method),
+    }
+}
+
 /// The maximum errors over the iterations, a line for each method that iterates; `unit` is what errors are measured in.
 pub fn figure(title: String, unit: &str, rows: &[MethodRow]) -> Figure {
     let series = rows
         .iter()
-        // A history by corrections has no place over iterations.
-        .filter(|row| {
-            !row.method.is_direct() && row.solution.report.history.len() == row.solution.report.iterations + 1
-        })
-        .map(|row| {
-            let name = match row.parameter.as_str() {
-                "" => row.method.to_string(),
-                parameter => format!("{} ({parameter})", row.method),
-            };
-            Series::history(name, row.solution.report.history.iter().map(|e| e.max))
-        })
+        .filter(|row| is_over_iterations(row))
+        .map(|row| Series::history(label(row), row.solution.report.history.iter().map(|e| e.max)))
         .collect();
     Figure::new(LinePlot {
         title,

@@ -2,5 +2,6 @@
 
 pub mod comparison;
 pub mod complex_spectrum;
+pub mod page;
 pub mod splitting;
 pub mod sweep;

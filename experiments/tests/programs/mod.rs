@@ -4,6 +4,7 @@ mod bad_input;
 mod contract;
 mod darts;
 mod metadata;
+mod page;
 #[cfg(target_os = "linux")]
 mod process;
 mod results;

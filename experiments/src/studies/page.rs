@@ -1,0 +1,308 @@
+//! The interactive page of a comparison of methods on one system: their errors, iterate by iterate and vertex by vertex, an ω
+//! sweep, the spectra, and the surfaces.
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+use nalgebra::Complex;
+
+use super::comparison::{is_over_iterations, json, label};
+use super::sweep::default_grid;
+use crate::cli::Problem;
+use crate::report::page::{Curve, Eigenvalues, Frames, Packed, Page, Place, Run, Solid, Sweep, Thinned, View};
+use crate::report::readable;
+use limitlab::Result;
+use limitlab::analysis::comparison::MethodRow;
+use limitlab::analysis::custom_methods::Named;
+use limitlab::analysis::dense;
+use limitlab::analysis::spectrum::{Extremes, Spectra};
+use limitlab::analysis::sweep::{OmegaSweep, rounding_floor, sweep};
+use limitlab::analysis::symmetric::SymmetricForm;
+use limitlab::interpolate::surface::{SurfaceMesh, SurfaceOptions, surface};
+use limitlab::mesh::{Surface, bounding_box};
+use limitlab::schemes::Scheme;
+use limitlab::solvers::method::SOR_OMEGA;
+use limitlab::solvers::{Method, Outcome, Step, System, run_from};
+
+/// Vertices that are shown at most: a larger mesh is thinned out.
+const MOST_SHOWN: usize = 20_000;
+/// Corners of the limit surface at most, and refinements.
+const MOST_REFINED: usize = 120_000;
+const MOST_LEVELS: usize = 3;
+/// Bytes for the errors at the vertices, of all methods, and iterates of one method at most.
+const FRAME_BYTES: usize = 1_500_000;
+const MOST_FRAMES: usize = 60;
+/// Entries of a history at most.
+const MOST_ENTRIES: usize = 500;
+/// Decades of error that are coloured where the tolerance gives no end.
+const DECADES: f64 = 10.0;
+/// A λ_min below this part of λ_max is zero as far as rounding tells.
+const VANISHING: f64 = 1e-13;
+/// The methods that are swept over ω.
+const SWEPT: [Method<'static>; 3] =
+    [Method::Jacobi { omega: None }, Method::Pia, Method::Sor { omega: SOR_OMEGA, order: None }];
+
+/// What a page has beside the rows of the comparison.
+pub struct Measured {
+    /// One a row.
+    frames: Vec<Option<Frames>>,
+    sweep: OmegaSweep,
+    spectra: Vec<Eigenvalues>,
+    shown: Option<Shown>,
+}
+
+/// The part of a mesh that is shown, and the errors of the first and of the last colour, in mesh units.
+struct Shown {
+    mesh: Thinned,
+    range: [f64; 2],
+}
+
+/// How often [`measure`] says that something is done.
+pub fn steps(rows: &[MethodRow]) -> usize {
+    rows.len() + SWEPT.iter().map(|&method| default_grid(method).len()).sum::<usize>()
+}
+
+/// Sweeps over ω, and runs the methods of `rows` again, now with a watch that writes down the errors at the vertices: the
+/// times of the comparison are without it. `eigenvalues` are those of A and of D⁻¹A, where they were computed; `done` is
+/// called after each run.
+///
+/// # Errors
+/// If an eigenvalue computation does not converge.
+pub fn measure(
+    problem: &Problem,
+    system: &impl System,
+    spectra: &(impl Spectra + Sync),
+    eigenvalues: Option<[Vec<Complex<f64>>; 2]>,
+    rows: &[MethodRow],
+    done: &(dyn Fn() + Sync),
+) -> Result<Measured> {
+    let shown = problem
+        .mesh()
+        .map(|(surface, ..)| Shown { mesh: Thinned::new(surface.mesh(), MOST_SHOWN), range: range(problem, rows) });
+    let lines = rows.iter().filter(|row| is_over_iterations(row)).count();
+    let record = |row: &MethodRow| {
+        let frames = shown.as_ref().and_then(|shown| {
+            let most = FRAME_BYTES / (lines.max(1) * shown.mesh.first.len());
+            frames(problem, system, row, shown, most.clamp(2, MOST_FRAMES))
+        });
+        done();
+        frames
+    };
+    let frames = rows.iter().map(record).collect();
+    let grids = SWEPT.map(|method| (method, default_grid(method)));
+    let floor = rounding_floor(problem.diagonal());
+    let order = Some(&problem.order[..]);
+    let sweep = sweep((system, spectra), problem.data(), &grids, order, &problem.stop, floor, &|_| done())?;
+    let b = system.bounds();
+    let [a, jacobi] = eigenvalues.map_or([None, None], |[a, jacobi]| [Some(a), Some(jacobi)]);
+    let spectra = vec![
+        spectrum("A", spectra.ends(SymmetricForm::A), [b.lambda_min, b.lambda_max], a),
+        spectrum("D⁻¹A", spectra.ends(SymmetricForm::Jacobi), [b.jacobi_lambda_min, b.jacobi_lambda_max], jacobi),
+    ];
+    Ok(Measured { frames, sweep, spectra, shown })
+}
+
+fn spectrum(matrix: &'static str, ends: Extremes, bounds: [f64; 2], all: Option<Vec<Complex<f64>>>) -> Eigenvalues {
+    let packed =
+        |part: fn(&Complex<f64>) -> f64, all: &[Complex<f64>]| Packed::new(all.iter().map(part).map(f64::to_le_bytes));
+    let ends = [ends.min, ends.max];
+    Eigenvalues {
+        matrix,
+        ends,
+        bounds,
+        most: dense::LARGEST,
+        all: all.map(|all| [packed(|z| z.re, &all), packed(|z| z.im, &all)]),
+    }
+}
+
+/// From the tolerance to the largest error of a start.
+fn range(problem: &Problem, rows: &[MethodRow]) -> [f64; 2] {
+    let starts = rows.iter().filter_map(|row| row.solution.report.history.first());
+    let greatest = problem.scale * starts.map(|errors| errors.max).fold(0.0, f64::max);
+    let tolerance = problem.scale * problem.stop.tolerance;
+    match (greatest > 0.0 && greatest.is_finite(), tolerance < 0.1 * greatest) {
+        (true, true) => [tolerance, greatest],
+        (true, false) => [greatest * 10f64.powf(-DECADES), greatest],
+        (false, _) => [10f64.powf(-DECADES), 1.0],
+    }
+}
+
+/// `count` whole numbers from 0 to `last`, evenly, with both ends, or all of them.
+fn spread(last: usize, count: usize) -> Vec<usize> {
+    let parts = last.min(count - 1);
+    (0..=parts).map(|k| if parts == 0 { 0 } else { (k * last + parts / 2) / parts }).collect()
+}
+
+/// Runs the method of a row once more, and keeps the errors at the vertices of some iterates.
+fn frames(problem: &Problem, system: &impl System, row: &MethodRow, shown: &Shown, most: usize) -> Option<Frames> {
+    let Named::Ours(method) = row.method else { return None };
+    let (_, _, vertices) = problem.mesh()?;
+    if !is_over_iterations(row) {
+        return None;
+    }
+    let (points, start) = problem.data();
+    let at = spread(row.solution.report.iterations, most);
+    let [least, greatest] = shown.range.map(f64::ln);
+    let byte = |error: f64| {
+        // What is no number has diverged.
+        let part = (error.min(f64::MAX).ln() - least) / (greatest - least);
+        (255.0 * part).round() as u8 // saturates
+    };
+    let mut errors = Vec::with_capacity(at.len() * shown.mesh.first.len());
+    let watch = &mut |step: &Step| {
+        if at.binary_search(&step.iteration).is_ok() {
+            // Of vertices in one place the greatest.
+            let mut frame = vec![0u8; shown.mesh.first.len()];
+            for (i, &p) in points.iter().enumerate() {
+                let vertex = vertices.map_or(i, |vertices| vertices[i] as usize);
+                let slot = &mut frame[shown.mesh.place[vertex] as usize];
+                *slot = byte(problem.scale * (p - system.row(i, step.points)).length()).max(*slot);
+            }
+            errors.extend(frame);
+        }
+        ControlFlow::Continue(())
+    };
+    run_from(system, points, start, method, &problem.stop, watch);
+    Some(Frames {
+        at: Packed::new(at.iter().map(|&k| (k as u32).to_le_bytes())),
+        errors: Packed::new(errors.into_iter().map(|byte| [byte])),
+    })
+}
+
+/// The page. `rows` are those that were [measured](measure), their errors now in the units of the files; `refused` says which methods were not run.
+///
+/// # Errors
+/// If the control mesh cannot be computed at all.
+pub fn page(problem: &Problem, measured: Measured, rows: &[MethodRow], refused: Option<String>) -> Result<Page> {
+    let subject = &problem.subject;
+    let tolerance = problem.scale * problem.stop.tolerance;
+    let [a, _] = &measured.spectra[..] else { unreachable!("A and D⁻¹A") };
+    let [least, greatest] = a.ends;
+    let condition = match least > VANISHING * greatest {
+        true => format!("condition {:.2}", greatest / least),
+        false => "singular to rounding".into(),
+    };
+    let about = vec![
+        subject.size.clone(),
+        format!(
+            "λ(A) from {} to {}, {condition}; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {tolerance:.1e} ({}).",
+            readable(least, 4),
+            readable(greatest, 4),
+            subject.unit
+        ),
+    ];
+    let curves = rows.iter().zip(measured.frames).filter(|(row, _)| is_over_iterations(row));
+    Ok(Page {
+        title: subject.title.clone(),
+        about,
+        unit: subject.unit,
+        tolerance,
+        curves: curves.map(|(row, frames)| curve(row, frames)).collect(),
+        rows: json(rows),
+        refused,
+        sweep: SWEPT.map(|method| swept(&measured.sweep, method)).into(),
+        spectra: measured.spectra,
+        view: match (problem.mesh(), measured.shown) {
+            (Some((surface, scheme, _)), Some(shown)) => Some(view(problem, surface, scheme, shown)?),
+            _ => None,
+        },
+    })
+}
+
+fn curve(row: &MethodRow, frames: Option<Frames>) -> Curve {
+    let report = &row.solution.report;
+    let at = spread(report.iterations, MOST_ENTRIES);
+    Curve {
+        name: label(row),
+        outcome: report.outcome.name(),
+        iterations: report.iterations,
+        max: Packed::new(at.iter().map(|&k| report.history[k].max.to_le_bytes())),
+        at: Packed::new(at.iter().map(|&k| (k as u32).to_le_bytes())),
+        frames,
+    }
+}
+
+fn swept(sweep: &OmegaSweep, method: Method<'static>) -> Sweep {
+    let thresholds = sweep.thresholds.iter().find(|t| t.method == method);
+    let runs = sweep.rows.iter().filter(|row| row.method == method).map(|row| Run {
+        omega: row.omega,
+        outcome: row.outcome.name(),
+        iterations: row.iterations,
+        predicted: row.predicted_rho,
+        measured: row.observed_rate,
+    });
+    Sweep {
+        method: method.name(),
+        optimal: thresholds.map(|t| t.optimal_omega),
+        critical: thresholds.map(|t| t.critical_omega),
+        runs: runs.collect(),
+    }
+}
+
+/// The given mesh; its control mesh by `auto` and the limit surface of that, as far as there are.
+fn view(problem: &Problem, given: &Surface, scheme: Scheme, shown: Shown) -> Result<View> {
+    let (least, greatest) = bounding_box(given.positions()).unwrap_or_default();
+    let place = Place {
+        middle: 0.5 * (least + greatest),
+        unit: if given.diagonal() > 0.0 { 0.5 * given.diagonal() } else { 1.0 },
+    };
+    let thinned = &shown.mesh;
+    let (left, all) = (thinned.first.len(), given.len());
+    let packed = |points: &[DVec3]| place.packed(thinned.first.iter().map(|&v| points[v as usize]));
+    let mut about = Vec::new();
+    if left < all {
+        about.push(format!(
+            "Thinned out: {left} of {all} vertices, each with the largest error of those that it stands for."
+        ));
+    }
+    let found = problem.auto()?;
+    let solved = found.report.outcome == Outcome::Converged;
+    // A refinement makes four times as many corners, or fewer.
+    let fits = |k: &usize| left == all && given.faces().corners().len() << (2 * k) <= MOST_REFINED;
+    let mut limit = None;
+    match (solved, (1..=MOST_LEVELS).rev().find(fits)) {
+        (false, _) => about.push(format!(
+            "No control mesh was found ({}), so that only the given mesh is shown.",
+            found.report.outcome
+        )),
+        (true, None) => about.push("The limit surface is left out: a mesh as fine as this one looks the same.".into()),
+        (true, Some(levels)) => match refined(given, scheme, found.points.clone(), levels) {
+            Ok(surface) => limit = Some(limit_surface(&surface, given.positions(), place)),
+            Err(error) => about.push(format!("The limit surface is left out: {error}.")),
+        },
+    }
+    Ok(View {
+        about: about.join(" "),
+        range: shown.range,
+        given: Solid::new(packed(given.positions()), &thinned.faces, &thinned.edges(creases(given))),
+        cage: solved.then(|| packed(&found.points)),
+        limit,
+    })
+}
+
+/// The surface of control points after some refinements, at limit points.
+fn refined(given: &Surface, scheme: Scheme, control: Vec<DVec3>, levels: usize) -> Result<Surface> {
+    let request = SurfaceOptions { levels, limit: true, ..SurfaceOptions::default() };
+    let SurfaceMesh { surface, .. } = surface(given.with_positions(control), scheme, given.positions(), &request)?;
+    Ok(surface)
+}
+
+/// A refined surface, each vertex with the nearest of the given ones, O(vertices) of both.
+fn limit_surface(surface: &Surface, given: &[DVec3], place: Place) -> Solid {
+    let nearest = |p: &DVec3| {
+        let distances = given.iter().map(|q| q.distance_squared(*p)).enumerate();
+        distances.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(v, _)| v as u32)
+    };
+    let points = place.packed(surface.positions().iter().copied());
+    let shown_by = Packed::new(surface.positions().iter().map(|p| nearest(p).to_le_bytes()));
+    Solid { shown_by: Some(shown_by), ..Solid::new(points, surface.faces(), &creases(surface)) }
+}
+
+/// The ends of all sharp and semi-sharp edges, boundaries among them.
+fn creases(surface: &Surface) -> Vec<[u32; 2]> {
+    let (faces, incidence) = (surface.faces(), surface.incidence());
+    let ends = |c: u32| [c, incidence.next(faces, c)].map(|c| faces.corners()[c as usize]);
+    let Some(features) = surface.features() else { return Vec::new() };
+    let semi_sharp = features.semi_sharp_edges().iter().map(|&(c, _)| c);
+    features.sharp_half_edges().iter().copied().chain(semi_sharp).map(ends).collect()
+}
