@@ -20,6 +20,7 @@ const browser = await chromium.launch({
 /** The page of a file, in a window; what it says on its console and asks for elsewhere goes to `faults`. */
 async function open(file, options, faults) {
   const page = await browser.newPage(options);
+  page.setDefaultTimeout(120_000);
   const address = pathToFileURL(path.resolve(file)).href;
   page.on('console', message => faults.push(`console: ${message.text()}`));
   page.on('pageerror', error => faults.push(`script: ${error}`));

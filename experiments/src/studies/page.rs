@@ -34,8 +34,8 @@ const FRAME_BYTES: usize = 1_500_000;
 const MOST_FRAMES: usize = 60;
 /// Entries of a history at most.
 const MOST_ENTRIES: usize = 500;
-/// Decades of error that are coloured where the tolerance gives no end.
-const DECADES: f64 = 10.0;
+/// Decades of error that are coloured at most.
+const DECADES: f64 = 12.0;
 /// A λ_min below this part of λ_max is zero as far as rounding tells.
 const VANISHING: f64 = 1e-13;
 /// The methods that are swept over ω.
@@ -115,16 +115,14 @@ fn spectrum(matrix: &'static str, ends: Extremes, bounds: [f64; 2], all: Option<
     }
 }
 
-/// From the tolerance to the largest error of a start.
+/// From the tolerance, or a little part, to the largest error of a start.
 fn range(problem: &Problem, rows: &[MethodRow]) -> [f64; 2] {
     let starts = rows.iter().filter_map(|row| row.solution.report.history.first());
     let greatest = problem.scale * starts.map(|errors| errors.max).fold(0.0, f64::max);
+    let greatest = if greatest > 0.0 && greatest.is_finite() { greatest } else { 1.0 };
     let tolerance = problem.scale * problem.stop.tolerance;
-    match (greatest > 0.0 && greatest.is_finite(), tolerance < 0.1 * greatest) {
-        (true, true) => [tolerance, greatest],
-        (true, false) => [greatest * 10f64.powf(-DECADES), greatest],
-        (false, _) => [10f64.powf(-DECADES), 1.0],
-    }
+    let least = greatest * 10f64.powf(-DECADES);
+    [if tolerance < 0.1 * greatest { tolerance.max(least) } else { least }, greatest]
 }
 
 /// `count` whole numbers from 0 to `last`, evenly, with both ends, or all of them.
@@ -305,4 +303,58 @@ fn creases(surface: &Surface) -> Vec<[u32; 2]> {
     let Some(features) = surface.features() else { return Vec::new() };
     let semi_sharp = features.semi_sharp_edges().iter().map(|&(c, _)| c);
     features.sharp_half_edges().iter().copied().chain(semi_sharp).map(ends).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use limitlab::analysis::comparison::{Entry, compare_entries};
+    use limitlab::analysis::spectrum::spectrum;
+    use limitlab::mesh::order::Order;
+
+    use super::*;
+    use crate::cli::{CommonFlags, Matrix, MeshFlags, STAND_IN_NOISE, StopFlags};
+
+    #[test]
+    fn spread_numbers_have_both_ends() {
+        assert_eq!(spread(0, 2), [0]);
+        assert_eq!(spread(3, 60), [0, 1, 2, 3]);
+        assert_eq!(spread(10, 5), [0, 3, 5, 8, 10]);
+        let many = spread(10_000, MOST_ENTRIES);
+        assert!(many.len() == MOST_ENTRIES && many[0] == 0 && many[MOST_ENTRIES - 1] == 10_000);
+        assert!(many.windows(2).all(|w| w[0] < w[1]));
+    }
+
+    #[test]
+    fn a_mesh_too_large_to_be_shown_is_thinned_out() {
+        let flags = MeshFlags {
+            scheme: None,
+            noise: Some(STAND_IN_NOISE),
+            boundary: None,
+            creases: None,
+            corners: None,
+            crease_angle: None,
+            weld: false,
+            defects: false,
+        };
+        let stop = StopFlags { tol: 1e-6, tol_absolute: None, max_iter: 1000 };
+        let common = CommonFlags { threads: None, quiet: true };
+        let problem = flags.problem("torus:160x130", &stop, Order::File, &common).unwrap();
+        let Matrix::Symmetric(system) = problem.matrix() else { panic!("no darts") };
+        let line = Entry { method: Method::Pia, variant: "", parameter: String::new() };
+        let rows =
+            compare_entries(system, &spectrum(system).unwrap(), problem.data(), &[line], &problem.stop, &mut || ())
+                .unwrap();
+        let (surface, scheme, _) = problem.mesh().unwrap();
+        let mesh = Thinned::new(surface.mesh(), MOST_SHOWN);
+        let left = mesh.first.len();
+        assert!(left < MOST_SHOWN && left > MOST_SHOWN / 3, "{left}");
+        let shown = Shown { mesh, range: range(&problem, &rows) };
+        let found = frames(&problem, system, &rows[0], &shown, 2).unwrap();
+        assert_eq!(found.at, Packed::new([0, rows[0].solution.report.iterations as u32].map(u32::to_le_bytes)));
+        assert!(found.errors.as_str().len() == (2 * left).div_ceil(3) * 4);
+        let view = view(&problem, surface, scheme, shown).unwrap();
+        assert!(view.about.starts_with(&format!("Thinned out: {left} of 20800 vertices")), "{}", view.about);
+        assert!(view.limit.is_none() && view.about.contains("limit surface is left out"));
+        assert_eq!(view.given.points.as_str().len(), view.cage.unwrap().as_str().len());
+    }
 }

@@ -35,7 +35,8 @@ function entryAt(curve, iteration) {
   const finite = curves.flatMap(curve => [...curve.max]).filter(e => e > 0 && Number.isFinite(e));
   const start = Math.max(...curves.map(curve => curve.max[0]).filter(Number.isFinite), data.tolerance);
   // Errors of runs that diverge may be of any size, and leave the frame.
-  const range = [Math.min(data.tolerance / 10, Math.max(finite.reduce((a, b) => Math.min(a, b), Infinity), data.tolerance / 1e3)), start * 1e2];
+  const least = finite.reduce((a, b) => Math.min(a, b), start);
+  const range = [Math.max(Math.min(data.tolerance, Math.max(least, data.tolerance / 1e3)) / 10, least * 1e-12), start * 1e2];
   const redraw = () => {
     const visible = curves.filter(curve => curve.shown);
     longest = Math.max(1, ...visible.map(curve => curve.iterations));
