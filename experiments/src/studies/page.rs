@@ -161,7 +161,8 @@ fn frames(problem: &Problem, system: &impl System, row: &MethodRow, shown: &Show
         ControlFlow::Continue(())
     };
     run_from(system, points, start, method, &problem.stop, watch);
-    Some(Frames {
+    // A method that could not be set up has no iterate.
+    (!errors.is_empty()).then(|| Frames {
         at: Packed::new(at.iter().map(|&k| (k as u32).to_le_bytes())),
         errors: Packed::new(errors.into_iter().map(|byte| [byte])),
     })
