@@ -136,7 +136,13 @@ const PROGRAMS: &[Program] = &[
         groups: &[
             COMMON,
             JSON,
-            &[("--list", SWITCH), ("--quick", SWITCH), ("--meshes", "no-such|."), ("--check", "no-such|.")],
+            &[
+                ("--list", SWITCH),
+                ("--quick", SWITCH),
+                ("--times", SWITCH),
+                ("--meshes", "no-such|."),
+                ("--check", "no-such|."),
+            ],
         ],
     },
     Program {

@@ -1,6 +1,7 @@
 //! `reproduce` and the ledger of the papers' claims: what is listed, what runs alone, what is written and compared.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::process::Output;
 
 use assert_cmd::Command;
@@ -60,18 +61,63 @@ fn an_unknown_claim_is_refused_in_one_line() {
     assert_eq!(line.lines().count(), 1);
 }
 
+/// All files below a folder, with their bytes.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else {
+            found.insert(path.clone(), std::fs::read(&path).unwrap());
+        }
+    }
+    found
+}
+
+/// One test of all that a quick run of everything does, as it takes its time.
 #[test]
-fn the_quick_ledger_is_written_and_held_against_a_committed_one() {
+fn a_quick_run_ends_with_one_screen_and_is_held_against_a_committed_one() {
     let dir = tempfile::tempdir().unwrap();
-    let output = reproduce(dir.path(), &["--quick", "--only", "claims", "--only", "findings"]);
+    let out = dir.path().to_str().unwrap();
+    let output = Command::cargo_bin("reproduce").unwrap().args(["--quick", "--out", out]).output().unwrap();
     assert!(output.status.success(), "{}", text(&output.stderr));
     let folder = dir.path().join("built-in");
+
+    // A line an item: its name, seconds, what came out.
+    let lines: Vec<&str> = text(&output.stderr).lines().collect();
+    let list = reproduce(dir.path(), &["--list"]);
+    let items = text(&list.stdout).lines().map(|line| line.split_whitespace().next().unwrap());
+    for (item, line) in items.zip(&lines) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        assert!(words[0] == item && words[1].parse::<f64>().is_ok() && words[2] == "s", "{line}");
+    }
+    assert_eq!(lines.len(), 17, "{lines:#?}");
+    assert!(lines[0].ends_with("1 table of 5 rows"), "{}", lines[0]);
+    // Verdicts with the claims that are not as printed, and where the rest is.
+    let screen = text(&output.stdout);
+    assert!(screen.lines().count() < 25 && screen.lines().all(|l| !l.starts_with('|')), "{screen}");
+    assert!(screen.lines().any(|l| l.contains("corrected") && l.contains(" P8 ")), "{screen}");
+    assert!(screen.contains("README.md") && screen.contains(folder.to_str().unwrap()), "{screen}");
+
+    // What a clock measures is written only if asked for; all else is the same from run to run.
+    let before = files(dir.path());
+    assert!(before.keys().all(|path| !path.to_str().unwrap().contains("--times.")), "{:#?}", before.keys());
+    assert!(reproduce(dir.path(), &["--quick", "--only", "zheng-cai-3-5", "--only", "popping"]).status.success());
+    assert!(files(dir.path()) == before, "a second run changed a file");
+    assert!(reproduce(dir.path(), &["--quick", "--only", "zheng-cai-3-5", "--times"]).status.success());
+    assert!(folder.join("zheng-cai-3-5--times.md").exists());
+
     let json = std::fs::read_to_string(folder.join("claims.json")).unwrap();
     let records: serde_json::Value = serde_json::from_str(&json).unwrap();
     let records = records.as_array().unwrap();
     assert!(records.len() > 50);
     for record in records {
         assert_ne!(record["verdict"], "not confirmed", "{record:#}");
+        // A duration has no value here, and so decides nothing.
+        for evidence in record["evidence"].as_array().unwrap() {
+            assert!(evidence["relation"].is_null() || !evidence["value"].is_null(), "{record:#}");
+        }
     }
     let page = std::fs::read_to_string(folder.join("claims.md")).unwrap();
     assert!(page.contains("Quick run, without"));

@@ -202,16 +202,20 @@ fn print_results<T: Serialize>(results: &[T]) -> Result<()> {
     }
 }
 
-/// What a program of several tables prints on standard output: each in Markdown as soon as it is there, or with `--json`
-/// one object with all of them at the end.
-pub struct Printer {
-    json: bool,
-    tables: Vec<Value>,
+/// What a program of several tables prints on standard output: each in Markdown as soon as it is there, with `--json`
+/// one object with all of them at the end, or nothing.
+pub enum Printer {
+    /// Tables and pages as they come.
+    Pages,
+    /// The object of all tables.
+    Json(Vec<Value>),
+    /// Neither: the program ends with words of its own.
+    Silent,
 }
 
 impl Printer {
     pub fn new(json: bool) -> Self {
-        Printer { json, tables: Vec::new() }
+        if json { Printer::Json(Vec::new()) } else { Printer::Pages }
     }
 
     /// A table.
@@ -219,11 +223,14 @@ impl Printer {
     /// # Errors
     /// If standard output cannot be written.
     pub fn table(&mut self, table: &Table) -> Result<()> {
-        if self.json {
-            self.tables.push(json!({ "id": table.id, "title": table.title, "rows": table.to_json() }));
-            return Ok(());
+        match self {
+            Printer::Pages => return print(&table.to_markdown()),
+            Printer::Json(tables) => {
+                tables.push(json!({ "id": table.id, "title": table.title, "rows": table.to_json() }));
+            }
+            Printer::Silent => {}
         }
-        print(&table.to_markdown())
+        Ok(())
     }
 
     /// A page for people, which the JSON object lacks.
@@ -231,7 +238,10 @@ impl Printer {
     /// # Errors
     /// As [`table`](Self::table).
     pub fn page(&self, text: &str) -> Result<()> {
-        if self.json { Ok(()) } else { print(text) }
+        match self {
+            Printer::Pages => print(text),
+            Printer::Json(_) | Printer::Silent => Ok(()),
+        }
     }
 
     /// The end: with `--json` prints the object of `fields` and `tables`.
@@ -242,10 +252,10 @@ impl Printer {
     /// # Panics
     /// If `fields` is not an object.
     pub fn finish(self, mut fields: Value) -> Result<()> {
-        if !self.json {
+        let Printer::Json(tables) = self else {
             return Ok(());
-        }
-        fields["tables"] = self.tables.into();
+        };
+        fields["tables"] = tables.into();
         print_json(&fields)
     }
 }

@@ -1,5 +1,6 @@
 //! Context of a run of `reproduce`: sources of meshes, the folder of results, the reports they are compared with.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -36,11 +37,51 @@ pub struct Context {
     root: PathBuf,
     models: Option<PathBuf>,
     pub quick: bool,
+    /// Whether tables of wall-clock times are made.
+    times: bool,
     check: Option<PathBuf>,
     differences: Vec<String>,
     pub printer: Printer,
     /// The ledger of claims, once it is computed.
     pub ledger: Vec<Record>,
+    /// What was made since it was last taken.
+    pub made: Made,
+}
+
+/// How much an item made.
+#[derive(Default)]
+pub struct Made {
+    tables: usize,
+    rows: usize,
+    figures: usize,
+    /// Pages of words: the ledger, the findings.
+    pub pages: usize,
+}
+
+impl std::ops::AddAssign<&Made> for Made {
+    fn add_assign(&mut self, more: &Made) {
+        self.tables += more.tables;
+        self.rows += more.rows;
+        self.figures += more.figures;
+        self.pages += more.pages;
+    }
+}
+
+impl fmt::Display for Made {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rows = if self.rows == 1 { "1 row".into() } else { format!("{} rows", self.rows) };
+        let parts = [
+            (self.tables, format!("table of {rows}"), format!("tables of {rows}")),
+            (self.figures, "figure".into(), "figures".into()),
+            (self.pages, "page".into(), "pages".into()),
+        ];
+        let said: Vec<String> = parts
+            .into_iter()
+            .filter(|(count, ..)| *count > 0)
+            .map(|(count, one, several)| format!("{count} {}", if count == 1 { one } else { several }))
+            .collect();
+        if said.is_empty() { f.write_str("nothing") } else { f.write_str(&said.join(", ")) }
+    }
 }
 
 /// A mesh with its name for the tables.
@@ -82,6 +123,7 @@ impl Context {
         root: &Path,
         models: Option<&Path>,
         quick: bool,
+        times: bool,
         check: Option<&Path>,
         printer: Printer,
     ) -> Result<Self> {
@@ -102,10 +144,12 @@ impl Context {
             root: root.to_path_buf(),
             models: models.map(Path::to_path_buf),
             quick,
+            times,
             check: check.map(Path::to_path_buf),
             differences: Vec::new(),
             printer,
             ledger: Vec::new(),
+            made: Made::default(),
         };
         create_dir(&context.folder())?;
         Ok(context)
@@ -239,7 +283,27 @@ impl Context {
         table.notes.insert(0, self.note_on_meshes());
         table.write(&self.folder())?;
         self.printer.table(&table)?;
+        self.note_table(&table);
         self.compare(&table)
+    }
+
+    /// Makes a table of wall-clock times where they are wanted: no run repeats them, so that a plain one leaves what is
+    /// committed as it is.
+    ///
+    /// # Errors
+    /// Those of `make`, and as [`table`](Self::table).
+    pub fn times(&mut self, make: impl FnOnce(&Context) -> Result<Table>) -> Result<()> {
+        if !self.times {
+            return Ok(());
+        }
+        let table = make(self)?;
+        self.table(table)
+    }
+
+    /// Counts a table that was made.
+    pub fn note_table(&mut self, table: &Table) {
+        self.made.tables += 1;
+        self.made.rows += table.rows.len();
     }
 
     /// Holds a table against the one of the same name in `--check`.
@@ -260,7 +324,8 @@ impl Context {
     ///
     /// # Errors
     /// If it cannot be drawn or written.
-    pub fn figure(&self, stem: &str, figure: &Figure) -> Result<()> {
+    pub fn figure(&mut self, stem: &str, figure: &Figure) -> Result<()> {
+        self.made.figures += 1;
         figure.render()?.save(&self.folder().join(format!("{stem}.png")))
     }
 
@@ -268,10 +333,16 @@ impl Context {
     ///
     /// # Errors
     /// If one cannot be drawn, or the file not written.
-    pub fn animation(&self, stem: &str, figures: &[Figure]) -> Result<()> {
+    pub fn animation(&mut self, stem: &str, figures: &[Figure]) -> Result<()> {
+        self.made.figures += 1;
         let animation =
             Animation { frames: figures.iter().map(Figure::render).collect::<Result<_>>()?, milliseconds: 700 };
         animation.save(&self.folder().join(format!("{stem}.png")))
+    }
+
+    /// The page that lists all results.
+    pub fn index(&self) -> PathBuf {
+        self.root.join("README.md")
     }
 
     /// Writes the index of all results in the report folder, those of earlier runs too.

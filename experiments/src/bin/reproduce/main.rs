@@ -17,6 +17,7 @@ mod popping;
 mod ripples;
 mod sparsity;
 mod splitting;
+mod summary;
 mod thall;
 mod valences;
 mod whole;
@@ -24,12 +25,13 @@ mod zheng_cai;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Instant;
 
 use clap::Parser;
 use serde_json::json;
 
 use claims::Claim;
-use context::{Context, Item};
+use context::{Context, Item, Made};
 use limitlab::Result;
 use limitlab::error::Error;
 use limitlab_experiments::cli::{self, CommonFlags, Printer, Progress};
@@ -37,11 +39,14 @@ use limitlab_experiments::cli::{self, CommonFlags, Printer, Progress};
 /// Regenerates the papers' tables and figures with what this workbench measures beside what they print.
 ///
 /// With --meshes the papers' own models are read from that folder, and the results go to the report folder itself;
-/// without, built-in meshes stand in, and the results go to its folder built-in.
+/// without, built-in meshes stand in, and the results go to its folder built-in. A run of everything says a line an
+/// item on standard error as it works, and ends with one screen: the claims by verdict, the findings, where the tables
+/// are. It writes the same files every time: only --times writes what a clock measured.
 #[derive(Parser)]
 #[command(name = "reproduce", version)]
 struct Arguments {
-    /// Only the item or claim with this ID; may be repeated. A claim alone is printed and not written
+    /// Only the item or claim with this ID, with its tables on standard output; may be repeated. A claim alone is
+    /// printed and not written
     #[arg(long, value_name = "ID")]
     only: Vec<String>,
     /// List the items and the papers' claims, and stop
@@ -56,6 +61,9 @@ struct Arguments {
     /// A subset of the rows, within a minute
     #[arg(long)]
     quick: bool,
+    /// Write the tables of wall-clock times too (ID--times), which differ from run to run
+    #[arg(long)]
+    times: bool,
     /// Print one JSON object on standard output, and nothing else there: all tables, and the claims with their numbers
     #[arg(long)]
     json: bool,
@@ -128,14 +136,22 @@ fn run(arguments: &Arguments) -> Result<()> {
         &arguments.out,
         arguments.meshes.as_deref(),
         arguments.quick,
+        arguments.times,
         arguments.check.as_deref(),
-        Printer::new(arguments.json),
+        // A run of everything has a screen of its own.
+        if arguments.only.is_empty() && !arguments.json { Printer::Silent } else { Printer::new(arguments.json) },
     )?;
     let steps = chosen.len() + usize::from(!claims.is_empty());
     let progress = Progress::new("reproduce", steps, arguments.common.quiet);
+    let width = ITEMS.iter().map(|i| i.id.len()).max().unwrap_or(0);
+    let mut made = Made::default();
     for item in &chosen {
         progress.message(item.id);
+        let start = Instant::now();
         (item.run)(&mut context)?;
+        let new = std::mem::take(&mut context.made);
+        progress.line(format_args!("{:width$} {:6.1} s  {new}", item.id, start.elapsed().as_secs_f64()));
+        made += &new;
         progress.step();
     }
     if !claims.is_empty() {
@@ -146,6 +162,10 @@ fn run(arguments: &Arguments) -> Result<()> {
     drop(progress);
     if !chosen.is_empty() {
         context.write_index(&ITEMS)?;
+    }
+    if arguments.only.is_empty() && !arguments.json {
+        cli::print(&summary::screen(&context, &made))?;
+    } else if !chosen.is_empty() {
         arguments.common.remark(format_args!("reports: {}", context.folder().display()));
     }
     let claims = claims::json(&context.ledger);

@@ -118,7 +118,7 @@ fn column_name(method: &str, variant: &str) -> String {
 }
 
 /// A row for each of [`TOLERANCES`].
-fn one<'a>(context: &Context, subject: &'a Subject, scheme: Scheme) -> Result<[Row<'a>; TOLERANCES.len()]> {
+fn one<'a>(context: &mut Context, subject: &'a Subject, scheme: Scheme) -> Result<[Row<'a>; TOLERANCES.len()]> {
     let system = subject.system(scheme)?;
     let spectrum = spectrum(&system)?;
     let size = subject.surface.diagonal();

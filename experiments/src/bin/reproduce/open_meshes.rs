@@ -236,7 +236,7 @@ fn creased(context: &mut Context) -> Result<()> {
 }
 
 /// The pattern of A in file order, and with corners first, then curves, then the smooth vertices.
-fn blocks(context: &Context) -> Result<()> {
+fn blocks(context: &mut Context) -> Result<()> {
     let (rings, sides) = (48, 6);
     let creases = [0, 3].map(|j| closed_loop(torus_loop(rings, sides, j), SHARP)).concat();
     let corners = [0, 16 * sides, 24 * sides + 3].map(|v| (v, SHARP)).to_vec();

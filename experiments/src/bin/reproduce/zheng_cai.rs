@@ -15,7 +15,7 @@ use limitlab::assemble::LimitSystem;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::system::sweep;
 use limitlab::solvers::{Method, Stop, run as solve, run_watched};
-use limitlab_experiments::report::{Column, Columns};
+use limitlab_experiments::report::{Column, Columns, Table};
 
 use crate::context::{Context, Item, Subject};
 use crate::corpus;
@@ -43,11 +43,11 @@ struct Row<'a> {
     /// The largest update of each sweep, and the error after the last, relative to the diagonal of the bounding box.
     updates: Vec<f64>,
     error: f64,
-    seconds: Seconds,
 }
 
-/// Gauss-Seidel on Zheng-Cai's system, and direct methods on Nasri's.
-struct Seconds {
+/// Gauss-Seidel on Zheng-Cai's system of a model, and direct methods on Nasri's.
+struct Seconds<'a> {
+    subject: &'a Subject,
     gauss_seidel: f64,
     dense: Option<f64>,
     lu: f64,
@@ -62,9 +62,11 @@ impl Row<'_> {
             None => "not the paper's model",
         }
     }
+}
 
+impl Seconds<'_> {
     /// The paper's seconds: of Gauss-Seidel, of Gaussian elimination on Nasri's system.
-    fn printed_seconds(&self) -> Option<(f64, f64)> {
+    fn printed(&self) -> Option<(f64, f64)> {
         (self.subject.surface.len() == 562).then_some((0.0049, 1.4))
     }
 }
@@ -77,8 +79,7 @@ fn run(context: &mut Context) -> Result<()> {
     for (subject, printed) in &subjects {
         let system = subject.system(Scheme::ZhengCai)?;
         let (updates, error) = updates(&system, subject.surface.positions(), subject.surface.diagonal());
-        let seconds = timing(context, subject, &system)?;
-        rows.push(Row { subject, printed: *printed, updates, error, seconds });
+        rows.push(Row { subject, printed: *printed, updates, error });
     }
     let mut columns = Columns::<Row>::new()
         .col(Column::key("mesh"), |r| r.subject.name.clone())
@@ -98,20 +99,28 @@ fn run(context: &mut Context) -> Result<()> {
          at most 0.3 % of the bounding box's diagonal. `update_k_percent` is that of sweep k, `max_error_percent` the \
          largest distance of the interpolated points after the last sweep, before the paper's second phase removes it.",
     );
-    let mut times = Columns::<Row>::new()
+    context.table(table)?;
+    context.times(|context| {
+        let rows = subjects.iter().map(|(subject, _)| timing(context, subject)).collect::<Result<Vec<_>>>()?;
+        Ok(times(&rows))
+    })
+}
+
+fn times(rows: &[Seconds]) -> Table {
+    let mut times = Columns::<Seconds>::new()
         .col(Column::key("mesh"), |r| r.subject.name.clone())
         .col(Column::text("vertices"), |r| r.subject.surface.len().to_string())
-        .col(Column::time("printed_gauss_seidel"), |r| r.printed_seconds().map(|p| p.0))
-        .col(Column::time("gauss_seidel"), |r| r.seconds.gauss_seidel)
-        .col(Column::time("printed_nasri_dense"), |r| r.printed_seconds().map(|p| p.1))
-        .col(Column::time("nasri_dense"), |r| r.seconds.dense)
-        .col(Column::time("nasri_sparse_lu"), |r| r.seconds.lu)
-        .col(Column::time("nasri_cholesky"), |r| r.seconds.cholesky)
-        .col(Column::time("printed_ratio"), |r| r.printed_seconds().map(|p| p.1 / p.0))
-        .col(Column::time("ratio_dense"), |r| r.seconds.dense.map(|d| d / r.seconds.gauss_seidel))
-        .col(Column::time("ratio_sparse_lu"), |r| r.seconds.lu / r.seconds.gauss_seidel)
-        .col(Column::time("ratio_cholesky"), |r| r.seconds.cholesky / r.seconds.gauss_seidel)
-        .table(format!("{}--times", SECTION_3_5.id), "Zheng-Cai §3.5: seconds, then and now", &rows);
+        .col(Column::time("printed_gauss_seidel"), |r| r.printed().map(|p| p.0))
+        .col(Column::time("gauss_seidel"), |r| r.gauss_seidel)
+        .col(Column::time("printed_nasri_dense"), |r| r.printed().map(|p| p.1))
+        .col(Column::time("nasri_dense"), |r| r.dense)
+        .col(Column::time("nasri_sparse_lu"), |r| r.lu)
+        .col(Column::time("nasri_cholesky"), |r| r.cholesky)
+        .col(Column::time("printed_ratio"), |r| r.printed().map(|p| p.1 / p.0))
+        .col(Column::time("ratio_dense"), |r| r.dense.map(|d| d / r.gauss_seidel))
+        .col(Column::time("ratio_sparse_lu"), |r| r.lu / r.gauss_seidel)
+        .col(Column::time("ratio_cholesky"), |r| r.cholesky / r.gauss_seidel)
+        .table(format!("{}--times", SECTION_3_5.id), "Zheng-Cai §3.5: seconds, then and now", rows);
     times.note(
         "Gauss-Seidel to the 0.3 % threshold on Zheng-Cai's system, against solving Nasri's system: dense Gaussian \
          elimination with partial pivoting (as in the paper), sparse LU and sparse Cholesky, each with its set-up. \
@@ -119,8 +128,7 @@ fn run(context: &mut Context) -> Result<()> {
          failed for lack of memory (the dense matrix takes 1.07 GB). On triangle meshes both matrices are the same, \
          so the comparison there is of solvers only.",
     );
-    context.table(table)?;
-    context.table(times)
+    times
 }
 
 /// The largest update of each sweep until the threshold is met, relative to `size`, and the error after the last.
@@ -146,7 +154,8 @@ fn largest_update(before: &[DVec3], after: &[DVec3]) -> f64 {
     before.iter().zip(after).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
 }
 
-fn timing(context: &Context, subject: &Subject, system: &LimitSystem) -> Result<Seconds> {
+fn timing<'a>(context: &Context, subject: &'a Subject) -> Result<Seconds<'a>> {
+    let system = subject.system(Scheme::ZhengCai)?;
     let points = subject.surface.positions();
     let threshold = THRESHOLD * subject.surface.diagonal();
     // The loop of the paper: sweep, largest update, threshold.
@@ -154,7 +163,7 @@ fn timing(context: &Context, subject: &Subject, system: &LimitSystem) -> Result<
     let mut x = points.to_vec();
     let mut before = points.to_vec();
     loop {
-        sweep(system, points, 1.0, 0..points.len(), &mut x);
+        sweep(&system, points, 1.0, 0..points.len(), &mut x);
         if largest_update(&before, &x) <= threshold {
             break;
         }
@@ -170,7 +179,7 @@ fn timing(context: &Context, subject: &Subject, system: &LimitSystem) -> Result<
         let solution = solve(&nasri, points, method, &stop);
         solution.setup_seconds + solution.solve_seconds
     };
-    Ok(Seconds { gauss_seidel, dense, lu: direct(Method::Lu), cholesky: direct(Method::Cholesky) })
+    Ok(Seconds { subject, gauss_seidel, dense, lu: direct(Method::Lu), cholesky: direct(Method::Cholesky) })
 }
 
 /// Seconds of Gaussian elimination with partial pivoting on the full matrix, three right-hand sides.

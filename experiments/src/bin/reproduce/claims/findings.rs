@@ -9,6 +9,11 @@ use super::{Record, shown};
 /// The page. `{{ID}}` stands for the verdict of a claim, `{{ID|start of a quantity}}` for a number of it.
 const PAGE: &str = include_str!("findings.md");
 
+/// The findings, a numbered line each.
+pub fn headings() -> impl Iterator<Item = &'static str> {
+    PAGE.lines().filter_map(|line| line.strip_prefix("## "))
+}
+
 /// The page with the ledger's numbers.
 ///
 /// # Errors

@@ -8,7 +8,7 @@
 //! - [`findings`]: the page on what is settled and what is wrong, filled with the ledger's numbers.
 
 mod finding;
-mod findings;
+pub mod findings;
 mod lab;
 mod lin_luo;
 mod open;
@@ -104,8 +104,10 @@ fn run_ledger(context: &mut Context) -> Result<()> {
     write("claims.csv", &table.to_csv())?;
     write("claims.json", &format!("{:#}\n", json(&records)))?;
     context.printer.page(&page)?;
+    context.made.pages += 1;
+    context.note_table(&table);
     context.compare(&table)?;
-    context.table(times(&records))?;
+    context.times(|_| Ok(times(&records)))?;
     context.ledger = records;
     Ok(())
 }
@@ -120,6 +122,7 @@ fn run_findings(context: &mut Context) -> Result<()> {
     }
     let page = findings::page(&context.note_on_meshes(), &context.ledger)?;
     write_file(&context.folder().join("findings.md"), |out| out.write_all(page.as_bytes()))?;
+    context.made.pages += 1;
     context.printer.page(&page)
 }
 
@@ -237,6 +240,27 @@ fn counts(records: &[Record]) -> String {
     parts.collect::<Vec<_>>().join(", ")
 }
 
+/// A line for each verdict that occurs: how many claims have it, and which, unless they are as printed.
+pub fn verdicts(records: &[Record]) -> String {
+    let mut text = String::new();
+    for verdict in Verdict::ALL {
+        let with = records.iter().filter(|r| r.finding.verdict() == verdict);
+        let ids: Vec<&str> = with.map(|r| r.claim.id).collect();
+        if ids.is_empty() {
+            continue;
+        }
+        let named = if verdict == Verdict::Reproduced { String::new() } else { ids.join(" ") };
+        let line = format!("{:5} {:17} {named}", ids.len(), verdict.name());
+        let _ = writeln!(text, "{}", line.trim_end());
+    }
+    text
+}
+
+/// The claims that a quick run leaves out.
+pub fn left_out() -> Vec<&'static str> {
+    all().filter(|c| c.slow).map(|c| c.id).collect()
+}
+
 /// The whole ledger for people: a list with verdicts, then a section a claim.
 fn page(context: &Context, records: &[Record]) -> String {
     let mut page = format!(
@@ -246,7 +270,7 @@ fn page(context: &Context, records: &[Record]) -> String {
          paper, decided here. *Not reproducible*: with the reason. *Not confirmed*: a number is on the wrong side of \
          its threshold. Random meshes are {} closed ones of at most {} vertices with valences from 3, from fixed \
          seeds; L is the diagonal of a mesh's bounding box. `claims.csv` has a row for every number, `claims.json` \
-         both, `claims--times.csv` the durations.\n\n{} claims: {}.\n",
+         both, `claims--times.csv` (written with `--times`) the durations.\n\n{} claims: {}.\n",
         LEDGER.title,
         context.note_on_meshes(),
         lab::RANDOM_MESHES,
@@ -255,8 +279,7 @@ fn page(context: &Context, records: &[Record]) -> String {
         counts(records),
     );
     if context.quick {
-        let left_out: Vec<&str> = all().filter(|c| c.slow).map(|c| c.id).collect();
-        let _ = write!(page, "\nQuick run, without {}.\n", left_out.join(", "));
+        let _ = write!(page, "\nQuick run, without {}.\n", left_out().join(", "));
     }
     for (_, name) in PAPERS {
         let own = || records.iter().filter(move |r| paper(r.claim) == name);
