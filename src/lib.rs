@@ -16,6 +16,7 @@ pub mod error;
 pub mod interpolate;
 pub mod memory;
 pub mod mesh;
+pub mod names;
 pub mod output;
 mod pages;
 mod parallel;

@@ -3,8 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::error::one_of;
-use crate::{Error, Result};
+use crate::{Error, Result, names};
 
 /// What to make of boundary edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,10 +46,8 @@ impl FromStr for Boundary {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        Boundary::ALL.into_iter().find(|boundary| boundary.name() == text).ok_or_else(|| {
-            let names = Boundary::ALL.map(Boundary::name);
-            Error::Unknown(format!("unknown treatment of the boundary `{text}`: use {}", one_of(&names)))
-        })
+        let all = Boundary::ALL.map(|boundary| (boundary.name(), boundary));
+        names::find("treatment of the boundary", text, &all, &[])
     }
 }
 

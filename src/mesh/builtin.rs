@@ -11,6 +11,7 @@ use super::incidence::next_in;
 use super::topology::Topology;
 use super::{Faces, Mesh};
 use crate::memory::require;
+use crate::names::{perhaps, same};
 use crate::{Error, Result};
 
 /// The largest built-in mesh in corners: 11 million vertices with triangles, 16 million with quads.
@@ -60,9 +61,11 @@ pub fn builtin(name: &str) -> Result<Mesh> {
         Some((kind, parameters)) => (kind, Some(parameters)),
         None => (name, None),
     };
-    let Some(&(pattern, _)) = NAMES.iter().find(|(pattern, _)| pattern.split(':').next() == Some(kind)) else {
+    let stems = || NAMES.iter().map(|(pattern, _)| pattern.split(':').next().unwrap_or(pattern));
+    let Some((kind, &(pattern, _))) = stems().zip(&NAMES).find(|(stem, _)| same(stem, kind)) else {
         return Err(Error::Unknown(format!(
-            "no file and no built-in mesh is called `{name}`; built-in are {}",
+            "no file and no built-in mesh is called `{name}`{}; built-in are {}",
+            perhaps(kind, stems()),
             names()
         )));
     };

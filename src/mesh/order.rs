@@ -13,7 +13,7 @@ use super::incidence::Incidence;
 pub use super::numbering::{Numbering, inverse};
 use super::space_filling::morton;
 use super::{Faces, Mesh};
-use crate::{Error, Result};
+use crate::{Error, Result, names};
 
 /// `--order file|reverse|bfs|rcm|morton|valence|multicolour|random[:SEED]`.
 ///
@@ -45,26 +45,23 @@ impl FromStr for Order {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let order = match text {
-            "file" => Order::File,
-            "reverse" => Order::Reverse,
-            "bfs" => Order::Bfs,
-            "rcm" => Order::Rcm,
-            "morton" => Order::Morton,
-            "valence" => Order::Valence,
-            "multicolour" => Order::Multicolour,
-            "random" => Order::Random(1),
-            _ => match text.strip_prefix("random:").map(str::parse) {
-                Some(Ok(seed)) => Order::Random(seed),
-                _ => {
-                    return Err(Error::Unknown(format!(
-                        "unknown vertex order `{text}`: use file, reverse, bfs, rcm, morton, valence, multicolour \
-                         or random[:SEED]"
-                    )));
-                }
-            },
-        };
-        Ok(order)
+        const NAMES: [(&str, Order); 8] = [
+            ("file", Order::File),
+            ("reverse", Order::Reverse),
+            ("bfs", Order::Bfs),
+            ("rcm", Order::Rcm),
+            ("morton", Order::Morton),
+            ("valence", Order::Valence),
+            ("multicolour", Order::Multicolour),
+            ("random", Order::Random(1)),
+        ];
+        match text.split_once(':') {
+            Some((name, seed)) if names::same(name, "random") => seed
+                .parse()
+                .map(Order::Random)
+                .map_err(|_| Error::Unknown(format!("unknown vertex order \"{text}\": the seed is a whole number"))),
+            _ => names::find("vertex order", text, &NAMES, &[("multicolor", Order::Multicolour)]),
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use super::{butterfly, catmull_clark, doo_sabin, labsik_greiner, loop_scheme, mi
 use crate::memory::require;
 use crate::mesh::features::Features;
 use crate::mesh::{Mesh, Surface, Topology};
+use crate::names;
 use crate::{Error, Result};
 
 /// What a refinement does with the vertices.
@@ -282,10 +283,6 @@ impl FromStr for Refinement {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        let found = Refinement::ALL.into_iter().find(|r| r.name() == name);
-        found.ok_or_else(|| {
-            let known = Refinement::ALL.map(Refinement::name).join(", ");
-            Error::Unknown(format!("unknown refinement {name:?}: choose one of {known}"))
-        })
+        names::find("refinement", name, &Refinement::ALL.map(|refinement| (refinement.name(), refinement)), &[])
     }
 }

@@ -9,6 +9,7 @@ use super::local_limit::StarRule;
 use super::{Refinement, catmull_clark, loop_scheme, mid_edge, nasri, sqrt3, zheng_cai};
 use crate::error::Error;
 use crate::mesh::Faces;
+use crate::names;
 
 /// What a scheme tells the assembler. `M = diag(d(n)) + w·Adj + Σ_F circulant(|F|)`, `H = diag(h(n))`, `A = H·M`.
 pub trait Masks: Sync {
@@ -233,10 +234,8 @@ impl FromStr for Scheme {
     type Err = Error;
 
     fn from_str(s: &str) -> Result<Self, Error> {
-        Scheme::ALL.into_iter().find(|scheme| scheme.name() == s).ok_or_else(|| {
-            let names = Scheme::ALL.map(Scheme::name).join(", ");
-            Error::Unknown(format!("unknown scheme \"{s}\"; the schemes are {names}"))
-        })
+        let aliases = [("cc", Scheme::CatmullClark), ("√3", Scheme::Sqrt3)];
+        names::find("scheme", s, &Scheme::ALL.map(|scheme| (scheme.name(), scheme)), &aliases)
     }
 }
 

@@ -21,6 +21,7 @@ use super::ssor::Ssor;
 use super::system::{Entries, Rows, System};
 use crate::assemble::LimitSystem;
 use crate::error::Error;
+use crate::names;
 
 /// ω of `sor` unless told: about the best for all schemes on irregular meshes. Tuned on the sweeps in
 /// `reports/`.
@@ -146,6 +147,13 @@ impl<'a> Method<'a> {
         Method::PcgIc0,
         Method::Anderson { of: Accelerated::Pia { omega: None }, window: WINDOW },
         Method::HeavyBall { interval: None },
+    ];
+
+    /// Further names of theirs: the literature's, and a short one.
+    pub const ALIASES: [(&'static str, Method<'static>); 3] = [
+        ("gs", Method::GaussSeidel { order: None }),
+        ("gs-pia", Method::GaussSeidel { order: None }),
+        ("cg-pia", Method::Cg),
     ];
 
     /// The name, which says nothing of parameters and variants.
@@ -307,10 +315,7 @@ impl FromStr for Method<'static> {
     type Err = Error;
 
     fn from_str(s: &str) -> Result<Self, Error> {
-        Method::ALL.into_iter().find(|m| m.name() == s).ok_or_else(|| {
-            let names = Method::ALL.map(Method::name).join(", ");
-            Error::Unknown(format!("unknown method \"{s}\"; the methods are {names}"))
-        })
+        names::find("method", s, &Method::ALL.map(|method| (method.name(), method)), &Method::ALIASES)
     }
 }
 

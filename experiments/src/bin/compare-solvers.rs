@@ -18,7 +18,7 @@ use limitlab::output::check_target;
 use limitlab::solvers::{Method, System};
 use limitlab::{Error, Result};
 use limitlab_experiments::cli::{
-    self, CommonFlags, List, Matrix, MeshFlags, OutputFlags, Problem, Progress, StopFlags,
+    self, CommonFlags, List, Matrix, MeshFlags, OutputFlags, Problem, Progress, StopFlags, WHICH_METHOD,
 };
 use limitlab_experiments::studies::comparison::{self as study, Asked};
 use limitlab_experiments::studies::page::{self, Measured};
@@ -31,7 +31,7 @@ use limitlab_experiments::studies::page::{self, Measured};
 ///
 /// Where a mesh has darts or semi-sharp vertices, methods that need a symmetric M are left out, and the others run on all of A.
 #[derive(Parser)]
-#[command(name = "compare-solvers", version)]
+#[command(name = "compare-solvers", version, after_help = WHICH_METHOD)]
 struct Arguments {
     /// Mesh files (.obj, .off, .ply, .usda), built-in names, or folders with M.mtx, H.mtx and P.mtx; torus:32x32 with --noise 0.1 unless told
     #[arg(value_name = "MESH|SYSTEM_DIR")]

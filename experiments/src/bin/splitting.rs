@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use limitlab::analysis::splitting::{
     Condition, Crossing, LocalScheme, SharpRow, SharpVertex, StarRow, VALENCES, rows, sharp_rows,
 };
-use limitlab::{Error, Result};
+use limitlab::{Error, Result, names};
 use limitlab_experiments::cli::{self, CommonFlags, OutputFlags, number};
 use limitlab_experiments::studies::splitting as study;
 
@@ -48,7 +48,9 @@ impl std::str::FromStr for At {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        Ok(At(if name == "smooth" { None } else { Some(name.parse()?) }))
+        let mut all = vec![("smooth", At(None))];
+        all.extend(SharpVertex::ALL.map(|vertex| (vertex.name(), At(Some(vertex)))));
+        names::find("kind of vertex", name, &all, &[])
     }
 }
 

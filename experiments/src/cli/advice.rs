@@ -20,6 +20,32 @@ pub fn of_defects(report: &Validation) -> String {
     }
 }
 
+/// Which tools show the surface of a control mesh of `scheme`, and what to ask for where they do not.
+pub fn of_tools(scheme: Scheme) -> &'static str {
+    match scheme {
+        Scheme::CatmullClark => {
+            "Catmull-Clark's, as Blender (Subdivision Surface with Use Limit Surface), Maya, Rhino, OpenSubdiv and USD \
+             show it"
+        }
+        Scheme::Loop => {
+            "Loop's, as OpenSubdiv, USD, CGAL and MeshLab show it; Blender, Maya and Rhino subdivide by Catmull-Clark, \
+             and would miss the points: use --scheme catmull-clark for these"
+        }
+        Scheme::Sqrt3 => {
+            "the √3 scheme's, as CGAL shows it; use --scheme catmull-clark for Blender, Maya, Rhino and USD, or write the \
+             surface with --subdivide 3 --limit"
+        }
+        Scheme::Nasri => {
+            "Doo-Sabin's, as CGAL shows it; use --scheme catmull-clark for Blender, Maya, Rhino and USD, or write the \
+             surface with --subdivide 3 --limit"
+        }
+        Scheme::ZhengCai | Scheme::MidEdge => {
+            "of a scheme that this program alone refines by: write it with --subdivide 3 --limit; use --scheme \
+             catmull-clark for Blender, Maya, Rhino and USD"
+        }
+    }
+}
+
 /// An error of a computation on `surface`.
 pub fn of_error(error: &Error, surface: &Surface) -> String {
     let with = |flags: String| format!("{error}{flags}");

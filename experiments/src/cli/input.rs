@@ -115,6 +115,10 @@ impl MeshFlags {
         if has_mesh_ending(path) || path.exists() {
             return io::read(path);
         }
+        if path.components().count() > 1 {
+            // No built-in mesh is called so, and a list of them is no help.
+            return Err(Error::io(path, "read", std::io::ErrorKind::NotFound.into()));
+        }
         Ok(Loaded {
             name: name.to_owned(),
             mesh: builtin::builtin(name)?,

@@ -24,6 +24,9 @@ use crate::report::Table;
 use limitlab::error::{Error, Result};
 use limitlab::solvers::Stop;
 
+/// The end of the help of programs that take a method.
+pub const WHICH_METHOD: &str = "Which method for which mesh: docs/methods.md, ten lines with their evidence.";
+
 /// Flags of every program: threads and silence.
 #[derive(Args, Clone, Debug)]
 pub struct CommonFlags {

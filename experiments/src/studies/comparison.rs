@@ -8,7 +8,7 @@ use crate::report::{Column, Columns, Figure, LinePlot, Scale, Series, Table};
 use limitlab::analysis::comparison::MethodRow;
 use limitlab::analysis::custom_methods::Named;
 use limitlab::solvers::{Method, Solution};
-use limitlab::{Error, Result};
+use limitlab::{Error, Result, names};
 
 /// A method that may be asked for, or the chain that chooses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,10 +21,9 @@ impl FromStr for Asked {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        match name {
-            AUTO => Ok(Asked::Auto),
-            _ => name.parse().map(Asked::Method).map_err(|e: Error| Error::Unknown(format!("{e}, {AUTO}"))),
-        }
+        let mut all = vec![(AUTO, Asked::Auto)];
+        all.extend(Method::ALL.map(|method| (method.name(), Asked::Method(method))));
+        names::find("method", name, &all, &Method::ALIASES.map(|(alias, method)| (alias, Asked::Method(method))))
     }
 }
 

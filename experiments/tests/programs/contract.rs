@@ -223,3 +223,66 @@ fn reproduce_lists_its_items_and_refuses_others() {
     }
     assert_no_files(folder.path(), "reproduce");
 }
+
+#[test]
+fn names_are_taken_in_any_case_and_with_any_separator() {
+    let folder = tempdir().unwrap();
+    let arguments = ["Torus:6x6", "--scheme", "Catmull_Clark", "--method", "GS,gauss seidel,CG-PIA", "--order", "BFS"];
+    let output = run(COMPARE, folder.path(), arguments.into_iter().chain(["--json", "--quiet"]));
+    assert_done(&output, "forgiving names");
+    let object: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(object["scheme"], "catmull-clark");
+    let methods: Vec<&str> = object["rows"].as_array().unwrap().iter().map(|r| r["method"].as_str().unwrap()).collect();
+    assert_eq!(methods, ["gauss-seidel", "gauss-seidel", "cg"]);
+}
+
+#[test]
+fn a_misspelt_name_gets_a_suggestion_and_all_names() {
+    let folder = tempdir().unwrap();
+    for (program, arguments, parts) in [
+        (COMPARE, &["cube", "--scheme", "catmull"][..], ["perhaps catmull-clark?", "loop, sqrt3"]),
+        (COMPARE, &["cube", "--method", "cholesk"], ["perhaps cholesky?", "use auto, lu"]),
+        (INTERPOLATE, &["cube", "-o", "x.obj", "--method", "halsted"], ["perhaps halstead?", "two-phase"]),
+        (COMPARE, &["cube", "--order", "revers"], ["perhaps reverse?", "or random"]),
+        (COMPARE, &["cube", "--boundary", "edgeonly,"], ["perhaps edge-only?", "refuse"]),
+        (
+            SPLITTING,
+            &["--valence", "4", "--at", "edge"],
+            ["kind of vertex \"edge\"", "smooth, boundary, crease, corner or dart"],
+        ),
+        (SPLITTING, &["--valence", "4", "--scheme", "doosabins"], ["perhaps doo-sabin?", "labsik-greiner"]),
+        (COMPARE, &["icospere:2"], ["perhaps icosphere?", "torus:NxM"]),
+        (REPRODUCE, &["--only", "pia_table"], ["perhaps pia-table1?", "--list"]),
+    ] {
+        let output = run(program, folder.path(), arguments);
+        assert_ne!(output.status.code(), Some(0), "{arguments:?}");
+        let error = text(&output.stderr);
+        assert!(parts.iter().all(|part| error.contains(part)), "{arguments:?}: {error}");
+    }
+    // A path that is not there is no misspelt built-in name.
+    let line = assert_refused(&run(COMPARE, folder.path(), ["models/cube"]), "models/cube");
+    assert!(line.contains("models/cube: cannot read") && !line.contains("built-in"), "{line}");
+}
+
+#[test]
+fn the_result_says_which_tools_show_its_surface() {
+    let folder = tempdir().unwrap();
+    let said = |more: &[&str]| {
+        let arguments = ["octahedron", "-o", "cage.obj"].iter().chain(more);
+        let output = run(INTERPOLATE, folder.path(), arguments);
+        assert_done(&output, "octahedron");
+        text(&output.stderr).lines().find_map(|l| l.strip_prefix("its surface: ")).map(str::to_owned)
+    };
+    // Triangles are taken for Loop, which Blender does not know.
+    let untold = said(&[]).unwrap();
+    assert!(untold.starts_with("Loop's") && untold.contains("use --scheme catmull-clark"), "{untold}");
+    let told = said(&["--scheme", "catmull-clark"]).unwrap();
+    assert!(told.contains("Blender") && !told.contains("--scheme"), "{told}");
+    assert!(said(&["--scheme", "zheng-cai"]).unwrap().contains("--limit"));
+    // The surface itself is seen in every tool.
+    assert_eq!([said(&["--limit"]), said(&["--subdivide", "1"]), said(&["--quiet"])], [None, None, None]);
+    for program in [COMPARE, INTERPOLATE] {
+        let help = run(program, folder.path(), ["--help"]);
+        assert!(text(&help.stdout).contains("docs/methods.md"));
+    }
+}

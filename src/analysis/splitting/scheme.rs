@@ -8,6 +8,7 @@ use nalgebra::Complex;
 use super::star::Layout;
 use crate::error::{Error, Result};
 use crate::mesh::{Mesh, Surface};
+use crate::names;
 use crate::schemes::unified_sqrt3::{self, ALPHA_RANGE};
 use crate::schemes::{catmull_clark, doo_sabin, labsik_greiner, loop_scheme, sqrt3};
 
@@ -41,19 +42,15 @@ impl LocalScheme {
     /// # Errors
     /// [`Error::Unknown`] for another name, an `alpha` outside [`ALPHA_RANGE`], or one for a scheme without.
     pub fn new(name: &str, alpha: Option<f64>) -> Result<Self> {
-        let scheme = match name {
-            "catmull-clark" => LocalScheme::CatmullClark,
-            "loop" => LocalScheme::Loop,
-            "doo-sabin" => LocalScheme::DooSabin,
-            "sqrt3" => LocalScheme::Sqrt3 { alpha: alpha.unwrap_or(0.0) },
-            "labsik-greiner" => LocalScheme::LabsikGreiner,
-            _ => {
-                return Err(Error::Unknown(format!(
-                    "no splitting matrix for {name:?}: choose one of catmull-clark, loop, doo-sabin, sqrt3, \
-                     labsik-greiner"
-                )));
-            }
-        };
+        let all = [
+            LocalScheme::CatmullClark,
+            LocalScheme::Loop,
+            LocalScheme::DooSabin,
+            LocalScheme::Sqrt3 { alpha: alpha.unwrap_or(0.0) },
+            LocalScheme::LabsikGreiner,
+        ];
+        let scheme =
+            names::find("scheme with a splitting matrix", name, &all.map(|scheme| (scheme.name(), scheme)), &[])?;
         match (scheme, alpha) {
             (LocalScheme::Sqrt3 { alpha }, _) if !ALPHA_RANGE.contains(&alpha) => {
                 Err(Error::Unknown(format!("α = {alpha} is outside [{}, {}]", ALPHA_RANGE.start(), ALPHA_RANGE.end())))

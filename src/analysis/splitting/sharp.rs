@@ -15,7 +15,6 @@
 
 use std::fmt;
 use std::ops::RangeInclusive;
-use std::str::FromStr;
 
 use faer::Mat;
 use glam::DVec3;
@@ -92,17 +91,6 @@ impl SharpVertex {
 impl fmt::Display for SharpVertex {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
-    }
-}
-
-impl FromStr for SharpVertex {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        SharpVertex::ALL.into_iter().find(|vertex| vertex.name() == name).ok_or_else(|| {
-            let names = SharpVertex::ALL.map(SharpVertex::name).join(", ");
-            Error::Unknown(format!("no kind of vertex {name:?}: choose one of smooth, {names}"))
-        })
     }
 }
 

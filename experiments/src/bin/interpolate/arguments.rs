@@ -5,17 +5,20 @@ use std::path::PathBuf;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser};
 
-use limitlab::Result;
 use limitlab::mesh::order::Order;
 use limitlab::schemes::Refinement;
 use limitlab::solvers::Method;
-use limitlab_experiments::cli::{self, CommonFlags, MeshFlags, StopFlags};
+use limitlab::{Result, names};
+use limitlab_experiments::cli::{self, CommonFlags, MeshFlags, StopFlags, WHICH_METHOD};
 
 /// Computes the control mesh V with A V = P: the vertices P of the mesh become points of the limit surface. Unless
-/// refined by --subdivide, the faces stay, vertex for vertex, so that the result can replace the mesh in any
-/// subdivision tool.
+/// refined by --subdivide, the faces stay, vertex for vertex, so that the result can replace the mesh in a tool that
+/// subdivides by the same scheme; another scheme's surface misses the points.
+///
+/// Blender, Maya and Rhino subdivide by Catmull-Clark: for these say --scheme catmull-clark, also of a triangle mesh,
+/// which is taken for Loop unless told. The last line of a run says which tools show its surface.
 #[derive(Parser)]
-#[command(name = "interpolate", version)]
+#[command(name = "interpolate", version, after_help = WHICH_METHOD)]
 pub struct Arguments {
     /// A mesh file (.obj, .off, .ply, .usda) or a built-in name
     #[arg(value_name = "MESH")]
@@ -111,14 +114,15 @@ pub enum Choice {
 }
 
 fn choice(text: &str) -> Result<Choice> {
-    match text {
-        "auto" => Ok(Choice::Auto),
-        "two-phase" => Ok(Choice::TwoPhase),
-        "halstead" => Ok(Choice::Halstead),
-        "butterfly" => Ok(Choice::Keeping(Refinement::Butterfly)),
-        "labsik-greiner" => Ok(Choice::Keeping(Refinement::LabsikGreiner)),
-        _ => text.parse().map(Choice::Solver),
-    }
+    let mut all = vec![
+        ("auto", Choice::Auto),
+        ("two-phase", Choice::TwoPhase),
+        ("halstead", Choice::Halstead),
+        ("butterfly", Choice::Keeping(Refinement::Butterfly)),
+        ("labsik-greiner", Choice::Keeping(Refinement::LabsikGreiner)),
+    ];
+    all.extend(Method::ALL.map(|method| (method.name(), Choice::Solver(method))));
+    names::find("method", text, &all, &Method::ALIASES.map(|(alias, method)| (alias, Choice::Solver(method))))
 }
 
 fn degrees(text: &str) -> std::result::Result<f64, String> {

@@ -85,6 +85,11 @@ fn is_file_of(input: &str, output: &Path) -> bool {
     input.is_some_and(|input| output.is_some_and(|output| input == output && input.is_file()))
 }
 
+/// Whether the output is a control mesh that is not refined, as tools take it.
+fn is_control(arguments: &Arguments) -> bool {
+    !arguments.shape.limit && arguments.shape.subdivide == 0
+}
+
 fn run(arguments: &Arguments) -> Result<()> {
     if arguments.mesh.print_defects(&[&arguments.input], &arguments.common)? {
         return Ok(());
@@ -124,9 +129,9 @@ fn run(arguments: &Arguments) -> Result<()> {
         allow_replacing(&arguments.output)?;
     }
     let made = &result.made;
-    let (normals, levels) = (made.normals.as_deref(), arguments.shape.subdivide);
+    let normals = made.normals.as_deref();
     // The surface itself is its faces.
-    let is_control = !arguments.shape.limit && levels == 0;
+    let is_control = is_control(arguments);
     let subdivision = if is_control { subdivision_of(input.scheme) } else { Subdivision::None };
     // The fairest control mesh is refined, and has other edges than the file.
     let tags = match (is_control, made.surface.len() == input.surface.len()) {

@@ -2,10 +2,11 @@
 
 use glam::DVec3;
 use limitlab::Result;
-use limitlab_experiments::cli::{self, Input, number};
+use limitlab_experiments::cli::{self, Input, advice, number};
 use serde_json::{Value, json};
 
 use super::arguments::{Arguments, Choice};
+use super::is_control;
 use super::surfaces::Finished;
 use super::vertex_options::VertexOptions;
 
@@ -44,6 +45,9 @@ pub fn print_summary(
         errors.max,
         errors.mean
     ));
+    if is_control(arguments) {
+        common.remark(format_args!("its surface: {}", advice::of_tools(input.scheme)));
+    }
     common.remark(format_args!(
         "seconds: read {:.3}, assemble {:.3}, solve {:.3}, subdivide {:.3}, write {:.3}",
         input.read_seconds, seconds.assemble, seconds.solve, seconds.subdivide, seconds.write

@@ -32,8 +32,8 @@ use serde_json::json;
 
 use claims::Claim;
 use context::{Context, Item, Made};
-use limitlab::Result;
 use limitlab::error::Error;
+use limitlab::{Result, names};
 use limitlab_experiments::cli::{self, CommonFlags, Printer, Progress};
 
 /// Regenerates the papers' tables and figures with what this workbench measures beside what they print.
@@ -124,12 +124,14 @@ fn run(arguments: &Arguments) -> Result<()> {
         chosen.extend(&ITEMS);
     }
     for id in &arguments.only {
-        if let Some(item) = ITEMS.iter().find(|i| i.id == id) {
+        if let Some(item) = ITEMS.iter().find(|i| names::same(i.id, id)) {
             chosen.push(item);
         } else if let Some(claim) = claims::find(id) {
             claims.push(claim);
         } else {
-            return Err(Error::Unknown(format!("no item or claim is called \"{id}\"; see reproduce --list")));
+            let ids = ITEMS.iter().map(|i| i.id).chain(claims::all().map(|c| c.id));
+            let perhaps = names::perhaps(id, ids);
+            return Err(Error::Unknown(format!("no item or claim is called \"{id}\"{perhaps}; see reproduce --list")));
         }
     }
     let mut context = Context::new(

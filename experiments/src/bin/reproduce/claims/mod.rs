@@ -26,9 +26,9 @@ use std::fmt::Write as _;
 
 use serde_json::{Value as Json, json};
 
-use limitlab::Result;
 use limitlab::error::Error;
 use limitlab::output::write_file;
+use limitlab::{Result, names};
 use limitlab_experiments::cli::number;
 use limitlab_experiments::report::{Column, Columns, Table, readable};
 
@@ -77,7 +77,7 @@ pub fn all() -> impl Iterator<Item = &'static Claim> {
 }
 
 pub fn find(id: &str) -> Option<&'static Claim> {
-    all().find(|c| c.id == id)
+    all().find(|c| names::same(c.id, id))
 }
 
 /// Computes some claims, prints them, and holds them against the ledger in `--check`; writes nothing.
