@@ -3,6 +3,7 @@
 mod bad_input;
 mod contract;
 mod darts;
+mod guide;
 mod metadata;
 mod page;
 #[cfg(target_os = "linux")]
