@@ -49,3 +49,26 @@ fn what_is_packaged_is_small() {
     // Registries take 10 MiB of it compressed.
     assert!(bytes < 5 << 20, "{bytes} bytes");
 }
+
+#[test]
+fn the_citation_has_the_version_of_the_manifest() {
+    let citation = std::fs::read_to_string(root().join("CITATION.cff")).unwrap();
+    let version = citation.lines().find_map(|line| line.strip_prefix("version: "));
+    assert_eq!(version, Some(env!("CARGO_PKG_VERSION")));
+}
+
+/// Files that a page links to, without addresses and anchors.
+fn links(page: &str) -> impl Iterator<Item = &str> {
+    let targets = page.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    targets.filter(|to| !to.contains("://")).filter_map(|to| to.split('#').next()).filter(|to| !to.is_empty())
+}
+
+#[test]
+fn links_of_the_pages_lead_to_files() {
+    for page in ["README.md", "CONTRIBUTING.md", "docs/guide.md", "docs/methods.md"] {
+        let path = root().join(page);
+        let text = std::fs::read_to_string(&path).unwrap();
+        let lost: Vec<&str> = links(&text).filter(|to| !path.parent().unwrap().join(to).exists()).collect();
+        assert!(links(&text).count() > 0 && lost.is_empty(), "{page}: {lost:?}");
+    }
+}

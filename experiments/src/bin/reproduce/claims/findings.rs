@@ -83,4 +83,17 @@ mod tests {
             assert!(find(name).is_some(), "{name}");
         }
     }
+
+    #[test]
+    fn the_readme_lists_the_findings_with_their_places() {
+        let readme = include_str!("../../../../../README.md");
+        for heading in headings() {
+            let (number, title) = heading.split_once(". ").unwrap();
+            // As the anchors of rendered Markdown.
+            let kept = heading.to_lowercase().replace(' ', "-");
+            let anchor: String = kept.chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '_')).collect();
+            let line = format!("{number}. [{title}](reports/built-in/findings.md#{anchor})");
+            assert!(readme.lines().any(|l| l == line), "{line}");
+        }
+    }
 }
