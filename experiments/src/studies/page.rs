@@ -128,7 +128,7 @@ fn range(problem: &Problem, rows: &[MethodRow]) -> [f64; 2] {
 /// `count` whole numbers from 0 to `last`, evenly, with both ends, or all of them.
 fn spread(last: usize, count: usize) -> Vec<usize> {
     let parts = last.min(count - 1);
-    (0..=parts).map(|k| if parts == 0 { 0 } else { (k * last + parts / 2) / parts }).collect()
+    (0..=parts).map(|k| (k * last + parts / 2).checked_div(parts).unwrap_or(0)).collect()
 }
 
 /// Runs the method of a row once more, and keeps the errors at the vertices of some iterates.

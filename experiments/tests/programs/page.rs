@@ -54,7 +54,7 @@ fn assert_solid(solid: &Value) -> (usize, usize) {
     assert!(corners.iter().all(|c| ((c & !(1 << 31)) as usize) < n));
     assert!(corners.last().unwrap() >> 31 == 1);
     let creases = u32s(&solid["creases"]);
-    assert!(creases.len() % 2 == 0 && creases.iter().all(|&v| (v as usize) < n));
+    assert!(creases.len().is_multiple_of(2) && creases.iter().all(|&v| (v as usize) < n));
     (n, corners.iter().filter(|&c| c >> 31 == 1).count())
 }
 
