@@ -100,7 +100,7 @@ fn vertices_that_are_not_smooth_have_their_own_tables() {
     let planes: Vec<&Value> = (0..2).map(|k| &object["rows"][k]["sectors"][0]["tangent_plane"]).collect();
     assert_eq!(planes, [&Value::from(true), &Value::from(false)]);
     for (arguments, told) in [
-        (&["--at", "edge"][..], "smooth, boundary, crease, corner, dart"),
+        (&["--at", "edge"][..], "smooth, boundary, crease, corner or dart"),
         (&["--at", "dart", "--valence", "1..3"], "3..100"),
         (&["--at", "corner", "--valence", "0"], "1..100"),
         (
