@@ -289,7 +289,8 @@ mod tests {
             assert_eq!(order.to_string().parse::<Order>().unwrap(), order);
         }
         assert_eq!("random".parse::<Order>().unwrap(), Order::Random(1));
-        for bad in ["", "RCM", "random:", "random:x", "random:1:2", "bfs:3"] {
+        assert_eq!("RCM".parse::<Order>().unwrap(), Order::Rcm);
+        for bad in ["", "random:", "random:x", "random:1:2", "bfs:3"] {
             assert!(bad.parse::<Order>().is_err(), "{bad}");
         }
     }

@@ -195,7 +195,8 @@ fn boundary_treatments_are_read_and_written() {
     for b in [Boundary::Refuse, Boundary::AsInterior] {
         assert_eq!(b.to_string().parse::<Boundary>().unwrap(), b);
     }
-    assert!("".parse::<Boundary>().is_err() && "Refuse".parse::<Boundary>().is_err());
+    assert_eq!("As_Interior".parse::<Boundary>().unwrap(), Boundary::AsInterior);
+    assert!("".parse::<Boundary>().is_err() && "refused".parse::<Boundary>().is_err());
 }
 
 #[test]
