@@ -2,11 +2,12 @@
 //! it.
 
 use glam::DVec3;
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, Schur};
 
 use limitlab::Result;
 use limitlab::analysis::dense;
 use limitlab::assemble::{GeneralSystem, Stages};
+use limitlab::error::Error;
 use limitlab::mesh::Surface;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::system::sweep;
@@ -73,9 +74,9 @@ impl Whole {
     /// The complex eigenvalues of A.
     ///
     /// # Errors
-    /// As [`dense::complex_eigenvalues`].
+    /// If the computation does not converge.
     pub fn eigenvalues(&self) -> Result<Vec<Complex<f64>>> {
-        dense::complex_eigenvalues(self.system.matrix())
+        eigenvalues(self.dense())
     }
 
     /// The spectral radius of an iteration's error matrix.
@@ -98,6 +99,21 @@ impl Whole {
             }
         })
     }
+}
+
+/// The eigenvalues of a matrix that is not symmetric, by one thread, so that a search takes the same way on any machine.
+///
+/// # Errors
+/// If the computation does not converge.
+fn eigenvalues(matrix: DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
+    /// Of the QR algorithm; some defective matrices need more than machine precision allows.
+    const TOLERANCE: f64 = 1e-14;
+    const ITERATIONS: usize = 10_000;
+    let n = matrix.nrows();
+    let schur = Schur::try_new(matrix, TOLERANCE, ITERATIONS);
+    let schur =
+        schur.ok_or_else(|| Error::Computation(format!("the eigenvalues of a matrix of order {n} are not found")))?;
+    Ok(schur.complex_eigenvalues().iter().copied().collect())
 }
 
 #[cfg(test)]
