@@ -5,12 +5,12 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::collection::collection;
+use chacha20::ChaCha8Rng;
 use limitlab::mesh::io::{self, Loaded};
 use limitlab::mesh::topology::IrregularEdge;
 use limitlab::mesh::validate::{Boundary, DefectKind, Validation, validate};
 use limitlab::mesh::{Faces, Mesh, Surface, Topology, builtin};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 /// One row of the MANIFEST.
 struct Row {

@@ -24,8 +24,8 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::inertia::inertia;

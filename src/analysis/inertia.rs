@@ -4,6 +4,7 @@
 //! S = H^½ M H^½ is similar to A (or Dm^-½ M Dm^-½, Dm = diag M, to D⁻¹A). If S − σ has a Cholesky factorization, all
 //! eigenvalues exceed σ; if LDLᵀ, its negative pivots count the eigenvalues below σ (Sylvester's law of inertia).
 
+use chacha20::ChaCha8Rng;
 use faer::Par;
 use faer::Side;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -13,7 +14,6 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::subspace_iteration::End;
 use super::symmetric::{SymmetricForm, symmetric};

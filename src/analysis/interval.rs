@@ -14,8 +14,8 @@
 
 use std::sync::Arc;
 
+use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::lanczos::{self, Matrix, SelfAdjoint};
 use super::symmetric::SymmetricForm;

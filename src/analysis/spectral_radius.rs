@@ -1,9 +1,9 @@
 //! Spectral radii of iterations whose error matrix is not symmetric: Gauss-Seidel, SOR, SSOR.
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use nalgebra::{Complex, DMatrix, DVector, Schur};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::dense;
 use crate::error::{Error, Result};

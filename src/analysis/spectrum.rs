@@ -1,9 +1,9 @@
 //! The ends of the spectra of A and D⁻¹A, dense for small systems and by Lanczos for large ones; what the data
 //! excite of them; spectral radii of in-place sweeps.
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::dirichlet_neumann::{alternation_is_all, bracket};
 use super::inertia::inertia;

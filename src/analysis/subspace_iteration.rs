@@ -11,9 +11,9 @@
 //! 6 N p² operations each time the block is made orthonormal. All sums are taken in chunks of fixed size and in
 //! their order, so results do not depend on the number of threads.
 
+use chacha20::ChaCha8Rng;
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use crate::assemble::Csr;
 use crate::error::{Error, Result};

@@ -103,9 +103,9 @@ impl Tridiagonal<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chacha20::ChaCha8Rng;
     use nalgebra::{DMatrix, SymmetricEigen};
     use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn the_second_difference_in_closed_form() {

@@ -4,9 +4,9 @@
 
 use std::f64::consts::{PI, TAU};
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use rand::{RngExt, SeedableRng, seq::SliceRandom};
-use rand_chacha::ChaCha8Rng;
 
 use super::incidence::{next_in, prev_in};
 use super::topology::{NONE, Topology};

@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 use std::fmt;
 use std::str::FromStr;
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::frame::distance;
 use super::incidence::next_in;

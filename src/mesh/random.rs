@@ -1,9 +1,9 @@
 //! Random meshes from a seed, for tests and measurements: closed triangulations and polygon meshes of several shapes,
 //! and what becomes of a closed mesh by holes, creases, corners, darts and semi-sharp edges.
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use rand::{Rng, RngExt, SeedableRng, seq::SliceRandom};
-use rand_chacha::ChaCha8Rng;
 
 use super::boundary::Boundary;
 use super::features::{Rule, SHARP, Tags};

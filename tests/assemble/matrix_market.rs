@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use limitlab::Error;
 use limitlab::assemble::matrix_market::{
@@ -14,7 +15,6 @@ use limitlab::output::write_file;
 use limitlab::schemes::Scheme;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use sprs::io::read_matrix_market;
 use tempfile::{TempDir, tempdir};
 

@@ -1,5 +1,6 @@
 //! Random meshes that are small enough for dense matrices, random points, special shapes.
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use limitlab::assemble::LimitSystem;
 use limitlab::mesh::generate::{
@@ -9,7 +10,6 @@ use limitlab::mesh::order::Order;
 use limitlab::mesh::{Faces, Mesh, Surface, Topology, builtin};
 use limitlab::schemes::Scheme;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 pub fn topology(mesh: &Mesh) -> Topology {
     Topology::new(&mesh.faces, mesh.len())

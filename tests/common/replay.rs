@@ -2,9 +2,9 @@
 
 use std::fs;
 
+use chacha20::ChaCha8Rng;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 /// Checks the committed inputs of a target and then `mutants` of them. The last line printed names what failed.
 pub fn replay(target: &str, mutants: u64, check: impl Fn(&[u8])) {

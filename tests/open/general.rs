@@ -1,5 +1,6 @@
 //! Methods on all of the matrix where darts and semi-sharp vertices leave it without symmetry, and its complex spectrum.
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use limitlab::Error;
 use limitlab::analysis::comparison::with_spectrum;
@@ -17,7 +18,6 @@ use limitlab::solvers::{Accelerated, Method, Outcome, Stop, run};
 use nalgebra::{DMatrix, DVector, Schur};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::random_semi_sharp;
 use crate::common::meshes::built_in;

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use limitlab::Error;
 use limitlab::interpolate::lin_luo::limit::limits;
@@ -14,7 +15,6 @@ use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Faces, Mesh, Surface};
 use limitlab::schemes::{Refinement, Scheme, sqrt3, unified_sqrt3};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::naive::{Creased, edge, faces_by_edge};
 use super::{grid, open, random_creased};

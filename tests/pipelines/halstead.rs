@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use limitlab::assemble::LimitSystem;
 use limitlab::interpolate::halstead::{Fairness, LEVELS, Weights, fit, follow};
@@ -14,7 +15,6 @@ use limitlab::mesh::{Faces, Mesh, Surface, builtin};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
 use limitlab::solvers::{Method, Outcome, Stop};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use crate::common::pipelines::{distance, noisy, noisy_surface};
 use crate::open::{grid, open, random_creased};

@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use limitlab::mesh::Surface;
 use limitlab::schemes::{Refinement, butterfly, labsik_greiner, sqrt3, unified_sqrt3};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::ROUNDING;
 use super::meshes::*;

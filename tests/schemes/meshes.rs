@@ -1,9 +1,9 @@
 //! Small closed meshes with known shapes, irregular ones from a seed, and what the tests ask of a mesh.
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use limitlab::mesh::{Faces, Mesh, Surface};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 pub use crate::common::meshes::distance;
 

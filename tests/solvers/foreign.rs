@@ -3,6 +3,7 @@
 
 use std::f64::consts::PI;
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use limitlab::Error;
 use limitlab::analysis::comparison::{Entry, compare, entries};
@@ -16,7 +17,6 @@ use limitlab::solvers::{Accelerated, Errors, Failure, Iterate, Method, Outcome, 
 use nalgebra::DMatrix;
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::methods::{checked, residual};
 use crate::common::meshes::random_points;

@@ -9,9 +9,9 @@ pub use cholesky::{Cholesky, CholeskyForm};
 pub use lu::SparseLu;
 pub use second_opinion::SecondOpinion;
 
+use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::iteration::{Errors, Failure, Iterate, Outcome, WarmStart};
 use super::system::{Rows, System};

@@ -1,9 +1,9 @@
 //! PIA on meshes with darts, of which no proof of convergence is known: a search for divergence by hill climbing over
 //! tags and edges, and the same for SOR, which does diverge.
 
+use chacha20::ChaCha8Rng;
 use nalgebra::Complex;
 use rand::{Rng, RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use limitlab::Result;
