@@ -17,12 +17,12 @@ use limitlab::mesh::{Faces, Incidence, Mesh, Surface, builtin::builtin, noise::a
 use limitlab::schemes::Scheme;
 use limitlab::solvers::chebyshev::Recurrence;
 use limitlab::solvers::coloured::Coloured;
-use limitlab::solvers::gauss_seidel::{Sor, by_colours, in_waves};
+use limitlab::solvers::gauss_seidel::{Sor, by_colours, by_colours_watched, in_waves};
 use limitlab::solvers::iteration::Iterate;
 use limitlab::solvers::local_update::{Editor, decay};
 use limitlab::solvers::system::{Rows, System};
 use limitlab::solvers::wavefront::Wavefront;
-use limitlab::solvers::{Method, Outcome, Stop, mixed, run, solve};
+use limitlab::solvers::{Method, Outcome, Recorded, Stop, mixed, run, solve};
 
 fn mesh(name: &str) -> Mesh {
     let mut mesh = builtin(name).expect("a built-in mesh");
@@ -382,6 +382,19 @@ fn gauss_seidel_by_colours_solves_and_knows_when_it_cannot() {
     let (report, error) = solve("irregular-quad:3000", 1e-10);
     assert_eq!(report.outcome, Outcome::Converged);
     assert!(error <= 1.01e-10 && report.last().max <= 1e-10, "{error:e}");
+    // A watch may stop at the second look, after eight sweeps.
+    let case = both("irregular-quad:300", surface("irregular-quad:300"), Scheme::CatmullClark);
+    let numbering = in_colours(case.surface.faces(), case.surface.incidence());
+    let operator = Operator::in_order(&case.surface, case.scheme, Some(&numbering)).expect("an operator");
+    let points = numbering.there(case.surface.positions());
+    let stop = Stop { tolerance: 1e-10, max_iterations: 1000 };
+    let mut seen = Vec::new();
+    let (control, report) = by_colours_watched(&operator, &points, 1.0, &stop, &mut |step| {
+        seen.push(Recorded { iteration: step.iteration, errors: step.errors });
+        if step.iteration < 8 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    assert_eq!((report.outcome, report.iterations, report.history), (Outcome::Stopped, 8, seen));
+    assert_eq!(control, by_colours(&operator, &points, 1.0, &Stop { max_iterations: 8, ..stop }).0);
     // A singular matrix with noisy points, and a tolerance below rounding.
     for (name, tolerance) in [("cube", 1e-10), ("irregular-quad:3000", 1e-18)] {
         let (report, _) = solve(name, tolerance);

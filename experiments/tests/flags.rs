@@ -30,8 +30,12 @@ const ON_MESHES: &[Flag] = &[
     ("--boundary", "as-interior|refuse|maybe"),
     ("--defects", SWITCH),
 ];
-const STOP: &[Flag] =
-    &[("--tol", "1e-3|1e-8|0.5|10|0|-1|nan"), ("--tol-absolute", "1e-3|1e-6|inf"), ("--max-iter", "0|1|50|-5")];
+const STOP: &[Flag] = &[
+    ("--tol", "1e-3|1e-8|0.5|10|0|-1|nan"),
+    ("--tol-absolute", "1e-3|1e-6|inf"),
+    ("--max-iter", "0|1|50|-5"),
+    ("--monitor", SWITCH),
+];
 const FOLDER: &[Flag] = &[("--out", "out|new/folder|closed.off|")];
 const METHODS: &str = "lu|jacobi,pia|sor,ssor,gauss-seidel|cg,pcg-ic0|pia,pia||no-such|auto,cg";
 const ORDERS: &str = "file|reverse|bfs|rcm|morton|valence|multicolour|random:3|no-such";
@@ -94,7 +98,7 @@ const PROGRAMS: &[Program] = &[
             ON_MESHES,
             STOP,
             FOLDER,
-            &[("--method", "jacobi|pia,sor|sor|cg||no-such"), ("--order", ORDERS)],
+            &[("--method", "jacobi|pia,sor|sor|cg||no-such"), ("--order", ORDERS), ("--history", "0.7|0.5,0.9|0|x")],
         ],
     },
     Program {

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use crate::assemble::LimitSystem;
 use crate::solvers::system::Rows;
-use crate::solvers::{Errors, Failure, Iterate, Method, Outcome, Report, Solution, Stop, solve};
+use crate::solvers::{Errors, Failure, Iterate, Method, Outcome, Recorded, Report, Solution, Stop, solve};
 
 /// Makes an iteration for a system and its points, at V = P.
 pub type Start<'s> =
@@ -77,7 +77,7 @@ impl Own<'_> {
                 (confirmed.points().to_vec(), report)
             }
             Err(Failure { outcome, detail }) => {
-                let history = vec![rows.errors(system, points, points)];
+                let history = vec![Recorded { iteration: 0, errors: rows.errors(system, points, points) }];
                 (points.to_vec(), Report { outcome, iterations: 0, history, detail: Some(detail) })
             }
         };

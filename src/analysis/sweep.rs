@@ -69,6 +69,15 @@ impl OmegaSweep {
     }
 }
 
+/// What is told of a sweep as it goes.
+#[derive(Clone, Copy, Debug)]
+pub enum SweepEvent<'a> {
+    /// An iterate of a method, as given with the grid, at an ω; first the start.
+    Iterate(Method<'static>, f64, &'a Step<'a>),
+    /// A run has ended: the rows that are there so far, in the order of the grids.
+    Row(&'a OmegaSweep),
+}
+
 /// Rounding level of the errors of points of size `diagonal`: histories are not fitted below.
 pub fn rounding_floor(diagonal: f64) -> f64 {
     64.0 * f64::EPSILON * diagonal
@@ -78,8 +87,7 @@ pub fn rounding_floor(diagonal: f64) -> f64 {
 /// grid.
 ///
 /// `grids` pairs a method (Jacobi, PIA or SOR) with its values of ω; `order` is the vertex order of SOR;
-/// `floor` the rounding level of the errors; `done` is called after each run, with the rows that are there so far, in the
-/// order of the grids.
+/// `floor` the rounding level of the errors; `watch` is told of every iterate and of every row, from all threads.
 ///
 /// # Errors
 /// If an eigenvalue computation does not converge.
@@ -93,7 +101,7 @@ pub fn sweep(
     order: Option<&[u32]>,
     stop: &Stop,
     floor: f64,
-    done: &(dyn Fn(&OmegaSweep) + Sync),
+    watch: &(dyn Fn(SweepEvent) + Sync),
 ) -> Result<OmegaSweep> {
     let mut thresholds = Vec::new();
     for (method, _) in grids {
@@ -130,10 +138,12 @@ pub fn sweep(
         let Some(swept) = method.in_order(order).at_omega(omega) else {
             panic!("{method} is not swept over ω");
         };
-        let watch = &mut |_: &Step| ControlFlow::Continue(());
-        let report = run_from(system, points, start, swept, stop, watch).report;
+        let told = &mut |step: &Step| {
+            watch(SweepEvent::Iterate(method, omega, step));
+            ControlFlow::Continue(())
+        };
+        let report = run_from(system, points, start, swept, stop, told).report;
         let predicted = predicted_rate(system, spectra, swept)?;
-        let maxima: Vec<f64> = report.history.iter().map(|e| e.max).collect();
         let data = thresholds.iter().find(|t| t.method == method).and_then(|t| t.data);
         let row = SweepRow {
             method,
@@ -142,7 +152,7 @@ pub fn sweep(
             iterations: report.iterations,
             predicted_rho: predicted.unwrap_or(f64::NAN),
             predicted_rho_data: data.map(|d| d.radius(omega)),
-            observed_rate: observed_rate(&maxima, floor),
+            observed_rate: observed_rate(&report.maxima(), floor),
             errors: report.last(),
         };
         let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
@@ -150,7 +160,7 @@ pub fn sweep(
         let place = numbers.partition_point(|&n| n < number);
         numbers.insert(place, number);
         sweep.rows.insert(place, row);
-        done(sweep);
+        watch(SweepEvent::Row(sweep));
         Ok(())
     })?;
     Ok(found.into_inner().unwrap_or_else(PoisonError::into_inner).0)

@@ -26,4 +26,6 @@ pub mod surface;
 pub mod thall;
 pub mod zheng_cai;
 
-pub use solver::{Interpolator, Options, Tolerance, interpolate, interpolate_watched, limit_points, solve_stored};
+pub use solver::{
+    Interpolator, Options, Tolerance, Watch, interpolate, interpolate_watched, limit_points, solve_stored,
+};

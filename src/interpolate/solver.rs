@@ -56,7 +56,7 @@ use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::gmres::gmres;
 use crate::solvers::mixed::{self, Workspace};
 use crate::solvers::system::Rows;
-use crate::solvers::{Iterate, Method, Outcome, Report, Solution, Step, Stop, run, run_watched, solve};
+use crate::solvers::{Errors, Iterate, Method, Outcome, Recorded, Report, Solution, Step, Stop, run_watched, solve};
 
 /// From this many vertices on, the rows of the operator are breadth first. Tuned.
 pub const ORDERED: usize = 200_000;
@@ -152,11 +152,21 @@ impl Options<'_> {
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn interpolate(surface: &Surface, scheme: Scheme, options: &Options) -> Result<Solution> {
-    interpolate_watched(surface, scheme, options, &mut |_| ControlFlow::Continue(()))
+    interpolate_watched(surface, scheme, options, &mut unwatched)
 }
 
-/// As [`interpolate`], with a watch that sees every iterate of a method that is named: all vertices, or those of the
-/// [block](Stages::block).
+/// Sees iterates, each with the name of the method that is at work, and says whether to go on: one that stops a method
+/// ends the run.
+pub type Watch<'w> = dyn FnMut(&'static str, &Step) -> ControlFlow<()> + Send + 'w;
+
+/// The watch of who does not look.
+pub(super) fn unwatched(_: &'static str, _: &Step) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// As [`interpolate`], with a watch. Of a method that is named it sees every iterate: all vertices, or those of the
+/// [block](Stages::block). Of `auto` it sees the iterates whose errors are known, in the order of the
+/// operator's rows, and where some vertices are known, the difference X.
 ///
 /// # Errors
 /// As [`interpolate`].
@@ -167,7 +177,7 @@ pub fn interpolate_watched(
     surface: &Surface,
     scheme: Scheme,
     options: &Options,
-    watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
+    watch: &mut Watch,
 ) -> Result<Solution> {
     let stop = options.stop(surface.positions())?;
     let marks = options.interpolated;
@@ -180,7 +190,7 @@ pub fn interpolate_watched(
     let setup_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let mut points = Vec::new();
-    let (method, report) = interpolator.solve_into(surface.positions(), &mut points, &stop);
+    let (method, report) = interpolator.solve_into(surface.positions(), &mut points, &stop, watch);
     let solve_seconds = start.elapsed().as_secs_f64();
     let found = Solution { points, method, report, setup_seconds, solve_seconds, fill: None };
     let unreachable = || Failed::new((surface, scheme), marks, false, &found.report, &stop).unreachable().is_some();
@@ -245,12 +255,14 @@ pub fn limit_points(surface: &Surface, scheme: Scheme) -> Result<Vec<DVec3>> {
 }
 
 /// The last two steps of the chain on a stored system of any origin: conjugate gradients, LDLᵀ where they make no progress.
+/// The watch sees every iterate.
 ///
 /// # Panics
 /// If there is not one point a vertex.
-pub fn solve_stored(system: &LimitSystem, points: &[DVec3], stop: &Stop) -> Solution {
-    let found = run(system, points, Method::Cg, stop);
-    if no_progress(found.report.outcome) { run(system, points, Method::Ldlt, stop) } else { found }
+pub fn solve_stored(system: &LimitSystem, points: &[DVec3], stop: &Stop, watch: &mut Watch) -> Solution {
+    let mut by = |method: Method| run_watched(system, points, method, stop, &mut |step| watch(method.name(), step));
+    let found = by(Method::Cg);
+    if no_progress(found.report.outcome) { by(Method::Ldlt) } else { found }
 }
 
 /// Whether an iteration ended without getting nearer.
@@ -265,9 +277,10 @@ fn by_method(
     marks: Option<&[bool]>,
     method: Method,
     stop: &Stop,
-    watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
+    watch: &mut Watch,
 ) -> Result<Solution> {
     let start = Instant::now();
+    let watch = &mut |step: &Step| watch(method.name(), step);
     let stages = Stages::new(surface, scheme, marks)?;
     if let Some(stars) = stages.stars() {
         if method.needs_symmetry() {
@@ -404,15 +417,21 @@ impl Interpolator {
         if !parallel::all(control.len(), |v| control[v].is_finite()) {
             control.clear();
         }
-        self.solve_into(points, control, stop).1
+        self.solve_into(points, control, stop, &mut unwatched).1
     }
 
     /// As [`solve`](Self::solve), with the name of the method that came to the end.
-    fn solve_into(&mut self, points: &[DVec3], control: &mut Vec<DVec3>, stop: &Stop) -> (&'static str, Report) {
+    fn solve_into(
+        &mut self,
+        points: &[DVec3],
+        control: &mut Vec<DVec3>,
+        stop: &Stop,
+        watch: &mut Watch,
+    ) -> (&'static str, Report) {
         match self.stars.take() {
-            None => self.solve_block(points, control, stop),
+            None => self.solve_block(points, control, stop, watch),
             Some(stars) => {
-                let found = self.solve_with(&stars, points, control, stop);
+                let found = self.solve_with(&stars, points, control, stop, watch);
                 self.stars = Some(stars);
                 found
             }
@@ -420,13 +439,14 @@ impl Interpolator {
     }
 
     /// With darts and semi-sharp vertices D beside the smooth ones S: `(A_DD − A_DS A_SS⁻¹ A_SD) V_D` is known by a solution
-    /// on S for each product, and V_D is found by GMRES.
+    /// on S for each product, and V_D is found by GMRES. The watch sees all vertices at the end of each round.
     fn solve_with(
         &mut self,
         stars: &StarRows,
         points: &[DVec3],
         control: &mut Vec<DVec3>,
         stop: &Stop,
+        watch: &mut Watch,
     ) -> (&'static str, Report) {
         /// What the solutions on S are asked for, in parts of what is needed.
         const PART: f64 = 0.1;
@@ -447,17 +467,19 @@ impl Interpolator {
         let count = points.len() as f64;
         let mut round = 0;
         loop {
-            let (method, found) = self.solve_block(&held, control, &inner);
+            let (method, found) = self.solve_block(&held, control, &inner, &mut unwatched);
             iterations += found.iterations;
             let residual: Vec<DVec3> = wanted.iter().zip(stars.product(control)).map(|(&p, ax)| p - ax).collect();
             let mut errors = found.last();
             errors.mean += residual.iter().map(|r| r.length()).sum::<f64>() / count;
             errors.max =
                 residual.iter().map(|r| r.length()).fold(errors.max, |a, b| if b > a || b.is_nan() { b } else { a });
-            history.push(errors);
+            history.push(Recorded { iteration: iterations, errors });
+            let told = watch(method, &Step { iteration: iterations, errors, points: control });
             let met = errors.max <= stop.tolerance;
-            if met || no_progress(found.outcome) || round == ROUNDS {
+            if met || no_progress(found.outcome) || told.is_break() || round == ROUNDS {
                 let outcome = match found.outcome {
+                    Outcome::Converged if !met && told.is_break() => Outcome::Stopped,
                     Outcome::Converged if !met => Outcome::Stagnated,
                     other => other,
                 };
@@ -471,7 +493,8 @@ impl Interpolator {
                         held[v as usize] = x;
                     }
                     moved.clear();
-                    let (_, found) = self.solve_block(&held, &mut moved, &Stop { tolerance: DIRECTION, ..*stop });
+                    let inner = Stop { tolerance: DIRECTION, ..*stop };
+                    let (_, found) = self.solve_block(&held, &mut moved, &inner, &mut unwatched);
                     iterations += found.iterations;
                     let error = found.last().max;
                     if no_progress(found.outcome) && (error.is_nan() || error > DIRECTION.sqrt()) {
@@ -493,12 +516,18 @@ impl Interpolator {
     }
 
     /// The smooth vertices, all others held.
-    fn solve_block(&mut self, points: &[DVec3], control: &mut Vec<DVec3>, stop: &Stop) -> (&'static str, Report) {
+    fn solve_block(
+        &mut self,
+        points: &[DVec3],
+        control: &mut Vec<DVec3>,
+        stop: &Stop,
+        watch: &mut Watch,
+    ) -> (&'static str, Report) {
         let n = self.operator.len();
         assert!(points.len() == n && (control.is_empty() || control.len() == n), "one point a vertex");
         let cold = control.is_empty();
         if self.numbering.is_none() && self.free.is_none() {
-            return chain(&self.operator, points, control, &mut self.workspace, stop);
+            return chain(&self.operator, points, control, &mut self.workspace, stop, watch);
         }
         let points: &[DVec3] = match self.curves.is_empty() {
             true => points,
@@ -530,9 +559,15 @@ impl Interpolator {
             }
             None => self.iterate.clone_from(control),
         }
-        let (method, mut report) = match &self.free {
-            None => chain(&self.operator, points, &mut self.iterate, &mut self.workspace, stop),
+        let (method, report) = match &self.free {
+            None => chain(&self.operator, points, &mut self.iterate, &mut self.workspace, stop, watch),
             Some(free) => {
+                // The mean is that of the vertices in question.
+                let share = n as f64 / free.iter().filter(|free| **free).count().max(1) as f64;
+                let of_block = |errors: Errors| Errors { mean: share * errors.mean, ..errors };
+                let watch = &mut |method: &'static str, step: &Step| {
+                    watch(method, &Step { errors: of_block(step.errors), ..*step })
+                };
                 self.right.resize(n, DVec3::ZERO);
                 self.rows.residual(&self.operator, points, points, &mut self.right, |i, e, right, _| {
                     *right = if free[i] { e } else { DVec3::ZERO };
@@ -540,16 +575,13 @@ impl Interpolator {
                 if !cold {
                     parallel::change(&mut self.iterate, |i, x| *x = if free[i] { *x - points[i] } else { DVec3::ZERO });
                 }
-                let found = chain(&self.operator, &self.right, &mut self.iterate, &mut self.workspace, stop);
+                let (operator, right) = (&self.operator, &self.right);
+                let (method, mut report) = chain(operator, right, &mut self.iterate, &mut self.workspace, stop, watch);
                 parallel::change(&mut self.iterate, |i, x| *x += points[i]);
-                found
+                report.history.iter_mut().for_each(|recorded| recorded.errors = of_block(recorded.errors));
+                (method, report)
             }
         };
-        if let Some(free) = &self.free {
-            // The mean is that of the vertices in question.
-            let share = n as f64 / free.iter().filter(|free| **free).count().max(1) as f64;
-            report.history.iter_mut().for_each(|errors| errors.mean *= share);
-        }
         match &self.numbering {
             Some(numbering) => {
                 if cold {
@@ -571,13 +603,15 @@ fn chain(
     control: &mut Vec<DVec3>,
     workspace: &mut Workspace,
     stop: &Stop,
+    watch: &mut Watch,
 ) -> (&'static str, Report) {
-    let report = mixed::solve_from(operator, points, control, workspace, stop);
+    let by_mixed = &mut |step: &Step| watch("chebyshev", step);
+    let report = mixed::solve_from(operator, points, control, workspace, stop, by_mixed);
     if !matches!(report.outcome, Outcome::Stagnated | Outcome::Diverged) {
         return ("chebyshev", report);
     }
     let mut cg = ConjugateGradient::new(operator, points, Preconditioner::weights(operator));
-    let report = solve(&mut cg, stop, &mut |_| ControlFlow::Continue(()));
+    let report = solve(&mut cg, stop, &mut |step| watch("cg", step));
     control.copy_from_slice(cg.points());
     ("cg", report)
 }

@@ -144,6 +144,22 @@ pub struct Auxiliary {
 /// # Panics
 /// If `interpolated` has not one entry a vertex, or an order names a vertex that the mesh lacks.
 pub fn auxiliary(surface: &Surface, interpolated: Option<&[bool]>, phase: &PhaseOne) -> Result<Auxiliary> {
+    auxiliary_watched(surface, interpolated, phase, &mut |_, _| ())
+}
+
+/// As [`auxiliary`], with a watch that sees the vertices with the number of sweeps before, first the start.
+///
+/// # Errors
+/// As [`auxiliary`].
+///
+/// # Panics
+/// As [`auxiliary`].
+pub fn auxiliary_watched(
+    surface: &Surface,
+    interpolated: Option<&[bool]>,
+    phase: &PhaseOne,
+    watch: &mut dyn FnMut(usize, &[DVec3]),
+) -> Result<Auxiliary> {
     Refinement::DooSabin.check(surface)?;
     let mesh = surface.mesh();
     let free = free(surface, interpolated)?;
@@ -156,6 +172,7 @@ pub fn auxiliary(surface: &Surface, interpolated: Option<&[bool]>, phase: &Phase
     };
     let mut updates = Vec::new();
     let mut passed = false;
+    watch(0, &system.points);
     while updates.len() < phase.max_iterations && !passed {
         system.sum_faces();
         let moves = |v: &usize| free.as_ref().is_none_or(|free| free[*v]);
@@ -177,6 +194,7 @@ pub fn auxiliary(surface: &Surface, interpolated: Option<&[bool]>, phase: &Phase
             }
         };
         updates.push(largest);
+        watch(updates.len(), &system.points);
         passed = largest <= tolerance;
     }
     Ok(Auxiliary { surface: surface.with_positions(system.points), updates, passed })

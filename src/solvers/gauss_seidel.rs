@@ -4,10 +4,14 @@
 //! Gauss-Seidel); the order changes the rate (Zheng-Cai §5). A sweep reads A once; testing the error of the
 //! result reads it again. One array of N points.
 
+use std::ops::ControlFlow;
+
 use glam::DVec3;
 
 use super::coloured::Coloured;
-use super::iteration::{Errors, Failure, Iterate, Outcome, PATIENCE, PROGRESS, Report, Stop, WarmStart};
+use super::iteration::{
+    Errors, Failure, Iterate, Outcome, PATIENCE, PROGRESS, Recorded, Report, Step, Stop, WarmStart,
+};
 use super::system::{Rows, System, sweep};
 use super::wavefront::Wavefront;
 use crate::assemble::Operator;
@@ -70,7 +74,7 @@ const LOOK: usize = 8;
 /// If there is not one point a vertex.
 pub fn in_waves(operator: &Operator, points: &[DVec3], omega: f64, stop: &Stop) -> (Vec<DVec3>, Report) {
     let wavefront = Wavefront::new(operator);
-    in_looks(operator, points, stop, |count, x| {
+    in_looks(operator, points, stop, &mut |_| ControlFlow::Continue(()), |count, x| {
         wavefront.relax(omega, count, points, x);
     })
 }
@@ -82,8 +86,22 @@ pub fn in_waves(operator: &Operator, points: &[DVec3], omega: f64, stop: &Stop) 
 /// # Panics
 /// If there is not one point a vertex.
 pub fn by_colours(operator: &Operator, points: &[DVec3], omega: f64, stop: &Stop) -> (Vec<DVec3>, Report) {
+    by_colours_watched(operator, points, omega, stop, &mut |_| ControlFlow::Continue(()))
+}
+
+/// As [`by_colours`], with a watch that sees the iterate at each look, and may stop the run.
+///
+/// # Panics
+/// As [`by_colours`].
+pub fn by_colours_watched(
+    operator: &Operator,
+    points: &[DVec3],
+    omega: f64,
+    stop: &Stop,
+    watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
+) -> (Vec<DVec3>, Report) {
     let coloured = Coloured::new(operator);
-    in_looks(operator, points, stop, |count, x| {
+    in_looks(operator, points, stop, watch, |count, x| {
         coloured.relax(omega, count, points, x);
     })
 }
@@ -93,19 +111,21 @@ fn in_looks(
     operator: &Operator,
     points: &[DVec3],
     stop: &Stop,
+    watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
     relax: impl Fn(usize, &mut [DVec3]),
 ) -> (Vec<DVec3>, Report) {
     let mut rows = Rows::new(points.len());
     let mut x = points.to_vec();
-    let mut history: Vec<Errors> = Vec::new();
+    let mut history: Vec<Recorded> = Vec::new();
     let (mut iterations, mut count) = (0, LOOK);
     // The smallest error that was progress, and the sweeps before it.
     let mut progress = (f64::INFINITY, 0);
     let outcome = loop {
         let errors = rows.errors(operator, points, &x);
-        let before = history.last().map(|e| e.max);
-        history.push(errors);
-        if let Some(outcome) = stop.verdict(errors.max, iterations) {
+        let before = history.last().map(|e| e.errors.max);
+        history.push(Recorded { iteration: iterations, errors });
+        let told = watch(&Step { iteration: iterations, errors, points: &x });
+        if let Some(outcome) = stop.verdict(errors.max, iterations, told) {
             break outcome;
         }
         if errors.max < (1.0 - PROGRESS) * progress.0 {

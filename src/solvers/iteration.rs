@@ -23,6 +23,15 @@ impl std::ops::Mul<f64> for Errors {
     }
 }
 
+/// The errors of one iterate of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recorded {
+    /// The number of updates made before; 0 for the start.
+    pub iteration: usize,
+    /// What the errors were then.
+    pub errors: Errors,
+}
+
 /// When to stop: at the first iterate with maximum error ≤ `tolerance` (absolute, in mesh units), or after
 /// `max_iterations` updates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,12 +48,15 @@ impl Stop {
         error <= self.tolerance && self.tolerance.is_finite()
     }
 
-    /// How a run ends that has got to an error after so many iterations, if it does whatever the method is.
-    pub(super) fn verdict(&self, error: f64, iterations: usize) -> Option<Outcome> {
+    /// How a run ends that has got to an error after so many iterations, and whose watch has `told` to go on or not, if it
+    /// does whatever the method is.
+    pub(super) fn verdict(&self, error: f64, iterations: usize, told: ControlFlow<()>) -> Option<Outcome> {
         if self.is_met(error) {
             Some(Outcome::Converged)
         } else if !error.is_finite() {
             Some(Outcome::Diverged)
+        } else if told.is_break() {
+            Some(Outcome::Stopped)
         } else {
             (iterations >= self.max_iterations).then_some(Outcome::MaxIterations)
         }
@@ -101,7 +113,7 @@ pub struct Report {
     pub iterations: usize,
     /// The errors of every iterate; entry 0 is the start, so there are `iterations + 1`. A method that knows its
     /// errors every few iterations only ([`mixed`](super::mixed)) has an entry for each time.
-    pub history: Vec<Errors>,
+    pub history: Vec<Recorded>,
     /// What was found where the outcome needs a reason.
     pub detail: Option<String>,
 }
@@ -109,7 +121,12 @@ pub struct Report {
 impl Report {
     /// The errors of the last iterate.
     pub fn last(&self) -> Errors {
-        self.history.last().copied().unwrap_or(Errors { max: f64::NAN, mean: f64::NAN })
+        self.history.last().map_or(Errors { max: f64::NAN, mean: f64::NAN }, |last| last.errors)
+    }
+
+    /// The maximum errors of the history, in its order.
+    pub fn maxima(&self) -> Vec<f64> {
+        self.history.iter().map(|recorded| recorded.errors.max).collect()
     }
 }
 
@@ -197,7 +214,7 @@ pub(super) fn solve_in_scale(
     stop: &Stop,
     watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
 ) -> Report {
-    let mut history: Vec<Errors> = Vec::new();
+    let mut history: Vec<Recorded> = Vec::new();
     let mut rules = Rules { rounding: f64::EPSILON * size, ..Rules::default() };
     loop {
         let mut errors = method.errors();
@@ -205,7 +222,7 @@ pub(super) fn solve_in_scale(
         if stop.is_met(errors.max) || iteration >= stop.max_iterations {
             errors = method.confirm(errors);
         }
-        history.push(errors);
+        history.push(Recorded { iteration, errors });
         let step = Step { iteration, errors, points: method.points() };
         let told = watch(&step);
         let ended = if stop.is_met(errors.max) {
@@ -310,7 +327,8 @@ mod tests {
         assert_eq!(report.outcome, Outcome::Converged);
         assert_eq!(report.iterations, 10); // 2⁻¹⁰ < 10⁻³ < 2⁻⁹
         assert_eq!(report.history.len(), 11);
-        assert_eq!(report.history[0].max, 1.0);
+        assert_eq!(report.history[0], Recorded { iteration: 0, errors: Errors { max: 1.0, mean: 0.5 } });
+        assert_eq!(report.history[10].iteration, 10);
     }
 
     #[test]

@@ -14,7 +14,7 @@ use super::direct::{Cholesky, CholeskyForm, Direct, Factorization, SecondOpinion
 use super::gauss_seidel::Sor;
 use super::heavy_ball::HeavyBall;
 use super::incomplete_cholesky::IncompleteCholesky;
-use super::iteration::{Errors, Failure, Outcome, Report, Step, Stop, WarmStart, largest, solve_in_scale};
+use super::iteration::{Errors, Failure, Outcome, Recorded, Report, Step, Stop, WarmStart, largest, solve_in_scale};
 use super::jacobi::{Jacobi, THALL_OMEGA};
 use super::pia::Pia;
 use super::ssor::Ssor;
@@ -540,7 +540,12 @@ fn not_set_up<S: System>(
     Solution {
         points: start.to_vec(),
         method,
-        report: Report { outcome: failure.outcome, iterations: 0, history: vec![errors], detail: Some(failure.detail) },
+        report: Report {
+            outcome: failure.outcome,
+            iterations: 0,
+            history: vec![Recorded { iteration: 0, errors }],
+            detail: Some(failure.detail),
+        },
         setup_seconds,
         solve_seconds: 0.0,
         fill: None,

@@ -5,10 +5,12 @@
 //! [`Wavefront`], and V + d is taken in double precision again (iterative refinement: Wilkinson 1963; Langou et al.
 //! 2006). A correction gains up to five digits; two or three are usual.
 
+use std::ops::ControlFlow;
+
 use glam::{DVec3, Vec3A};
 
 use super::chebyshev::{Recurrence, promised_iterations};
-use super::iteration::{Errors, Outcome, Report, Stop};
+use super::iteration::{Outcome, Recorded, Report, Step, Stop};
 use super::system::Rows;
 use super::wavefront::{Scratch, Wavefront};
 use crate::assemble::Operator;
@@ -67,12 +69,14 @@ impl Workspace {
 /// If there is not one point a vertex.
 pub fn solve(operator: &Operator, points: &[DVec3], stop: &Stop) -> (Vec<DVec3>, Report) {
     let mut control = Vec::new();
-    let report = solve_from(operator, points, &mut control, &mut Workspace::new(operator), stop);
+    let report = solve_from(operator, points, &mut control, &mut Workspace::new(operator), stop, &mut |_| {
+        ControlFlow::Continue(())
+    });
     (control, report)
 }
 
 /// As [`solve`], from V = `control`, which becomes the solution; an empty one stands for V = P. Allocates no array of N
-/// points, unless `control` is empty.
+/// points, unless `control` is empty. The watch sees the start and what each correction makes of it, and may stop the run.
 ///
 /// # Panics
 /// If there is not one point a vertex, or the workspace is that of another operator.
@@ -82,12 +86,13 @@ pub fn solve_from(
     control: &mut Vec<DVec3>,
     workspace: &mut Workspace,
     stop: &Stop,
+    watch: &mut (dyn FnMut(&Step) -> ControlFlow<()> + Send),
 ) -> Report {
     let n = operator.len();
     assert!(points.len() == n && (control.is_empty() || control.len() == n), "one point a vertex");
     assert_eq!(workspace.residual.len(), n, "the workspace of this operator");
     // Within the thread pool, so that the many short parallel loops need not be handed over to it.
-    rayon::scope(|_| in_pool(operator, points, control, workspace, stop))
+    rayon::scope(|_| in_pool(operator, points, control, workspace, stop, watch))
 }
 
 fn in_pool(
@@ -96,6 +101,7 @@ fn in_pool(
     control: &mut Vec<DVec3>,
     workspace: &mut Workspace,
     stop: &Stop,
+    watch: &mut (dyn FnMut(&Step) -> ControlFlow<()> + Send),
 ) -> Report {
     let wavefront = Wavefront::new(operator);
     let Workspace { rows, residual, correction, scratch } = workspace;
@@ -105,7 +111,7 @@ fn in_pool(
     let mut interval = (operator.usual_lambda_min().max(least), 1.0);
     let largest = points.iter().map(|p| p.length_squared()).fold(0.0, f64::max);
     let floor = FLOOR * f64::EPSILON * largest.sqrt();
-    let mut history: Vec<Errors> = Vec::new();
+    let mut history: Vec<Recorded> = Vec::new();
     let mut iterations = 0;
     // The last correction: its number of iterations.
     let mut count = 0;
@@ -124,9 +130,10 @@ fn in_pool(
                 *d = first * *r;
             })
             .errors;
-        let before = history.last().map(|e| e.max);
-        history.push(errors);
-        if let Some(outcome) = stop.verdict(errors.max, iterations) {
+        let before = history.last().map(|e| e.errors.max);
+        history.push(Recorded { iteration: iterations, errors });
+        let told = watch(&Step { iteration: iterations, errors, points: current });
+        if let Some(outcome) = stop.verdict(errors.max, iterations, told) {
             break outcome;
         }
         if let Some(before) = before {

@@ -20,6 +20,6 @@ pub mod ssor;
 pub mod system;
 pub mod wavefront;
 
-pub use iteration::{Errors, Failure, Iterate, Outcome, Report, Step, Stop, WarmStart, solve};
+pub use iteration::{Errors, Failure, Iterate, Outcome, Recorded, Report, Step, Stop, WarmStart, solve};
 pub use method::{Accelerated, Method, Solution, run, run_from, run_watched};
 pub use system::System;

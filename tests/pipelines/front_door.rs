@@ -1,15 +1,18 @@
 //! `interpolate` and `Interpolator`: the chain of `auto` against direct solves, on all vertices and on some, in any order
 //! inside, once and again.
 
+use std::ops::ControlFlow;
+
 use glam::DVec3;
 use limitlab::Result;
 use limitlab::assemble::LimitSystem;
-use limitlab::interpolate::{Interpolator, Options, Tolerance, interpolate};
+use limitlab::interpolate::{Interpolator, Options, Tolerance, interpolate, interpolate_watched};
+use limitlab::mesh::features::Tags;
 use limitlab::mesh::generate::permute_vertices;
 use limitlab::mesh::order::Order;
 use limitlab::mesh::{Mesh, Surface, builtin};
 use limitlab::schemes::Scheme;
-use limitlab::solvers::{Method, Outcome, Stop};
+use limitlab::solvers::{Method, Outcome, Recorded, Solution, Stop};
 
 use crate::common::meshes::distance;
 use crate::common::pipelines::noisy_surface as noisy;
@@ -92,6 +95,67 @@ fn the_chain_ends_with_a_factorization() {
     let found = interpolate(&surface, Scheme::CatmullClark, &options(None)).unwrap();
     assert_eq!(found.method, "cg");
     assert_ne!(found.report.outcome, Outcome::Converged);
+}
+
+/// A run with a watch that goes on until it has seen `most` iterates: what it saw, and what came of it.
+fn watched(
+    surface: &Surface,
+    scheme: Scheme,
+    options: &Options,
+    most: usize,
+) -> (Vec<(&'static str, Recorded)>, Solution) {
+    let mut seen = Vec::new();
+    let found = interpolate_watched(surface, scheme, options, &mut |method, step| {
+        seen.push((method, Recorded { iteration: step.iteration, errors: step.errors }));
+        if seen.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    (seen, found.unwrap())
+}
+
+#[test]
+fn a_watch_sees_what_is_recorded_and_changes_nothing() {
+    let torus = noisy("torus:8x9");
+    let tags = Tags { creases: vec![([0, 1], 10.0)], ..Tags::default() };
+    let dart = torus.tagged(&tags).unwrap();
+    let marks = every_third(torus.len());
+    let some = Options { interpolated: Some(&marks), ..options(None) };
+    let cases: [(&str, &Surface, Options, usize, &[&str]); 5] = [
+        ("auto", &torus, options(None), 2, &["chebyshev"]),
+        ("some vertices", &torus, some, 2, &["chebyshev"]),
+        ("a dart", &dart, options(None), 1, &["chebyshev"]),
+        ("the whole chain", &noisy("prism:401"), options(None), 2, &["chebyshev", "cg", "ldlt"]),
+        ("by name", &dart, options(Some(Method::Pia)), 2, &["pia"]),
+    ];
+    for (what, surface, options, enough, methods) in cases {
+        let scheme = Scheme::CatmullClark;
+        let alone = interpolate(surface, scheme, &options).unwrap();
+        let (seen, found) = watched(surface, scheme, &options, usize::MAX);
+        assert_eq!((&found.points, &found.report), (&alone.points, &alone.report), "{what}");
+        let of = |method: &str| -> Vec<Recorded> { seen.iter().filter(|s| s.0 == method).map(|s| s.1).collect() };
+        assert_eq!(of(found.method), found.report.history, "{what}");
+        let mut names: Vec<&str> = seen.iter().map(|s| s.0).collect();
+        names.dedup();
+        assert_eq!(names, methods, "{what}");
+        assert_eq!(found.report.history.last().map(|last| last.iteration), Some(found.report.iterations), "{what}");
+        // Whoever has seen enough gets the iterate that was seen last.
+        let (_, stopped) = watched(surface, scheme, &options, enough);
+        assert_eq!(stopped.report.outcome, Outcome::Stopped, "{what}");
+        assert_eq!(stopped.report.history, of(methods[0])[..enough], "{what}");
+        assert_eq!(stopped.report.iterations, stopped.report.history[enough - 1].iteration, "{what}");
+    }
+}
+
+/// So many iterations alone come to the same errors.
+#[test]
+fn a_history_of_corrections_tells_their_iterations() {
+    let surface = noisy("irregular-quad:300");
+    let history = interpolate(&surface, Scheme::CatmullClark, &options(None)).unwrap().report.history;
+    assert!(history.len() > 2 && history[0].iteration == 0);
+    for recorded in history {
+        let limited = Options { max_iterations: recorded.iteration, ..options(None) };
+        let report = interpolate(&surface, Scheme::CatmullClark, &limited).unwrap().report;
+        assert_eq!((report.iterations, report.last()), (recorded.iteration, recorded.errors));
+    }
 }
 
 /// Above the sizes from which surfaces are renumbered inside, and rows are breadth first.

@@ -34,11 +34,17 @@ fn both_sweeps_are_the_solvers_of_the_same_system() {
             (reverse, Method::GaussSeidel { order: Some(&order) }),
         ] {
             let stop = Stop { tolerance: 0.0, max_iterations: 8 };
+            let mut seen = Vec::new();
+            let eight = PhaseOne { sweep, max_iterations: 8, eps: 0.0 };
+            auxiliary_watched(&surface, None, &eight, &mut |sweeps, points| seen.push((sweeps, points.to_vec())))
+                .unwrap();
             let mut before = surface.positions().to_vec();
             run_watched(&system, surface.positions(), method, &stop, &mut |step| {
                 let phase = PhaseOne { sweep, max_iterations: step.iteration, eps: 0.0 };
                 let found = auxiliary(&surface, None, &phase).unwrap();
                 assert!(distance(found.surface.positions(), step.points) < ROUNDING, "{name}");
+                let (sweeps, points) = &seen[step.iteration];
+                assert!(*sweeps == step.iteration && points == found.surface.positions(), "{name}");
                 if let Some(&update) = found.updates.last() {
                     assert!((update - distance(&before, step.points)).abs() < ROUNDING);
                 }

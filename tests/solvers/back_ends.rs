@@ -49,7 +49,12 @@ fn hold(scheme: Scheme, mesh: &Mesh, explicit: &LimitSystem, free: &Operator) {
         let counts = (stored.iterations, found.iterations);
         assert!(counts.0.abs_diff(counts.1) <= allowed, "{what}: {counts:?}");
         for (a, b) in stored.history.iter().zip(&found.history).take(5) {
-            assert!((a.max - b.max).abs() <= 1e-11 * (1.0 + a.max), "{what}: {:e} and {:e}", a.max, b.max);
+            assert!(
+                (a.errors.max - b.errors.max).abs() <= 1e-11 * (1.0 + a.errors.max),
+                "{what}: {:e} and {:e}",
+                a.errors.max,
+                b.errors.max
+            );
         }
     }
 }

@@ -233,8 +233,8 @@ impl Case<'_> {
             let e = self.dense.e(w);
             let mean = e.row_iter().map(|r| r.norm()).sum::<f64>() / e.nrows() as f64;
             let slack = allowed(k, scale);
-            assert!((report.history[k].max - max_row(&e)).abs() <= slack, "{what}: history");
-            assert!((report.history[k].mean - mean).abs() <= slack, "{what}: history");
+            assert!((report.history[k].errors.max - max_row(&e)).abs() <= slack, "{what}: history");
+            assert!((report.history[k].errors.mean - mean).abs() <= slack, "{what}: history");
         }
     }
 }

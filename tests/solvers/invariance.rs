@@ -59,7 +59,7 @@ fn renumbering_leaves_simultaneous_updates_alone_but_not_sweeps() {
         let order = Order::Random(77).order(&mesh, &topology(&mesh).incidence);
         let renumbered = permute_vertices(&mesh, &order);
         let (before, after) = (system(&mesh, scheme), system(&renumbered, scheme));
-        let maxima = |solution: &Solution| -> Vec<f64> { solution.report.history.iter().map(|e| e.max).collect() };
+        let maxima = |solution: &Solution| -> Vec<f64> { solution.report.maxima() };
         let histories = |method: Method| {
             let runs = [(&before, &mesh), (&after, &renumbered)];
             runs.map(|(system, mesh)| maxima(&checked(system, &mesh.positions, method, &FEW)))

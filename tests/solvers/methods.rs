@@ -3,7 +3,7 @@
 use glam::DVec3;
 use limitlab::analysis::dense;
 use limitlab::assemble::LimitSystem;
-use limitlab::solvers::{Accelerated, Method, Outcome, Solution, Stop, run};
+use limitlab::solvers::{Accelerated, Method, Outcome, Recorded, Solution, Stop, run};
 
 use crate::common::tol;
 
@@ -76,9 +76,10 @@ pub fn checked(system: &LimitSystem, points: &[DVec3], method: Method, stop: &St
     assert!(report.iterations <= stop.max_iterations, "{method:?}");
     // The same operations in the same order: the same number.
     let same = |a: f64, b: f64| a == b || a.is_nan() && b.is_nan();
-    let (start, first) = (residual(system, points, points), report.history[0].max);
+    let (start, first) = (residual(system, points, points), report.history[0].errors.max);
     assert!(same(first, start), "{method:?}: {first:e} at the start is {start:e}");
-    for errors in &report.history {
+    for (iteration, &Recorded { iteration: at, errors }) in report.history.iter().enumerate() {
+        assert_eq!(at, iteration, "{method:?}");
         let limit = errors.max * (1.0 + tol::rounding(points.len()));
         assert!(errors.mean <= limit || errors.mean.is_nan(), "{method:?}: mean above maximum");
     }

@@ -52,7 +52,7 @@ fn every_start_ends_at_the_solution() {
         for start in [vec![DVec3::ZERO; points.len()], random, far] {
             let found = from(system, points, &start, method, &stop);
             assert_eq!(found.report.outcome, Outcome::Converged, "{what}: {:?}", found.report.detail);
-            assert_eq!(found.report.history[0].max, residual(system, points, &start), "{what}");
+            assert_eq!(found.report.history[0].errors.max, residual(system, points, &start), "{what}");
             assert!(distance(&found.points, &exact) <= allowed, "{what}");
         }
         let again = from(system, points, &exact, method, &stop);

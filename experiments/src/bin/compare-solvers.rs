@@ -1,5 +1,6 @@
 //! Every method on the same system, start, norm and tolerance: `compare-solvers [MESH|SYSTEM_DIR…]`.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -8,23 +9,25 @@ use clap::{CommandFactory, Parser};
 use nalgebra::Complex;
 use serde_json::json;
 
-use limitlab::analysis::comparison::{self, MethodRow};
+use limitlab::analysis::comparison::{MethodRow, compare_entry, entries, with_least_times};
 use limitlab::analysis::complex_spectrum::ComplexSpectrum;
 use limitlab::analysis::dense;
 use limitlab::analysis::spectrum::{Spectra, spectrum};
 use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::mesh::order::Order;
 use limitlab::output::check_target;
-use limitlab::solvers::{Method, System};
+use limitlab::solvers::{Errors, Method, Step, System};
 use limitlab::{Error, Result};
 use limitlab_experiments::cli::{
-    self, CommonFlags, List, Matrix, MeshFlags, OutputFlags, Problem, Progress, StopFlags, WHICH_METHOD,
+    self, CommonFlags, List, Matrix, MeshFlags, MonitorFlags, OutputFlags, Problem, Progress, StopFlags, WHICH_METHOD,
 };
-use limitlab_experiments::studies::comparison::{self as study, Asked};
+use limitlab_experiments::studies::comparison::{self as study, AUTO, Asked};
+use limitlab_experiments::studies::histories;
 use limitlab_experiments::studies::page::{self, Measured};
 
 /// Runs every method on the same system from the same start V = P, and prints iterations, errors, observed and
-/// predicted rate, and the seconds of set-up and solve apart.
+/// predicted rate, and the seconds of set-up and solve apart, the least of several runs where a run is short. Beside the
+/// picture stands a CSV file with the errors of every iterate.
 ///
 /// A folder is taken for a system of anybody: M.mtx (symmetric positive definite), H.mtx (the positive diagonal of H; the
 /// identity if it is missing) and P.mtx (N×3, N×2 or N×1) of A V = P, A = H·M, as `assemble` writes them.
@@ -50,6 +53,8 @@ struct Arguments {
     mesh: MeshFlags,
     #[command(flatten)]
     stop: StopFlags,
+    #[command(flatten)]
+    monitor: MonitorFlags,
     #[command(flatten)]
     output: OutputFlags,
     #[command(flatten)]
@@ -92,6 +97,13 @@ fn run(arguments: &Arguments) -> Result<()> {
         table.write(&arguments.output.out)?;
         let figure = study::figure(problem.subject.title.clone(), problem.subject.unit, &rows);
         figure.render()?.save(&arguments.output.out.join(format!("{stem}.png")))?;
+        let histories = rows.iter().map(|row| &row.solution.report.history);
+        let runs = rows.iter().map(|row| [row.method.to_string(), row.parameter.clone()]);
+        histories::write(
+            &arguments.output.out.join(format!("{stem}-history.csv")),
+            ["method", "parameter"],
+            runs.zip(histories.clone().map(Vec::as_slice)),
+        )?;
         if let (Some(path), Some(measured)) = (&arguments.html, measured) {
             page::page(&problem, measured, &rows, refused)?.write(path)?;
             arguments.common.remark(format_args!("interactive page: {}", path.display()));
@@ -99,7 +111,11 @@ fn run(arguments: &Arguments) -> Result<()> {
         if !arguments.output.json {
             cli::print(&table.to_markdown())?;
         }
-        results.push(problem.subject.json(json!({ "rows": study::json(&rows) })));
+        let mut objects = study::json(&rows);
+        for (object, history) in objects.as_array_mut().into_iter().flatten().zip(histories) {
+            object["history"] = histories::json(history);
+        }
+        results.push(problem.subject.json(json!({ "rows": objects })));
     }
     cli::finish(&results, &arguments.output, &arguments.common)
 }
@@ -153,8 +169,8 @@ fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Compared<'
             by_methods(problem, system, &ComplexSpectrum::new(system)?, eigenvalues, (&methods, auto), arguments)?
         }
     };
-    for errors in rows.iter_mut().flat_map(|row| &mut row.solution.report.history) {
-        *errors = *errors * problem.scale;
+    for recorded in rows.iter_mut().flat_map(|row| &mut row.solution.report.history) {
+        recorded.errors = recorded.errors * problem.scale;
     }
     Ok(Compared { rows, refused, measured })
 }
@@ -170,20 +186,33 @@ fn by_methods<'a, S: System, K: Spectra + Clone + Sync>(
     arguments: &Arguments,
 ) -> Result<(Vec<MethodRow<'a>>, Option<Measured>)> {
     let order_name = arguments.order.to_string();
-    let lines = comparison::entries(system, spectra, methods, Some(&problem.order), &order_name)?;
-    let progress = |steps| Progress::new(&problem.subject.name, steps, arguments.common.quiet);
-    let of_rows = progress(lines.len() + usize::from(auto));
-    let done = &mut || of_rows.step();
-    let mut rows = comparison::compare_entries(system, spectra, problem.data(), &lines, &problem.stop, done)?;
+    let lines = entries(system, spectra, methods, Some(&problem.order), &order_name)?;
+    let subject = &problem.subject.name;
+    let of_rows = Progress::new(subject, lines.len() + usize::from(auto), arguments.monitor.no_bar(&arguments.common));
+    let see = |name: &str, iteration, errors: Errors| {
+        arguments.monitor.see(format_args!("{subject}: {name}"), iteration, errors * problem.scale);
+        ControlFlow::Continue(())
+    };
+    let mut rows = Vec::new();
+    for line in &lines {
+        let name = study::name(line);
+        of_rows.message(name.as_str());
+        let watch = &mut |step: &Step| see(&name, step.iteration, step.errors);
+        rows.push(compare_entry(system, spectra, problem.data(), line, &problem.stop, watch)?);
+        of_rows.step();
+    }
     if auto {
-        rows.push(study::auto_row(problem.auto()?));
+        of_rows.message(AUTO);
+        let watch = &mut |method: &str, step: &Step| see(&format!("{AUTO} ({method})"), step.iteration, step.errors);
+        let again = || problem.auto(&mut |_, _| ControlFlow::Continue(()));
+        rows.push(study::auto_row(with_least_times(problem.auto(watch)?, again)?));
         of_rows.step();
     }
     drop(of_rows);
     if arguments.html.is_none() {
         return Ok((rows, None));
     }
-    let of_page = progress(page::steps(&rows));
-    let measured = page::measure(problem, system, spectra, eigenvalues(spectra)?, &rows, &|| of_page.step())?;
+    let of_page = Progress::new(subject, page::steps(&rows), arguments.common.quiet);
+    let measured = page::measure(problem, system, spectra, eigenvalues(spectra)?, &rows, &of_page)?;
     Ok((rows, Some(measured)))
 }

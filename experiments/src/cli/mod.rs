@@ -3,12 +3,14 @@
 pub mod advice;
 mod input;
 mod json;
+mod monitor;
 mod problem;
 mod process;
 mod progress;
 
 pub use input::{Input, MeshFlags, STAND_IN_NOISE, subdivision_of};
 pub use json::print_json;
+pub use monitor::MonitorFlags;
 pub use problem::{Given, Matrix, Problem, Subject};
 pub use process::{exit, say};
 pub use progress::Progress;

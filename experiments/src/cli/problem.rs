@@ -10,7 +10,7 @@ use super::{CommonFlags, Input, MeshFlags, StopFlags};
 use limitlab::assemble::matrix_market::{self, is_missing};
 use limitlab::assemble::{GeneralSystem, LimitSystem, Stages};
 use limitlab::error::{Error, Result};
-use limitlab::interpolate::{interpolate, solve_stored};
+use limitlab::interpolate::{Watch, interpolate_watched, solve_stored};
 use limitlab::mesh::features::Rule;
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::order::Order;
@@ -151,16 +151,16 @@ impl Problem {
         (&self.points, &self.start)
     }
 
-    /// By `auto`: the whole chain on a mesh, conjugate gradients and LDLᵀ on a system without one.
+    /// By `auto`, watched: the whole chain on a mesh, conjugate gradients and LDLᵀ on a system without one.
     ///
     /// # Errors
-    /// As [`interpolate`].
-    pub fn auto(&self) -> Result<Solution> {
+    /// As [`interpolate_watched`].
+    pub fn auto(&self, watch: &mut Watch) -> Result<Solution> {
         match &self.source {
             Source::Mesh(surface, scheme, _) | Source::Unsymmetric(surface, scheme, ..) => {
-                interpolate(surface, *scheme, &self.stop.into())
+                interpolate_watched(surface, *scheme, &self.stop.into(), watch)
             }
-            Source::Folder(system) => Ok(solve_stored(system, &self.points, &self.stop)),
+            Source::Folder(system) => Ok(solve_stored(system, &self.points, &self.stop, watch)),
         }
     }
 

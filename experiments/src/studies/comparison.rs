@@ -5,7 +5,7 @@ use std::str::FromStr;
 use serde_json::{Value, json};
 
 use crate::report::{Column, Columns, Figure, LinePlot, Scale, Series, Table};
-use limitlab::analysis::comparison::MethodRow;
+use limitlab::analysis::comparison::{Entry, MethodRow};
 use limitlab::analysis::custom_methods::Named;
 use limitlab::solvers::{Method, Solution};
 use limitlab::{Error, Result, names};
@@ -27,7 +27,8 @@ impl FromStr for Asked {
     }
 }
 
-const AUTO: &str = "auto";
+/// What the chain that chooses is called.
+pub const AUTO: &str = "auto";
 
 /// The row of `auto`, whose parameter is the method that came to the end. Its history has an entry for each correction, so
 /// that no rate is observed.
@@ -78,10 +79,16 @@ pub(super) fn is_over_iterations(row: &MethodRow) -> bool {
 
 /// The method with its parameter.
 pub(super) fn label(row: &MethodRow) -> String {
-    match row.parameter.as_str() {
-        "" => row.method.to_string(),
-        parameter => format!("{} ({parameter})", row.method),
-    }
+    with_parameter(row.method.name(), &row.parameter)
+}
+
+/// The line of a comparison, as its row will be called.
+pub fn name(entry: &Entry) -> String {
+    with_parameter(entry.method.name(), &entry.parameter)
+}
+
+fn with_parameter(method: &str, parameter: &str) -> String {
+    if parameter.is_empty() { method.into() } else { format!("{method} ({parameter})") }
 }
 
 /// The maximum errors over the iterations, a line for each method that iterates; `unit` is what errors are measured in.
@@ -89,7 +96,7 @@ pub fn figure(title: String, unit: &str, rows: &[MethodRow]) -> Figure {
     let series = rows
         .iter()
         .filter(|row| is_over_iterations(row))
-        .map(|row| Series::history(label(row), row.solution.report.history.iter().map(|e| e.max)))
+        .map(|row| Series::history(label(row), row.solution.report.maxima()))
         .collect();
     Figure::new(LinePlot {
         title,

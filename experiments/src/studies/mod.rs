@@ -2,6 +2,7 @@
 
 pub mod comparison;
 pub mod complex_spectrum;
+pub mod histories;
 pub mod page;
 pub mod splitting;
 pub mod sweep;

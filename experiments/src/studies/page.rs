@@ -7,8 +7,8 @@ use glam::DVec3;
 use nalgebra::Complex;
 
 use super::comparison::{is_over_iterations, json, label};
-use super::sweep::default_grid;
-use crate::cli::Problem;
+use super::sweep::{default_grid, show};
+use crate::cli::{Problem, Progress};
 use crate::report::page::{Curve, Eigenvalues, Frames, Packed, Page, Place, Run, Solid, Sweep, Thinned, View};
 use crate::report::readable;
 use limitlab::Result;
@@ -16,7 +16,7 @@ use limitlab::analysis::comparison::MethodRow;
 use limitlab::analysis::custom_methods::Named;
 use limitlab::analysis::dense;
 use limitlab::analysis::spectrum::{Extremes, Spectra};
-use limitlab::analysis::sweep::{OmegaSweep, rounding_floor, sweep};
+use limitlab::analysis::sweep::{OmegaSweep, SweepEvent, rounding_floor, sweep};
 use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::interpolate::surface::{SurfaceMesh, SurfaceOptions, surface};
 use limitlab::mesh::{Surface, bounding_box};
@@ -57,14 +57,14 @@ struct Shown {
     range: [f64; 2],
 }
 
-/// How often [`measure`] says that something is done.
+/// The runs of [`measure`].
 pub fn steps(rows: &[MethodRow]) -> usize {
     rows.len() + SWEPT.iter().map(|&method| default_grid(method).len()).sum::<usize>()
 }
 
 /// Sweeps over ω, and runs the methods of `rows` again, now with a watch that writes down the errors at the vertices: the
-/// times of the comparison are without it. `eigenvalues` are those of A and of D⁻¹A, where they were computed; `done` is
-/// called after each run.
+/// times of the comparison are without it. `eigenvalues` are those of A and of D⁻¹A, where they were computed. The bar is one
+/// of [`steps`].
 ///
 /// # Errors
 /// If an eigenvalue computation does not converge.
@@ -74,25 +74,27 @@ pub fn measure(
     spectra: &(impl Spectra + Sync),
     eigenvalues: Option<[Vec<Complex<f64>>; 2]>,
     rows: &[MethodRow],
-    done: &(dyn Fn() + Sync),
+    progress: &Progress,
 ) -> Result<Measured> {
     let shown = problem
         .mesh()
         .map(|(surface, ..)| Shown { mesh: Thinned::new(surface.mesh(), MOST_SHOWN), range: range(problem, rows) });
     let lines = rows.iter().filter(|row| is_over_iterations(row)).count();
     let record = |row: &MethodRow| {
+        progress.message(label(row));
         let frames = shown.as_ref().and_then(|shown| {
             let most = FRAME_BYTES / (lines.max(1) * shown.mesh.first.len());
             frames(problem, system, row, shown, most.clamp(2, MOST_FRAMES))
         });
-        done();
+        progress.step();
         frames
     };
     let frames = rows.iter().map(record).collect();
     let grids = SWEPT.map(|method| (method, default_grid(method)));
     let floor = rounding_floor(problem.diagonal());
     let order = Some(&problem.order[..]);
-    let sweep = sweep((system, spectra), problem.data(), &grids, order, &problem.stop, floor, &|_| done())?;
+    let show = |event: SweepEvent| show(progress, &event);
+    let sweep = sweep((system, spectra), problem.data(), &grids, order, &problem.stop, floor, &show)?;
     let b = system.bounds();
     let [a, jacobi] = eigenvalues.map_or([None, None], |[a, jacobi]| [Some(a), Some(jacobi)]);
     let spectra = vec![
@@ -118,7 +120,7 @@ fn spectrum(matrix: &'static str, ends: Extremes, bounds: [f64; 2], all: Option<
 /// From the tolerance, or a little part, to the largest error of a start.
 fn range(problem: &Problem, rows: &[MethodRow]) -> [f64; 2] {
     let starts = rows.iter().filter_map(|row| row.solution.report.history.first());
-    let greatest = problem.scale * starts.map(|errors| errors.max).fold(0.0, f64::max);
+    let greatest = problem.scale * starts.map(|start| start.errors.max).fold(0.0, f64::max);
     let greatest = if greatest > 0.0 && greatest.is_finite() { greatest } else { 1.0 };
     let tolerance = problem.scale * problem.stop.tolerance;
     let least = greatest * 10f64.powf(-DECADES);
@@ -215,7 +217,7 @@ fn curve(row: &MethodRow, frames: Option<Frames>) -> Curve {
         name: label(row),
         outcome: report.outcome.name(),
         iterations: report.iterations,
-        max: Packed::new(at.iter().map(|&k| report.history[k].max.to_le_bytes())),
+        max: Packed::new(at.iter().map(|&k| report.history[k].errors.max.to_le_bytes())),
         at: Packed::new(at.iter().map(|&k| (k as u32).to_le_bytes())),
         frames,
     }
@@ -254,7 +256,7 @@ fn view(problem: &Problem, given: &Surface, scheme: Scheme, shown: Shown) -> Res
             "Thinned out: {left} of {all} vertices, each with the largest error of those that it stands for."
         ));
     }
-    let found = problem.auto()?;
+    let found = problem.auto(&mut |_, _| ControlFlow::Continue(()))?;
     let solved = found.report.outcome == Outcome::Converged;
     // A refinement makes four times as many corners, or fewer.
     let fits = |k: &usize| left == all && given.faces().corners().len() << (2 * k) <= MOST_REFINED;
@@ -308,7 +310,7 @@ fn creases(surface: &Surface) -> Vec<[u32; 2]> {
 
 #[cfg(test)]
 mod tests {
-    use limitlab::analysis::comparison::{Entry, compare_entries};
+    use limitlab::analysis::comparison::{Entry, compare_entry};
     use limitlab::analysis::spectrum::spectrum;
     use limitlab::mesh::order::Order;
 
@@ -342,9 +344,9 @@ mod tests {
         let problem = flags.problem("torus:160x130", &stop, Order::File, &common).unwrap();
         let Matrix::Symmetric(system) = problem.matrix() else { panic!("no darts") };
         let line = Entry { method: Method::Pia, variant: "", parameter: String::new() };
-        let rows =
-            compare_entries(system, &spectrum(system).unwrap(), problem.data(), &[line], &problem.stop, &mut || ())
-                .unwrap();
+        let watch = &mut |_: &Step| ControlFlow::Continue(());
+        let spectrum = spectrum(system).unwrap();
+        let rows = [compare_entry(system, &spectrum, problem.data(), &line, &problem.stop, watch).unwrap()];
         let (surface, scheme, _) = problem.mesh().unwrap();
         let mesh = Thinned::new(surface.mesh(), MOST_SHOWN);
         let left = mesh.first.len();

@@ -1,15 +1,29 @@
 //! The table and the picture of an ω sweep.
 
-use crate::cli::Grid;
-use crate::report::{Column, Columns, Figure, LinePlot, Marker, Rule, Scale, Series, Table, palette};
-use limitlab::analysis::sweep::{OmegaSweep, SweepRow};
+use crate::cli::{Grid, Progress};
+use crate::report::{Column, Columns, Figure, LinePlot, Marker, Rule, Scale, Series, Table, palette, readable};
+use limitlab::analysis::sweep::{OmegaSweep, SweepEvent, SweepRow};
 use limitlab::error::short;
-use limitlab::solvers::{Method, Outcome};
+use limitlab::solvers::{Method, Outcome, Step};
 
 /// The grids unless told: Jacobi's reaches beyond 2/λ_max(D⁻¹A) on regular quads, the others over all of (0, 2].
 pub fn default_grid(method: Method) -> Vec<f64> {
     let text = if matches!(method, Method::Jacobi { .. }) { "0.05:1.2:0.05" } else { "0.05:2:0.05" };
     text.parse::<Grid>().map(|g| g.0).unwrap_or_default()
+}
+
+/// A method at one ω, in words.
+pub fn name(method: Method, omega: f64) -> String {
+    format!("{method} (ω={})", short(omega))
+}
+
+/// Names on a bar the run that began last, and counts those that have ended.
+pub fn show(progress: &Progress, event: &SweepEvent) {
+    match event {
+        SweepEvent::Iterate(method, omega, Step { iteration: 0, .. }) => progress.message(name(*method, *omega)),
+        SweepEvent::Iterate(..) => {}
+        SweepEvent::Row(_) => progress.step(),
+    }
 }
 
 /// One row a method and ω. `about` says which mesh, start and tolerance.
@@ -39,6 +53,27 @@ pub fn table(id: String, title: String, about: String, sweep: &OmegaSweep) -> Ta
         table.note(text + ".");
     }
     table
+}
+
+/// A line a method: the best ω on the grid, and what is predicted beside it.
+pub fn best(methods: &[Method<'static>], sweep: &OmegaSweep) -> String {
+    let line = |&method: &Method<'static>| {
+        let mut line = match sweep.best(method) {
+            None => format!("{method}: no run converged"),
+            Some(best) => format!(
+                "{method}: best ω = {} with {} iterations, predicted ρ = {}",
+                short(best.omega),
+                best.iterations,
+                readable(best.predicted_rho, 4)
+            ),
+        };
+        if let Some(t) = sweep.thresholds.iter().find(|t| t.method == method) {
+            let [omega, rho] = [t.optimal_omega, t.optimal_rho].map(|x| readable(x, 4));
+            line += &format!("; predicted best ω = {omega} with ρ = {rho}");
+        }
+        line
+    };
+    methods.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 fn columns() -> Columns<'static, SweepRow> {

@@ -116,7 +116,10 @@ fn compare_solvers_prints_the_fields_of_the_contract() {
         assert_ne!(status, "converged", "{row}");
     }
     let files = below(&folder.path().join("out"));
-    assert_eq!(files, ["csv", "md", "png"].map(|e| format!("compare-solvers-cube-catmull-clark.{e}")));
+    assert_eq!(
+        files,
+        ["-history.csv", ".csv", ".md", ".png"].map(|e| format!("compare-solvers-cube-catmull-clark{e}"))
+    );
 }
 
 #[test]
@@ -191,7 +194,7 @@ fn several_meshes_make_a_list_of_results() {
         assert_eq!(names, ["tetrahedron", "octahedron"]);
     }
     // The default folder.
-    assert_eq!(below(&folder.path().join("out")).len(), 2 * 2 * 3);
+    assert_eq!(below(&folder.path().join("out")).len(), 2 * (4 + 3));
 }
 
 #[test]

@@ -4,6 +4,7 @@ mod bad_input;
 mod contract;
 mod darts;
 mod guide;
+mod histories;
 mod metadata;
 mod page;
 #[cfg(target_os = "linux")]
@@ -24,6 +25,8 @@ pub const INTERPOLATE: &str = env!("CARGO_BIN_EXE_interpolate");
 pub const COMPARE: &str = env!("CARGO_BIN_EXE_compare-solvers");
 pub const SWEEP: &str = env!("CARGO_BIN_EXE_sweep-omega");
 pub const REPRODUCE: &str = env!("CARGO_BIN_EXE_reproduce");
+#[cfg(target_os = "linux")]
+pub const SCALING: &str = env!("CARGO_BIN_EXE_scaling");
 pub const SPECTRUM: &str = env!("CARGO_BIN_EXE_spectrum");
 pub const SPLITTING: &str = env!("CARGO_BIN_EXE_splitting");
 

@@ -121,7 +121,7 @@ fn a_laplacian_is_solved_by_all_methods_that_can() {
     }
     assert_eq!(
         below(&folder.path().join("out")),
-        ["csv", "md", "png"].map(|e| format!("compare-solvers-my-laplacian.{e}"))
+        ["-history.csv", ".csv", ".md", ".png"].map(|e| format!("compare-solvers-my-laplacian{e}"))
     );
     let table = fs::read_to_string(folder.path().join("out/compare-solvers-my-laplacian.md")).unwrap();
     assert!(table.contains("All methods on my laplacian") && table.contains("units of P") && !table.contains("mesh"));

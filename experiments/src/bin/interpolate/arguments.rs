@@ -9,7 +9,7 @@ use limitlab::mesh::order::Order;
 use limitlab::schemes::Refinement;
 use limitlab::solvers::Method;
 use limitlab::{Result, names};
-use limitlab_experiments::cli::{self, CommonFlags, MeshFlags, StopFlags, WHICH_METHOD};
+use limitlab_experiments::cli::{self, CommonFlags, MeshFlags, MonitorFlags, StopFlags, WHICH_METHOD};
 
 /// Computes the control mesh V with A V = P: the vertices P of the mesh become points of the limit surface. Unless
 /// refined by --subdivide, the faces stay, vertex for vertex, so that the result can replace the mesh in a tool that
@@ -47,6 +47,8 @@ pub struct Arguments {
     pub mesh: MeshFlags,
     #[command(flatten)]
     pub stop: StopFlags,
+    #[command(flatten)]
+    pub monitor: MonitorFlags,
     #[command(flatten)]
     pub common: CommonFlags,
 }

@@ -12,8 +12,8 @@ use limitlab::interpolate::zheng_cai::{self, PhaseOne, Sweep};
 use limitlab::interpolate::{Options, Tolerance, interpolate_watched, limit_points};
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::order::Order;
-use limitlab::solvers::gauss_seidel::by_colours;
-use limitlab::solvers::{Errors, Method, Outcome, Report, Step, Stop};
+use limitlab::solvers::gauss_seidel::by_colours_watched;
+use limitlab::solvers::{Errors, Method, Outcome, Recorded, Report, Step, Stop};
 use limitlab_experiments::cli::{Input, Progress, advice};
 
 use super::arguments::{Arguments, Choice};
@@ -34,8 +34,37 @@ pub struct Control {
     pub iterations: usize,
     pub status: &'static str,
     pub errors: Errors,
+    pub history: Vec<Recorded>,
     pub tolerance: f64,
     pub seconds: Seconds,
+}
+
+/// What is shown of a solution as it goes: a bar, or lines.
+struct Shown<'a> {
+    arguments: &'a Arguments,
+    input: &'a Input,
+    progress: Progress,
+    tolerance: f64,
+    /// The first error seen.
+    start: Option<f64>,
+}
+
+impl<'a> Shown<'a> {
+    fn new(arguments: &'a Arguments, input: &'a Input, tolerance: f64) -> Self {
+        let progress = Progress::toward("solving", arguments.monitor.no_bar(&arguments.common));
+        Shown { arguments, input, progress, tolerance, start: None }
+    }
+
+    fn see(&mut self, method: &str, step: &Step) -> ControlFlow<()> {
+        // In digits: from the first error seen to the tolerance.
+        let error = step.errors.max;
+        let digits = |e: f64| (e / self.tolerance).ln();
+        self.progress.part(1.0 - digits(error) / digits(*self.start.get_or_insert(error)));
+        let (iteration, errors) = (step.iteration, step.errors * self.input.frame.scale());
+        self.progress.message(format!("{method}: iteration {iteration}: max error {:.2e}", errors.max));
+        self.arguments.monitor.see(format_args!("{}: {method}", self.input.name), iteration, errors);
+        ControlFlow::Continue(())
+    }
 }
 
 /// The control points, and the errors of what will be left of them in the digits of the file.
@@ -75,29 +104,17 @@ fn solved(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -> R
     let Stop { tolerance, max_iterations } = stop;
     let interpolated = per_vertex.interpolated.as_deref();
     let options = Options { method, tolerance: Tolerance::Absolute(tolerance), max_iterations, interpolated };
-    // The chain of auto tells nothing before its end.
-    let progress = match method {
-        Some(_) => Progress::toward("solving", arguments.common.quiet),
-        None => Progress::open("solving", arguments.common.quiet),
-    };
-    let mut start = None;
-    let watch = &mut |step: &Step| {
-        // In digits: from the first error seen to the tolerance.
-        let error = step.errors.max;
-        let digits = |e: f64| (e / tolerance).ln();
-        progress.part(1.0 - digits(error) / digits(*start.get_or_insert(error)));
-        let (iteration, error) = (step.iteration, input.frame.scale() * error);
-        progress.message(format!("iteration {iteration}: max error {error:.2e}"));
-        ControlFlow::Continue(())
-    };
+    let mut shown = Shown::new(arguments, input, tolerance);
+    let watch = &mut |method: &str, step: &Step| shown.see(method, step);
     let found = interpolate_watched(&input.surface, input.scheme, &options, watch).map_err(|e| input.named(e))?;
-    drop(progress);
+    drop(shown);
     check(arguments, input, per_vertex, found.method, &found.report, &stop)?;
     Ok(Control {
         method: found.method,
         iterations: found.report.iterations,
         status: found.report.outcome.name(),
         errors: found.report.last(),
+        history: found.report.history,
         tolerance,
         seconds: Seconds {
             assemble: input.check_seconds + found.setup_seconds,
@@ -117,7 +134,7 @@ fn by_colour(
     stop: &Stop,
 ) -> Result<Control> {
     let start = Instant::now();
-    let progress = Progress::open("solving", arguments.common.quiet);
+    let mut shown = Shown::new(arguments, input, stop.tolerance);
     let surface = &input.surface;
     let numbering = in_colours(surface.faces(), surface.incidence());
     let operator = Operator::in_order(surface, input.scheme, Some(&numbering)).map_err(|e| input.named(e))?;
@@ -125,8 +142,9 @@ fn by_colour(
     let start = Instant::now();
     let omega = if let Method::Sor { omega, .. } = method { omega } else { 1.0 };
     let points = numbering.there(surface.positions());
-    let (control, report) = by_colours(&operator, &points, omega, stop);
-    drop(progress);
+    let watch = &mut |step: &Step| shown.see(method.name(), step);
+    let (control, report) = by_colours_watched(&operator, &points, omega, stop, watch);
+    drop(shown);
     check(arguments, input, per_vertex, method.name(), &report, stop)?;
     Ok(Control {
         method: method.name(),
@@ -134,6 +152,7 @@ fn by_colour(
         iterations: report.iterations,
         status: report.outcome.name(),
         errors: report.last(),
+        history: report.history,
         tolerance: stop.tolerance,
         seconds: Seconds { assemble, solve: start.elapsed().as_secs_f64(), ..Seconds::default() },
     })
@@ -150,9 +169,20 @@ fn two_phase(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -
     };
     let surface = &input.surface;
     let marks = per_vertex.interpolated.as_deref();
-    let found = zheng_cai::auxiliary(surface, marks, &phase)?;
+    let mut history = Vec::new();
+    let watch = &mut |iteration, points: &[DVec3]| {
+        // The sweeps do without errors of limit points, which are for who asks. If this fails, so does the end, which says it.
+        if (arguments.json || arguments.monitor.monitor)
+            && let Ok(errors) = limit_errors(input, marks, points)
+        {
+            history.push(Recorded { iteration, errors });
+            arguments.monitor.see(format_args!("{}: two-phase", input.name), iteration, errors * input.frame.scale());
+        }
+    };
+    let found = zheng_cai::auxiliary_watched(surface, marks, &phase, watch)?;
     Ok(Control {
         method: "two-phase",
+        history,
         errors: limit_errors(input, marks, found.surface.positions())?,
         points: found.surface.into_mesh().positions,
         iterations: found.updates.len(),

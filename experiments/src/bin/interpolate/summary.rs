@@ -3,6 +3,7 @@
 use glam::DVec3;
 use limitlab::Result;
 use limitlab_experiments::cli::{self, Input, advice, number};
+use limitlab_experiments::studies::histories;
 use serde_json::{Value, json};
 
 use super::arguments::{Arguments, Choice};
@@ -64,6 +65,7 @@ pub fn print_summary(
         "max_error": number(errors.max),
         "mean_error": number(errors.mean),
         "tolerance": number(result.tolerance),
+        "history": histories::json(&result.history),
         "output": arguments.output.display().to_string(),
         "interpolated": per_vertex.interpolated.as_ref().map_or(input.surface.len(), marked),
         "subdivide": arguments.shape.subdivide,

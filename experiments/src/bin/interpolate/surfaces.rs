@@ -10,7 +10,7 @@ use limitlab::interpolate::normals::Rotation;
 use limitlab::interpolate::surface::{SurfaceMesh, SurfaceOptions, surface};
 use limitlab::mesh::frame::Frame;
 use limitlab::schemes::Refinement;
-use limitlab::solvers::Errors;
+use limitlab::solvers::{Errors, Recorded};
 use limitlab_experiments::cli::Input;
 
 use super::arguments::Arguments;
@@ -23,6 +23,8 @@ pub struct Finished {
     pub iterations: usize,
     pub status: &'static str,
     pub errors: Errors,
+    /// Of the solution: empty where nothing iterates.
+    pub history: Vec<Recorded>,
     pub tolerance: f64,
     pub fairness: Option<Energies>,
     pub seconds: Seconds,
@@ -57,6 +59,7 @@ pub fn refine(input: &Input, request: &SurfaceOptions, control: Control) -> Resu
         iterations: control.iterations,
         status: control.status,
         errors: control.errors,
+        history: control.history,
         tolerance: control.tolerance,
         fairness: None,
         seconds,
@@ -88,6 +91,7 @@ pub fn fairest(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions)
         iterations: 1,
         status: "converged",
         errors: found.errors,
+        history: Vec::new(),
         tolerance: 0.0,
         fairness: Some(found.energies),
         seconds: Seconds { assemble, solve, subdivide: start.elapsed().as_secs_f64(), ..Seconds::default() },
@@ -135,6 +139,7 @@ fn unsolved(method: &'static str, input: &Input, made: SurfaceMesh, start: Insta
         iterations: 0,
         status: "converged",
         errors: Errors { max: 0.0, mean: 0.0 },
+        history: Vec::new(),
         tolerance: 0.0,
         fairness: None,
         seconds: Seconds {
@@ -150,6 +155,7 @@ pub fn leave(frame: &Frame, finished: &mut Finished) {
     let unit = frame.scale();
     frame.leave(finished.made.surface.positions_mut());
     finished.errors = finished.errors * unit;
+    finished.history.iter_mut().for_each(|at| at.errors = at.errors * unit);
     finished.tolerance *= unit;
     if let Some(energies) = &mut finished.fairness {
         // Integrals of squares.

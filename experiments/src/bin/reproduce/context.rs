@@ -12,9 +12,11 @@ use limitlab::mesh::validate::{Boundary, Validation};
 use limitlab::mesh::{Surface, builtin, io};
 use limitlab::output::create_dir;
 use limitlab::schemes::Scheme;
+use limitlab::solvers::Recorded;
 use limitlab_experiments::cli::{self, Printer, STAND_IN_NOISE};
 use limitlab_experiments::report::index::{self, Entry};
 use limitlab_experiments::report::{Animation, Figure, Table, compare};
+use limitlab_experiments::studies::histories;
 
 use serde_json::{Value as Json, json};
 
@@ -327,6 +329,19 @@ impl Context {
     pub fn figure(&mut self, stem: &str, figure: &Figure) -> Result<()> {
         self.made.figures += 1;
         figure.render()?.save(&self.folder().join(format!("{stem}.png")))
+    }
+
+    /// Writes the histories that a figure of this stem shows as `STEM.csv`.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn histories<'a>(
+        &self,
+        stem: &str,
+        keys: [&str; 2],
+        runs: impl IntoIterator<Item = ([String; 2], &'a [Recorded])>,
+    ) -> Result<()> {
+        histories::write(&self.folder().join(format!("{stem}.csv")), keys, runs)
     }
 
     /// Writes figures of one size as an animation, `STEM.png`.

@@ -3,14 +3,15 @@
 use std::collections::BTreeMap;
 
 use limitlab::Result;
-use limitlab::analysis::comparison::entries;
+use limitlab::analysis::comparison::{Entry, entries};
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::interpolate::interpolate;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::anderson::WINDOW;
 use limitlab::solvers::method::{SOR_OMEGA, SSOR_OMEGA};
-use limitlab::solvers::{Method, Outcome, Stop, run as solve};
+use limitlab::solvers::{Errors, Method, Outcome, Recorded, Report, Stop, run as solve};
 use limitlab_experiments::report::{Cell, Column, Columns, Figure, LinePlot, Scale, Series, Table};
+use limitlab_experiments::studies::comparison as study;
 
 use crate::context::{Context, Item, Subject};
 use crate::corpus;
@@ -124,7 +125,7 @@ fn one<'a>(context: &mut Context, subject: &'a Subject, scheme: Scheme) -> Resul
     let size = subject.surface.diagonal();
     let stop = |tolerance| Stop { tolerance: tolerance * size, max_iterations: LIMIT };
     let mut rows = TOLERANCES.map(|tolerance| Row { subject, scheme, tolerance, ended: BTreeMap::new() });
-    let mut series = Vec::new();
+    let mut histories = Vec::new();
     let lines = entries(&system, &spectrum, &Method::ALL, None, "file")?;
     for (method, variant) in COLUMNS {
         let name = column_name(method, variant);
@@ -133,15 +134,16 @@ fn one<'a>(context: &mut Context, subject: &'a Subject, scheme: Scheme) -> Resul
             // No bound of λ_min is proven for this mesh.
             continue;
         };
-        let report = solve(&system, subject.surface.positions(), line.method, &stop(TOLERANCES[2])).report;
-        let errors: Vec<f64> = report.history.iter().map(|e| e.max / size).collect();
+        let mut report = solve(&system, subject.surface.positions(), line.method, &stop(TOLERANCES[2])).report;
+        for Recorded { errors, .. } in &mut report.history {
+            *errors = Errors { max: errors.max / size, mean: errors.mean / size };
+        }
         for row in &mut rows {
-            let reached = errors.iter().position(|&e| e <= row.tolerance);
+            let reached = report.history.iter().find(|at| at.errors.max <= row.tolerance).map(|at| at.iteration);
             row.ended.insert(name.clone(), reached.ok_or(report.outcome));
         }
         if !line.method.is_direct() {
-            let name = format!("{} ({})", line.method, line.parameter);
-            series.push(Series::history(name, errors));
+            histories.push((line, report));
         }
     }
     for row in &mut rows {
@@ -156,6 +158,10 @@ fn one<'a>(context: &mut Context, subject: &'a Subject, scheme: Scheme) -> Resul
         return Ok(rows);
     }
     let stem = format!("{}--{}-{scheme}", ALL.id, subject.name.replace(':', "-"));
+    let keys = |line: &Entry| [line.method.to_string(), line.parameter.clone()];
+    let runs = histories.iter().map(|(line, report)| (keys(line), &report.history[..]));
+    context.histories(&stem, ["method", "parameter"], runs)?;
+    let curve = |(line, report): &(&Entry, Report)| Series::history(study::name(line), report.maxima());
     context.figure(
         &stem,
         &Figure::new(LinePlot {
@@ -163,7 +169,7 @@ fn one<'a>(context: &mut Context, subject: &'a Subject, scheme: Scheme) -> Resul
             x_label: "iterations".into(),
             y_label: "max error / L".into(),
             y_scale: Scale::Log,
-            series,
+            series: histories.iter().map(curve).collect(),
             ..LinePlot::default()
         }),
     )?;

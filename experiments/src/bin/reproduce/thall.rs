@@ -50,7 +50,7 @@ fn run(context: &mut Context) -> Result<()> {
         for (name, omega) in [("ω = ½", THALL_OMEGA), ("best ω", jacobi.optimal_omega())] {
             let method = Method::Jacobi { omega: Some(omega) };
             let report = solve(&system, subject.surface.positions(), method, &stop).report;
-            let errors = report.history.iter().map(|e| e.max / size).collect();
+            let errors = report.maxima().into_iter().map(|error| error / size).collect();
             rows.push(Row { subject, name, omega, jacobi, errors, outcome: report.outcome });
         }
     }

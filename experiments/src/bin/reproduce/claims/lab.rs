@@ -241,7 +241,7 @@ pub fn history(system: &LimitSystem, subject: &Subject, method: Method, count: u
     let stop = Stop { tolerance: 0.0, max_iterations: count };
     let report = run(system, subject.surface.positions(), method, &stop).report;
     let size = subject.surface.diagonal();
-    report.history.iter().map(|e| e.max / size).collect()
+    report.maxima().into_iter().map(|error| error / size).collect()
 }
 
 /// Stored entries of A a vertex.
