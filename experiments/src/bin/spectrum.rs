@@ -228,7 +228,9 @@ fn complex(input: &Input, arguments: &Arguments) -> Result<Value> {
             input.name
         ));
     }
-    let found = ComplexFindings::new(input, !arguments.no_sweeps).map_err(|e| input.named(e))?;
+    let progress = Progress::open(&input.name, arguments.common.quiet);
+    let found = ComplexFindings::new(input, !arguments.no_sweeps, &progress).map_err(|e| input.named(e))?;
+    drop(progress);
     let subject = input.subject();
     let out = &arguments.output.out;
     for table in found.tables(&subject) {
@@ -255,6 +257,7 @@ fn analyse_any(
 ) -> Result<Findings> {
     let Parts { name, bounds, verdict, stop, ends } = parts;
     let promise = Promise::new(&bounds);
+    progress.message("iterations that suffice");
     let counts = match stop {
         Ok(stop) => Some(promise.counts(acting, (points, start), stop.tolerance)),
         Err(error) => {
@@ -262,8 +265,12 @@ fn analyse_any(
             None
         }
     };
+    if arguments.full {
+        progress.message("all eigenvalues");
+    }
     let full = system.filter(|_| arguments.full).map(dense::full_eigenvalues).transpose()?;
     progress.step();
+    progress.message("ends of the spectra");
     let ends = ends()?;
     if !ends.converged() {
         arguments.common.remark(format_args!(
@@ -271,9 +278,10 @@ fn analyse_any(
         ));
     }
     progress.step();
-    let sweeps =
-        system.filter(|_| !arguments.no_sweeps).map(radii_of_sweeps::<LimitSystem>).transpose()?.unwrap_or_default();
+    let sweeps = system.filter(|_| !arguments.no_sweeps).map(|system| radii_of_sweeps(system, progress));
+    let sweeps = sweeps.transpose()?.unwrap_or_default();
     progress.step();
+    progress.message("what the points excite, and slow modes");
     let data = if arguments.no_data {
         [None; 2]
     } else {
@@ -284,6 +292,7 @@ fn analyse_any(
     let modes = system.filter(|_| count > 0).map(|s| modes(s, SymmetricForm::A, End::Lowest, count)).transpose()?;
     progress.step();
     let mut certificates = [None; 4];
+    progress.message("certificates");
     if let Some(system) = system.filter(|_| arguments.certify) {
         let Spectrum { a, jacobi } = ends.spectrum();
         for (slot, (which, end, estimate)) in certificates.iter_mut().zip([

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde_json::{Map, Value, json};
 
-use crate::cli::{Input, Subject, number};
+use crate::cli::{Input, Progress, Subject, number};
 use crate::report::{Column, Columns, Figure, LinePlot, Series, Table};
 use limitlab::analysis::complex_spectrum::ComplexSpectrum;
 use limitlab::analysis::dense::LARGEST_COMPLEX;
@@ -64,29 +64,37 @@ impl Relaxation {
     }
 }
 
-/// The spectral radii of Gauss-Seidel, SOR and SSOR in file order, each with its ω.
+/// The spectral radii of Gauss-Seidel, SOR and SSOR in file order, each with its ω, named on a bar while it is computed.
 ///
 /// # Errors
 /// As [`spectral_radius`].
-pub fn radii_of_sweeps<S: System>(system: &S) -> Result<Vec<(Method<'static>, f64, SpectralRadius)>> {
+pub fn radii_of_sweeps<S: System>(
+    system: &S,
+    progress: &Progress,
+) -> Result<Vec<(Method<'static>, f64, SpectralRadius)>> {
     let zero = vec![DVec3::ZERO; system.len()];
-    let sor = |omega| spectral_radius(system, |x| sweep(system, &zero, omega, 0..zero.len(), x));
-    let ssor = spectral_radius(system, |x| {
-        symmetric_sweep(system, &zero, SSOR_OMEGA, None, x);
-    })?;
+    let zero = &zero[..];
+    let radius = |method: Method<'static>, omega: f64, sweep: &dyn Fn(&mut [DVec3])| -> Result<_> {
+        progress.message(format!("spectral radius of {method}"));
+        Ok((method, omega, spectral_radius(system, sweep)?))
+    };
+    let sor = |omega: f64| move |x: &mut [DVec3]| sweep(system, zero, omega, 0..zero.len(), x);
+    let order = None;
     Ok(vec![
-        (Method::GaussSeidel { order: None }, 1.0, sor(1.0)?),
-        (Method::Sor { omega: SOR_OMEGA, order: None }, SOR_OMEGA, sor(SOR_OMEGA)?),
-        (Method::Ssor { omega: SSOR_OMEGA, order: None }, SSOR_OMEGA, ssor),
+        radius(Method::GaussSeidel { order }, 1.0, &sor(1.0))?,
+        radius(Method::Sor { omega: SOR_OMEGA, order }, SOR_OMEGA, &sor(SOR_OMEGA))?,
+        radius(Method::Ssor { omega: SSOR_OMEGA, order }, SSOR_OMEGA, &|x| {
+            symmetric_sweep(system, zero, SSOR_OMEGA, None, x);
+        })?,
     ])
 }
 
 impl ComplexFindings {
-    /// All eigenvalues of A and D⁻¹A, and the radii of sweeps if they are wanted.
+    /// All eigenvalues of A and D⁻¹A, and the radii of sweeps if they are wanted; the bar says which are computed.
     ///
     /// # Errors
     /// More than [`LARGEST_COMPLEX`] vertices; if a computation does not converge.
-    pub fn new(input: &Input, sweeps: bool) -> Result<Self> {
+    pub fn new(input: &Input, sweeps: bool, progress: &Progress) -> Result<Self> {
         let system = input.stages()?.whole();
         let too_many = || {
             Error::Computation(format!(
@@ -98,12 +106,13 @@ impl ComplexFindings {
         if System::len(&system) > LARGEST_COMPLEX {
             return Err(too_many());
         }
+        progress.message("all eigenvalues");
         let spectrum = ComplexSpectrum::full(&system)?;
         let relaxations = [SymmetricForm::A, SymmetricForm::Jacobi].map(|form| Relaxation::new(&spectrum, form));
         let [Some(a), Some(jacobi)] = relaxations else { return Err(too_many()) };
         Ok(ComplexFindings {
             relaxations: [a, jacobi],
-            sweeps: if sweeps { radii_of_sweeps(&system)? } else { Vec::new() },
+            sweeps: if sweeps { radii_of_sweeps(&system, progress)? } else { Vec::new() },
             verdict: Singularity::detect(&input.surface, input.scheme),
         })
     }

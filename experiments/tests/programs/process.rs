@@ -146,6 +146,43 @@ fn signals_leave_the_old_file_and_no_temporary_one() {
     assert_done(&output, "nohup");
 }
 
+/// Whole rows of a measurement that takes minutes, after Ctrl-C.
+#[test]
+fn what_was_measured_is_kept_when_scaling_is_stopped() {
+    if is_ignored(2) {
+        return;
+    }
+    let folder = tempdir().unwrap();
+    let sizes = ["1000"; 500].join(",");
+    let arguments =
+        ["--sizes", &sizes, "--scheme", "loop", "--runs", "1", "--profile", "0", "--gains", "0", "--steps", "0"];
+    let mut command = Plain::new(SCALING);
+    command.current_dir(folder.path()).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let child = command.spawn().unwrap();
+    let rows = || {
+        let table = fs::read_to_string(folder.path().join("out/scaling.csv")).unwrap_or_default();
+        let mut reader = csv::Reader::from_reader(table.as_bytes());
+        reader.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()).collect::<Vec<Vec<String>>>()
+    };
+    while rows().len() < 3 {
+        sleep(Duration::from_millis(5));
+    }
+    let before = rows();
+    assert!(Plain::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.signal(), Some(2), "{}", text(&output.stderr));
+    let after = rows();
+    assert_eq!(after[..before.len()], before);
+    assert!(after.iter().all(|row| row.len() == 11 && row[6] == "converged"), "{after:?}");
+    // Each row was said when it was there, then which files are complete.
+    let said: Vec<&str> = text(&output.stderr).lines().collect();
+    let (end, rows) = said.split_last().unwrap();
+    assert!(rows.len() >= after.len(), "{said:?}");
+    assert!(rows[0].starts_with("loop, irregular-tri:1000, good order, auto: "), "{said:?}");
+    assert!(end.starts_with("error: stopped by SIGINT: ") && end.contains(" complete"), "{end}");
+    assert!(below(folder.path()).iter().all(|name| !name.ends_with(".tmp")), "{:?}", below(folder.path()));
+}
+
 #[test]
 fn targets_that_cannot_be_written_are_found_before_the_work() {
     let folder = tempdir().unwrap();

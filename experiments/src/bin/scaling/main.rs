@@ -8,6 +8,7 @@ mod profile;
 mod steps;
 mod threads;
 
+use std::fmt;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -36,6 +37,10 @@ use limitlab_experiments::report::{
 
 /// Measures time, memory and iterations of the methods over growing meshes, from faces in memory to control points,
 /// everything counted.
+///
+/// As it stands this takes about twenty minutes on two cores, most of them for Cholesky and incomplete Cholesky of a million
+/// vertices, and 5 GB of memory; --sizes 1000,10000,100000 --profile 0 --gains 0 --steps 0 takes one. Each row is said on standard
+/// error and written as soon as it is measured, and what is there stays when the program is stopped.
 #[derive(Parser)]
 #[command(name = "scaling", version)]
 struct Arguments {
@@ -117,6 +122,7 @@ fn measure(arguments: &Arguments) -> Result<()> {
     for &scheme in &arguments.scheme.0 {
         panels.extend(of_scheme(arguments, scheme, bandwidth, &mut table)?);
     }
+    let progress = Progress::open("scaling", arguments.common.quiet);
     if !panels.is_empty() {
         let rows = panels.len() as u32 / 2;
         let mut figure = Figure::row(panels);
@@ -124,28 +130,30 @@ fn measure(arguments: &Arguments) -> Result<()> {
         (figure.width, figure.height) = (900, 40 + 230 * rows);
         figure.render()?.save(&arguments.out.join("scaling.png"))?;
     }
-    local_edits(arguments, &mut printer)?;
+    local_edits(arguments, &progress, &mut printer)?;
     if arguments.steps >= LEAST {
-        steps::steps(arguments.steps, &arguments.out, &mut printer)?;
+        steps::steps(arguments.steps, &arguments.out, &progress, &mut printer)?;
     }
     let all = rayon::current_num_threads();
     if arguments.gains >= LEAST && all > 1 {
-        threads::gains(arguments, all, &mut printer)?;
+        threads::gains(arguments, all, &progress, &mut printer)?;
     }
     if arguments.profile >= LEAST {
         let name = family(Scheme::CatmullClark, arguments.profile);
         let mesh = noisy(&name)?;
+        progress.message(format!("profile: {name}"));
         let profile = profile::profile(&name, &mesh, Scheme::CatmullClark, all)?;
         profile.write(&arguments.out)?;
         printer.table(&profile)?;
     }
+    drop(progress);
     printer.table(&table)?;
     arguments.common.remark(format_args!("tables and plot: {}", arguments.out.display()));
     printer.finish(json!({ "threads": threads, "triad_bytes_per_second": number(bandwidth) }))
 }
 
 /// Local edits on the meshes of all schemes and sizes, and the decay on the largest.
-fn local_edits(arguments: &Arguments, printer: &mut Printer) -> Result<()> {
+fn local_edits(arguments: &Arguments, progress: &Progress, printer: &mut Printer) -> Result<()> {
     let mut sizes = arguments.sizes.0.clone();
     sizes.retain(|&n| n <= arguments.most_edits);
     let Some(&last) = sizes.last() else {
@@ -157,14 +165,17 @@ fn local_edits(arguments: &Arguments, printer: &mut Printer) -> Result<()> {
         for &n in &sizes {
             let name = family(scheme, n);
             let mesh = noisy(&name)?;
+            progress.message(format!("local edits: {name}, {scheme}"));
             let operator = edits::edits(&name, mesh, scheme, arguments.tol, &mut rows)?;
+            edits::edits_table(arguments.tol, &rows).write(&arguments.out)?;
+            progress.step();
             if n == last {
                 largest.push((format!("{name}, {scheme}"), operator));
             }
         }
     }
     let table = edits::edits_table(arguments.tol, &rows);
-    table.write(&arguments.out)?;
+    progress.message("decay of the inverse");
     edits::decay_table(&largest)?.write(&arguments.out)?;
     printer.table(&table)
 }
@@ -272,6 +283,19 @@ struct Row {
     memory: usize,
 }
 
+impl fmt::Display for Row {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Row { scheme, name, way, seconds, outcome: Outcome { iterations, status, .. }, .. } = self;
+        let order = order(self.random);
+        write!(f, "{scheme}, {name}, {order} order, {}: {seconds:.2e} s, {iterations} iterations, {status}", way.name())
+    }
+}
+
+/// The order of vertices and faces in words.
+fn order(random: bool) -> &'static str {
+    if random { "random" } else { "good" }
+}
+
 impl Row {
     fn nanoseconds_per_vertex(&self) -> f64 {
         1e9 * self.seconds / self.vertices as f64
@@ -282,7 +306,7 @@ fn columns() -> Columns<'static, Row> {
     Columns::<Row>::new()
         .col(Column::key("scheme"), |r| r.scheme.name())
         .col(Column::key("mesh"), |r| r.name.clone())
-        .col(Column::key("order"), |r| if r.random { "random" } else { "good" })
+        .col(Column::key("order"), |r| order(r.random))
         .col(Column::key("method"), |r| r.way.name())
         .col(Column::count("vertices"), |r| r.vertices)
         .col(Column::count("iterations"), |r| r.outcome.iterations)
@@ -305,7 +329,9 @@ fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut 
     let estimate = estimate(scheme)?;
     let mut curves: Vec<Curve> = Vec::new();
     let mut bound = Vec::new();
-    let progress = Progress::open(scheme.name(), arguments.common.quiet);
+    let ways = |n: usize| Way::ALL.iter().filter(move |way| n <= way.most(arguments));
+    let runs = 2 * arguments.sizes.0.iter().map(|&n| ways(n).count()).sum::<usize>();
+    let progress = Progress::new(scheme.name(), runs, arguments.common.quiet);
     for &n in &arguments.sizes.0 {
         let name = family(scheme, n);
         let good = noisy(&name)?;
@@ -318,17 +344,16 @@ fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut 
             } else {
                 &good
             };
-            for way in Way::ALL {
-                if n > way.most(arguments) {
-                    continue;
-                }
+            for &way in ways(n) {
                 progress.message(format!("{name}: {}", way.name()));
-                let Some((seconds, outcome, memory)) = timed(arguments, mesh, scheme, way, estimate)? else {
+                let measured = timed(arguments, mesh, scheme, way, estimate)?;
+                progress.step();
+                let Some((seconds, outcome, memory)) = measured else {
                     continue;
                 };
-                progress.step();
                 let (name, vertices) = (name.clone(), mesh.len());
                 let row = Row { scheme, name, random, way, vertices, seconds, outcome, memory };
+                progress.line(&row);
                 table.push(columns.row(&row));
                 // A run of hours may be stopped: what was measured is kept.
                 table.write(&arguments.out)?;
@@ -380,7 +405,7 @@ fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) ->
         series.push(Series::line(name, bound.iter().copied()).colour(Colour(0, 0, 0)).dash(Dash::Dotted));
     }
     LinePlot {
-        title: format!("{scheme}, {} order", if random { "random" } else { "good" }),
+        title: format!("{scheme}, {} order", order(random)),
         x_label: "vertices".into(),
         y_label: "nanoseconds a vertex".into(),
         x_scale: Scale::Log,

@@ -11,8 +11,8 @@ use limitlab::mesh::order::Order;
 use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::{Mesh, Surface, Topology, io};
 use limitlab::schemes::{Refinement, Scheme, unified_sqrt3};
-use limitlab_experiments::cli::Printer;
-use limitlab_experiments::report::{Column, Columns};
+use limitlab_experiments::cli::{Printer, Progress};
+use limitlab_experiments::report::{Column, Columns, Table};
 
 use super::noisy;
 use super::threads::on_threads;
@@ -22,7 +22,7 @@ const RUNS: usize = 3;
 
 /// Measures all steps at about `n` vertices and writes the table to `folder`, which also takes the mesh files for a
 /// while.
-pub fn steps(n: usize, folder: &Path, printer: &mut Printer) -> Result<()> {
+pub fn steps(n: usize, folder: &Path, progress: &Progress, printer: &mut Printer) -> Result<()> {
     let mut rows = Vec::new();
     let quads = noisy(&format!("irregular-quad:{}", n & !1))?;
     let triangles = noisy(&format!("irregular-tri:{n}"))?;
@@ -35,11 +35,19 @@ pub fn steps(n: usize, folder: &Path, printer: &mut Printer) -> Result<()> {
         let random = shuffle_faces(&permute_vertices(&good, &order), 7);
         for (order, mesh) in [("good", &good), ("random", &random)] {
             for &threads in &threads {
-                let on = On { name: format!("irregular-{name}:{n}"), order, threads, vertices: mesh.len() };
+                let name = format!("irregular-{name}:{n}");
+                progress.message(format!("steps around the solve: {name}, {order} order, threads: {threads}"));
+                let on = On { name, order, threads, vertices: mesh.len() };
                 on_threads(threads, || Rows { rows: &mut rows, mesh, on }.measure(folder))??;
+                table(&rows).write(folder)?;
+                progress.step();
             }
         }
     }
+    printer.table(&table(&rows))
+}
+
+fn table(rows: &[Row]) -> Table {
     let columns = Columns::<Row>::new()
         .col(Column::key("step"), |r| r.step.clone())
         .col(Column::key("scheme"), |r| r.scheme)
@@ -51,14 +59,13 @@ pub fn steps(n: usize, folder: &Path, printer: &mut Printer) -> Result<()> {
         .col(Column::time("seconds"), |r| r.seconds)
         .col(Column::time("nanoseconds_per_vertex"), |r| 1e9 * r.seconds / r.vertices as f64)
         .col(Column::time("megabytes_per_second"), |r| r.speed.map(|s| s / 1e6));
-    let mut table = columns.table("scaling-steps", "The steps around the solve", &rows);
+    let mut table = columns.table("scaling-steps", "The steps around the solve", rows);
     table.note(
         "Memory to memory but for the files; the fastest of three runs. Refinement: from a validated mesh with its \
          topology to the refined mesh with its topology, nanoseconds per new vertex; \"from faces\" finds the topology \
          of the coarse mesh too, not validated. Assembly: from faces to A and M. Files: positions with all 17 digits; PLY is binary.",
     );
-    table.write(folder)?;
-    printer.table(&table)
+    table
 }
 
 /// What steps are measured on.

@@ -13,7 +13,7 @@ use limitlab::solvers::Method;
 use limitlab::solvers::coloured::Coloured;
 use limitlab::solvers::system::Rows;
 use limitlab::solvers::wavefront::Wavefront;
-use limitlab_experiments::cli::Printer;
+use limitlab_experiments::cli::{Printer, Progress};
 use limitlab_experiments::report::{Column, Columns};
 
 use super::machine::triad;
@@ -54,7 +54,7 @@ struct Row {
 }
 
 /// Writes the table of quads under Catmull-Clark and triangles under Loop.
-pub fn gains(arguments: &Arguments, all: usize, printer: &mut Printer) -> Result<()> {
+pub fn gains(arguments: &Arguments, all: usize, progress: &Progress, printer: &mut Printer) -> Result<()> {
     let runs = usize::from(arguments.runs).max(2);
     let columns = Columns::<Row>::new()
         .col(Column::key("scheme"), |r| r.scheme.name())
@@ -78,6 +78,7 @@ pub fn gains(arguments: &Arguments, all: usize, printer: &mut Printer) -> Result
         let mut seconds = Vec::new();
         let estimate = estimate(scheme)?;
         for way in WAYS {
+            progress.message(format!("one thread beside {all}: {name}: {}", way.name()));
             for part in ["whole", "set-up", "solve"] {
                 seconds.push((way.name(), part, [f64::INFINITY; 2]));
             }
@@ -98,6 +99,7 @@ pub fn gains(arguments: &Arguments, all: usize, printer: &mut Printer) -> Result
                 }
             }
         }
+        progress.message(format!("one thread beside {all}: {name}: products and sweeps"));
         for (k, count) in [1, all].into_iter().enumerate() {
             let single = on_threads(count, || kernels(&surface, scheme, runs))??;
             for (name, time) in single {
@@ -118,8 +120,9 @@ pub fn gains(arguments: &Arguments, all: usize, printer: &mut Printer) -> Result
             let name = name.clone();
             table.push(columns.row(&Row { scheme, name, method, part, seconds, bandwidth }));
         }
+        table.write(&arguments.out)?;
+        progress.step();
     }
-    table.write(&arguments.out)?;
     printer.table(&table)
 }
 
