@@ -23,7 +23,7 @@ pub fn json(history: &[Recorded]) -> Value {
 }
 
 /// Writes one CSV file with a row an iterate: two columns called `keys` that tell the runs apart, then the fields of
-/// [`json`].
+/// [`json()`].
 ///
 /// # Errors
 /// If it cannot be written.
