@@ -5,7 +5,7 @@
 
 #![allow(missing_docs, reason = "the functions that criterion's macro writes")]
 
-#[path = "../experiments/src/bin/scaling/baseline.rs"]
+#[path = "../experiments/src/programs/scaling/baseline.rs"]
 mod baseline;
 
 use std::hint::black_box;

@@ -1,109 +1,11 @@
-//! The limit system of a mesh as Matrix Market files: `assemble MESH --out DIR`.
+//! `assemble`: what it does is in [`assemble`].
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use serde_json::json;
 
-use limitlab::Result;
-use limitlab::assemble::matrix_market;
-use limitlab::output::{Batch, check_target, create_dir};
-use limitlab_experiments::cli::{self, CommonFlags, MeshFlags};
-
-/// Writes A, M, H and P of the limit system A V = P, A = H·M, as Matrix Market files with 17 significant digits,
-/// in the vertex order of the mesh. On an open or creased mesh A is no such product: A.mtx and P.mtx are those of all
-/// vertices, and the folder `smooth` has the five files of the system of the smooth vertices, in ascending order, once
-/// curves and corners are known; with darts and semi-sharp edges there is no such system.
-///
-/// A.mtx is general, M.mtx symmetric (lower triangle), H.mtx an N×1 array (the diagonal), P.mtx an N×3 array of the
-/// given points, and R.mtx = H⁻¹P, the right-hand side of M V = R. With --scheme zheng-cai, M and R are the paper's
-/// Eq. 6 in its own scaling.
-#[derive(Parser)]
-#[command(name = "assemble", version)]
-struct Arguments {
-    /// A mesh file (.obj, .off, .ply, .usda) or a built-in name
-    #[arg(value_name = "MESH")]
-    input: String,
-    /// Folder for the five files
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// Print one JSON object on standard output, and nothing else there
-    #[arg(long)]
-    json: bool,
-    #[command(flatten)]
-    mesh: MeshFlags,
-    #[command(flatten)]
-    common: CommonFlags,
-}
-
-/// What is written.
-const FILES: [&str; 5] = ["A.mtx", "M.mtx", "H.mtx", "P.mtx", "R.mtx"];
+use limitlab_experiments::programs::assemble::{self, Arguments};
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    cli::exit(|| {
-        arguments.common.apply()?;
-        run(&arguments)
-    })
-}
-
-fn run(arguments: &Arguments) -> Result<()> {
-    if arguments.mesh.print_defects(&[&arguments.input], &arguments.common)? {
-        return Ok(());
-    }
-    create_dir(&arguments.out)?;
-    for name in FILES {
-        check_target(&arguments.out.join(name))?;
-    }
-    let input = arguments.mesh.input(&arguments.input, &arguments.common)?;
-    let stages = input.stages()?;
-    let matrix = stages.matrix();
-    let points = &*input.given_points();
-    let known = stages.known(points);
-    let mut files = Vec::new();
-    let mut batch = Batch::default();
-    let whole = ["A.mtx", "P.mtx"].map(|name| arguments.out.join(name));
-    let mut folder = arguments.out.clone();
-    if stages.vertices().is_some() {
-        batch.write(&whole[0], |out| matrix_market::write_general(&matrix, out))?;
-        batch.write(&whole[1], |out| matrix_market::write_points(points, out))?;
-        files.extend(whole);
-        folder.push("smooth");
-    }
-    // With darts and semi-sharp vertices the smooth ones have no system of their own.
-    if stages.stars().is_none() {
-        create_dir(&folder)?;
-        let of_block = FILES.map(|name| folder.join(name));
-        let block = stages.block();
-        let right = stages.right_hand_side(&known);
-        let symmetric = block.symmetric_right_hand_side(&right);
-        batch.write(&of_block[0], |out| matrix_market::write_general(&block.a, out))?;
-        batch.write(&of_block[1], |out| matrix_market::write_symmetric(&block.m, out))?;
-        batch.write(&of_block[2], |out| matrix_market::write_vector(&block.h, out))?;
-        batch.write(&of_block[3], |out| matrix_market::write_points(&right, out))?;
-        batch.write(&of_block[4], |out| matrix_market::write_points(&symmetric, out))?;
-        files.extend(of_block);
-    }
-    batch.commit()?;
-    let names = input.scheme.paper_names();
-    arguments.common.remark(format_args!(
-        "{}: {} vertices, {} entries; in the paper {} = {}·{}",
-        arguments.out.display(),
-        stages.len(),
-        matrix.values().len(),
-        names.system,
-        names.diagonal,
-        names.symmetric
-    ));
-    if arguments.json {
-        let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
-        let object = input.json(json!({
-            "entries": matrix.values().len(),
-            "bandwidth": matrix.pattern().bandwidth(),
-            "files": files,
-        }));
-        cli::print_json(&object)?;
-    }
-    Ok(())
+    assemble::main(Arguments::parse())
 }

@@ -26,6 +26,9 @@ use crate::report::Table;
 use limitlab::error::{Error, Result};
 use limitlab::solvers::Stop;
 
+/// Version and commit, as `--version` says them.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("LIMITLAB_COMMIT"), ")");
+
 /// The end of the help of programs that take a method.
 pub const WHICH_METHOD: &str = "Which method for which mesh: docs/methods.md, ten lines with their evidence.";
 

@@ -1,0 +1,218 @@
+//! Every method on the same system, start, norm and tolerance: `compare-solvers [MESH|SYSTEM_DIR…]`.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
+use nalgebra::Complex;
+use serde_json::json;
+
+use crate::cli::{
+    self, CommonFlags, List, Matrix, MeshFlags, MonitorFlags, OutputFlags, Problem, Progress, StopFlags, WHICH_METHOD,
+};
+use crate::studies::comparison::{self as study, AUTO, Asked};
+use crate::studies::histories;
+use crate::studies::page::{self, Measured};
+use limitlab::analysis::comparison::{MethodRow, compare_entry, entries, with_least_times};
+use limitlab::analysis::complex_spectrum::ComplexSpectrum;
+use limitlab::analysis::dense;
+use limitlab::analysis::spectrum::{Spectra, spectrum};
+use limitlab::analysis::symmetric::SymmetricForm;
+use limitlab::mesh::order::Order;
+use limitlab::output::check_target;
+use limitlab::solvers::{Errors, Method, Step, System};
+use limitlab::{Error, Result};
+
+/// Runs every method on the same system from the same start V = P, and prints iterations, errors, observed and
+/// predicted rate, and the seconds of set-up and solve apart, the least of several runs where a run is short. Beside the
+/// picture stands a CSV file with the errors of every iterate.
+///
+/// A folder is taken for a system of anybody: M.mtx (symmetric positive definite), H.mtx (the positive diagonal of H; the
+/// identity if it is missing) and P.mtx (N×3, N×2 or N×1) of A V = P, A = H·M, as `assemble` writes them.
+///
+/// Where a mesh has darts or semi-sharp vertices, methods that need a symmetric M are left out, and the others run on all of A.
+#[derive(Parser)]
+#[command(name = "compare-solvers", version = cli::VERSION, after_help = WHICH_METHOD)]
+pub struct Arguments {
+    /// Mesh files (.obj, .off, .ply, .usda), built-in names, or folders with M.mtx, H.mtx and P.mtx; torus:32x32 with --noise 0.1 unless told
+    #[arg(value_name = "MESH|SYSTEM_DIR")]
+    meshes: Vec<String>,
+    /// Methods, separated by commas, auto among them; all unless told
+    #[arg(long, value_name = "NAME,…")]
+    method: Option<List<Asked>>,
+    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
+    #[arg(long, value_name = "NAME", default_value_t = Order::File)]
+    order: Order,
+    /// Write an interactive page of one mesh or folder to this file too: curves of convergence, an ω sweep, the spectrum, the
+    /// surfaces with the errors of every method; it needs a browser and no network
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    #[command(flatten)]
+    mesh: MeshFlags,
+    #[command(flatten)]
+    stop: StopFlags,
+    #[command(flatten)]
+    monitor: MonitorFlags,
+    #[command(flatten)]
+    output: OutputFlags,
+    #[command(flatten)]
+    common: CommonFlags,
+}
+
+/// Runs the program.
+pub fn main(mut arguments: Arguments) -> ExitCode {
+    if let (Some(_), several @ 2..) = (&arguments.html, arguments.meshes.len()) {
+        let what = format!("--html makes a page of one mesh, and {several} are named: run the program once for each");
+        Arguments::command().error(ErrorKind::ArgumentConflict, what).exit();
+    }
+    cli::exit(|| {
+        arguments.common.apply()?;
+        arguments.mesh.or_built_in(&mut arguments.meshes, &["torus:32x32"]);
+        run(&arguments)
+    })
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.mesh.print_defects(&arguments.meshes, &arguments.common)? {
+        return Ok(());
+    }
+    arguments.output.prepare()?;
+    if let Some(path) = &arguments.html {
+        check_target(path)?;
+    }
+    let mut results = Vec::new();
+    for name in &arguments.meshes {
+        let problem = arguments.mesh.problem(name, &arguments.stop, arguments.order, &arguments.common)?;
+        let Compared { rows, refused, measured } = compare(&problem, arguments)?;
+        let about = format!(
+            "{}; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:e} ({}).",
+            problem.subject.size,
+            problem.stop.tolerance * problem.scale,
+            problem.subject.unit
+        );
+        let stem = problem.subject.stem("compare-solvers");
+        let table = study::table(stem.clone(), format!("All methods on {}", problem.subject.title), about, &rows);
+        table.write(&arguments.output.out)?;
+        let figure = study::figure(problem.subject.title.clone(), problem.subject.unit, &rows);
+        figure.render()?.save(&arguments.output.out.join(format!("{stem}.png")))?;
+        let histories = rows.iter().map(|row| &row.solution.report.history);
+        let runs = rows.iter().map(|row| [row.method.to_string(), row.parameter.clone()]);
+        histories::write(
+            &arguments.output.out.join(format!("{stem}-history.csv")),
+            ["method", "parameter"],
+            runs.zip(histories.clone().map(Vec::as_slice)),
+        )?;
+        if let (Some(path), Some(measured)) = (&arguments.html, measured) {
+            page::page(&problem, measured, &rows, refused)?.write(path)?;
+            arguments.common.remark(format_args!("interactive page: {}", path.display()));
+        }
+        if !arguments.output.json {
+            cli::print(&table.to_markdown())?;
+        }
+        let mut objects = study::json(&rows);
+        for (object, history) in objects.as_array_mut().into_iter().flatten().zip(histories) {
+            object["history"] = histories::json(history);
+        }
+        results.push(problem.subject.json(json!({ "rows": objects })));
+    }
+    cli::finish(&results, &arguments.output, &arguments.common)
+}
+
+/// What comes of one mesh or folder.
+struct Compared<'a> {
+    /// Their errors in the units of the files.
+    rows: Vec<MethodRow<'a>>,
+    /// Which methods were left out, and why.
+    refused: Option<String>,
+    /// For the page, if one was asked for.
+    measured: Option<Measured>,
+}
+
+fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Compared<'a>> {
+    let asked = match &arguments.method {
+        Some(list) => list.0.clone(),
+        None => Method::ALL.into_iter().map(Asked::Method).chain([Asked::Auto]).collect(),
+    };
+    let method = |asked: &Asked| if let Asked::Method(method) = *asked { Some(method) } else { None };
+    let methods: Vec<Method> = asked.iter().filter_map(method).collect();
+    let auto = asked.contains(&Asked::Auto);
+    let mut refused = None;
+    let (mut rows, measured) = match problem.matrix() {
+        Matrix::Symmetric(system) => {
+            let eigenvalues = |_: &_| {
+                let all = (system.len() <= dense::LARGEST).then(|| dense::eigenvalues(system)).transpose()?;
+                let complex = |all: Vec<f64>| all.into_iter().map(Complex::from).collect();
+                Ok(all.map(|all| [complex(all.a), complex(all.jacobi)]))
+            };
+            by_methods(problem, system, &spectrum(system)?, eigenvalues, (&methods, auto), arguments)?
+        }
+        Matrix::General(system, vertex) => {
+            let (left_out, methods): (Vec<_>, Vec<_>) = methods.into_iter().partition(|method| method.needs_symmetry());
+            if let (Some(refused), true) = (left_out.first(), methods.is_empty() && !auto) {
+                return Err(Error::mesh(&problem.subject.name, refused.refused_at(vertex).to_string()));
+            }
+            if !left_out.is_empty() {
+                let names: Vec<&str> = left_out.iter().map(|method| method.name()).collect();
+                let what = format!(
+                    "vertex {vertex} is a dart or semi-sharp, and no diagonal makes the matrix symmetric: left out {}",
+                    names.join(", ")
+                );
+                arguments.common.remark(format_args!("{}: {what}", problem.subject.name));
+                refused = Some(what);
+            }
+            let eigenvalues = |spectrum: &ComplexSpectrum| {
+                let of = |form| spectrum.eigenvalues(form).map(<[_]>::to_vec);
+                Ok(of(SymmetricForm::A).zip(of(SymmetricForm::Jacobi)).map(<[_; 2]>::from))
+            };
+            by_methods(problem, system, &ComplexSpectrum::new(system)?, eigenvalues, (&methods, auto), arguments)?
+        }
+    };
+    for recorded in rows.iter_mut().flat_map(|row| &mut row.solution.report.history) {
+        recorded.errors = recorded.errors * problem.scale;
+    }
+    Ok(Compared { rows, refused, measured })
+}
+
+/// The rows of methods by name, and of `auto` if it is asked for; what the page needs beside them, with all `eigenvalues` of A
+/// and of D⁻¹A where there are not too many.
+fn by_methods<'a, S: System, K: Spectra + Clone + Sync>(
+    problem: &'a Problem,
+    system: &S,
+    spectra: &K,
+    eigenvalues: impl FnOnce(&K) -> Result<Option<[Vec<Complex<f64>>; 2]>>,
+    (methods, auto): (&[Method<'a>], bool),
+    arguments: &Arguments,
+) -> Result<(Vec<MethodRow<'a>>, Option<Measured>)> {
+    let order_name = arguments.order.to_string();
+    let lines = entries(system, spectra, methods, Some(&problem.order), &order_name)?;
+    let subject = &problem.subject.name;
+    let of_rows = Progress::new(subject, lines.len() + usize::from(auto), arguments.monitor.no_bar(&arguments.common));
+    let see = |name: &str, iteration, errors: Errors| {
+        arguments.monitor.see(format_args!("{subject}: {name}"), iteration, errors * problem.scale);
+        ControlFlow::Continue(())
+    };
+    let mut rows = Vec::new();
+    for line in &lines {
+        let name = study::name(line);
+        of_rows.message(name.as_str());
+        let watch = &mut |step: &Step| see(&name, step.iteration, step.errors);
+        rows.push(compare_entry(system, spectra, problem.data(), line, &problem.stop, watch)?);
+        of_rows.step();
+    }
+    if auto {
+        of_rows.message(AUTO);
+        let watch = &mut |method: &str, step: &Step| see(&format!("{AUTO} ({method})"), step.iteration, step.errors);
+        let again = || problem.auto(&mut |_, _| ControlFlow::Continue(()));
+        rows.push(study::auto_row(with_least_times(problem.auto(watch)?, again)?));
+        of_rows.step();
+    }
+    drop(of_rows);
+    if arguments.html.is_none() {
+        return Ok((rows, None));
+    }
+    let of_page = Progress::new(subject, page::steps(&rows), arguments.common.quiet);
+    let measured = page::measure(problem, system, spectra, eigenvalues(spectra)?, &rows, &of_page)?;
+    Ok((rows, Some(measured)))
+}

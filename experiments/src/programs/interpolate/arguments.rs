@@ -1,0 +1,141 @@
+//! Command line of `interpolate`.
+
+use std::path::PathBuf;
+
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory, Parser};
+
+use crate::cli::{self, CommonFlags, MeshFlags, MonitorFlags, StopFlags, WHICH_METHOD};
+use limitlab::mesh::order::Order;
+use limitlab::schemes::Refinement;
+use limitlab::solvers::Method;
+use limitlab::{Result, names};
+
+/// Computes the control mesh V with A V = P: the vertices P of the mesh become points of the limit surface. Unless
+/// refined by --subdivide, the faces stay, vertex for vertex, so that the result can replace the mesh in a tool that
+/// subdivides by the same scheme; another scheme's surface misses the points.
+///
+/// Blender, Maya and Rhino subdivide by Catmull-Clark: for these say --scheme catmull-clark, also of a triangle mesh,
+/// which is taken for Loop unless told. The last line of a run says which tools show its surface.
+#[derive(Parser)]
+#[command(name = "interpolate", version = cli::VERSION, after_help = WHICH_METHOD)]
+pub struct Arguments {
+    /// A mesh file (.obj, .off, .ply, .usda) or a built-in name
+    #[arg(value_name = "MESH")]
+    pub input: String,
+    /// The mesh to write (.obj, .off, .ply, .usda): the control mesh, or the surface with --subdivide or --limit
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
+    /// pcg-ssor, pcg-ic0, anderson, heavy-ball; two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); halstead (the fairest
+    /// surface, with --scheme catmull-clark: a control mesh two refinements down); butterfly and labsik-greiner (with
+    /// --subdivide: schemes that pass through the vertices of triangle meshes with no system solved). auto is
+    /// chebyshev in mixed precision without a stored matrix, cg where that makes no progress, and ldlt where neither
+    /// does
+    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice)]
+    pub method: Choice,
+    /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED.
+    /// By colours, gauss-seidel and sor of all vertices run on all threads without a stored matrix
+    #[arg(long, value_name = "NAME", default_value_t = Order::File)]
+    pub order: Order,
+    /// Print one JSON object on standard output, and nothing else there
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub shape: ShapeFlags,
+    #[command(flatten)]
+    pub mesh: MeshFlags,
+    #[command(flatten)]
+    pub stop: StopFlags,
+    #[command(flatten)]
+    pub monitor: MonitorFlags,
+    #[command(flatten)]
+    pub common: CommonFlags,
+}
+
+/// What is asked of the surface.
+#[derive(Args)]
+pub struct ShapeFlags {
+    /// Refine the control mesh K times by the scheme and write the surface; by mid-edge, where there are boundaries or
+    /// creases, two steps each time
+    #[arg(long, value_name = "K", default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=12))]
+    pub subdivide: u8,
+    /// Push the vertices that are written to their limit points
+    #[arg(long)]
+    pub limit: bool,
+    /// Write the unit normals of the limit surface with the vertices; zero where it has none
+    #[arg(long)]
+    pub write_normals: bool,
+    /// Interpolate these vertices only: numbers and ranges A..B, separated by commas, or a file of them; the other
+    /// control points stay where they are, or with --method halstead go where the surface is fairest
+    #[arg(long, value_name = "LIST|FILE")]
+    pub vertices: Option<String>,
+    /// Normals of the surface at given points: a file with lines `vertex nx ny nz`, or a mesh file with normals
+    /// (.obj, .off, .ply, .usda). Loop, √3 and Catmull-Clark turn rings of the mesh refined twice or more, Doo-Sabin tilts faces
+    #[arg(long, value_name = "FILE")]
+    pub normals: Option<PathBuf>,
+    /// Turn rings only where the normal is off by more than this angle in degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = degrees, requires = "normals")]
+    pub normal_threshold: f64,
+    /// Stop turning this angle in degrees before the given normal
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = degrees, requires = "normals")]
+    pub normal_tolerance: f64,
+    /// Spread the turn over this many levels
+    #[arg(long, value_name = "L", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8), requires = "normals")]
+    pub normal_levels: u8,
+    /// Scale the faces of interpolated vertices about their points after the first refinement: a positive number,
+    /// or a file with lines `vertex number` (schemes zheng-cai and nasri)
+    #[arg(long, value_name = "S|FILE", allow_negative_numbers = true)]
+    pub shape_handle: Option<String>,
+    /// Lin & Luo's unified √3 scheme, no system solved: α from 0 (approximating) over 1 (interpolating) to 2, a number
+    /// or a file with lines `vertex number` (others 0); with --vertices, those have α = 1
+    #[arg(long, value_name = "A|FILE", allow_negative_numbers = true, conflicts_with_all = ["normals", "shape_handle"])]
+    pub alpha: Option<String>,
+    /// Sweeps of --method two-phase at most
+    #[arg(long, value_name = "K", default_value_t = 5)]
+    pub ite_max: usize,
+    /// --method two-phase stops at a largest update of this part of the bounding box's diagonal
+    #[arg(long, value_name = "T", default_value_t = 0.003, value_parser = cli::positive)]
+    pub eps: f64,
+    /// Weight of the thin-plate energy in --method halstead, 0 or more
+    #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true)]
+    pub thin_plate: f64,
+    /// Weight of the membrane energy in --method halstead, positive
+    #[arg(long, value_name = "W", default_value_t = 1.0, value_parser = cli::positive)]
+    pub membrane: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Choice {
+    Auto,
+    Solver(Method<'static>),
+    TwoPhase,
+    Halstead,
+    /// A scheme that keeps its vertices.
+    Keeping(Refinement),
+}
+
+fn choice(text: &str) -> Result<Choice> {
+    let mut all = vec![
+        ("auto", Choice::Auto),
+        ("two-phase", Choice::TwoPhase),
+        ("halstead", Choice::Halstead),
+        ("butterfly", Choice::Keeping(Refinement::Butterfly)),
+        ("labsik-greiner", Choice::Keeping(Refinement::LabsikGreiner)),
+    ];
+    all.extend(Method::ALL.map(|method| (method.name(), Choice::Solver(method))));
+    names::find("method", text, &all, &Method::ALIASES.map(|(alias, method)| (alias, Choice::Solver(method))))
+}
+
+fn degrees(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if (0.0..=180.0).contains(&x) => Ok(x),
+        _ => Err("an angle from 0 to 180 is needed".into()),
+    }
+}
+
+/// Ends with status 2, as clap does: flags that contradict each other.
+pub fn conflict(what: &str) -> ! {
+    let mut command = Arguments::command();
+    command.error(ErrorKind::ArgumentConflict, what).exit()
+}

@@ -1,0 +1,158 @@
+//! The control mesh, or the surface, that passes through the vertices of a mesh: `interpolate MESH -o OUT`.
+
+mod arguments;
+mod control;
+mod summary;
+mod surfaces;
+mod vertex_options;
+
+use std::borrow::Cow;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use glam::DVec3;
+
+use crate::cli::{self, subdivision_of};
+use limitlab::Result;
+use limitlab::error::Error;
+use limitlab::interpolate::surface::check;
+use limitlab::mesh::features::Tags;
+use limitlab::mesh::file_tags::Subdivision;
+use limitlab::mesh::{Mesh, io};
+use limitlab::output::{allow_replacing, check_target};
+use limitlab::schemes::Scheme;
+
+pub use arguments::Arguments;
+use arguments::{Choice, conflict};
+use control::control_mesh;
+use summary::print_summary;
+use surfaces::{fairest, keeping, leave, refine, request, require_finite, unified};
+use vertex_options::VertexOptions;
+
+/// Runs the program.
+pub fn main(mut arguments: Arguments) -> ExitCode {
+    if arguments.shape.alpha.is_some() {
+        if *arguments.mesh.scheme.get_or_insert(Scheme::Sqrt3) != Scheme::Sqrt3 {
+            conflict("--alpha belongs to the unified √3 scheme: use it with --scheme sqrt3");
+        }
+        if arguments.method != Choice::Auto {
+            conflict("--alpha solves no system: leave --method out");
+        }
+    }
+    if arguments.method == Choice::TwoPhase
+        && *arguments.mesh.scheme.get_or_insert(Scheme::ZhengCai) != Scheme::ZhengCai
+    {
+        conflict("--method two-phase belongs to --scheme zheng-cai");
+    }
+    if arguments.method == Choice::Halstead {
+        if *arguments.mesh.scheme.get_or_insert(Scheme::CatmullClark) != Scheme::CatmullClark {
+            conflict("--method halstead belongs to --scheme catmull-clark");
+        }
+        if arguments.shape.shape_handle.is_some() {
+            conflict("--method halstead has no type-V faces for shape handles: use --scheme zheng-cai or nasri");
+        }
+        if arguments.shape.subdivide == 1 {
+            conflict("--method halstead gives a mesh two refinements down: use --subdivide 2 or more, or leave it out");
+        }
+    }
+    if let Choice::Keeping(scheme) = arguments.method {
+        let shape = &arguments.shape;
+        if arguments.mesh.scheme.is_some() {
+            conflict(&format!("--method {scheme} is a scheme of its own: leave --scheme out"));
+        }
+        if shape.vertices.is_some() || shape.normals.is_some() || shape.shape_handle.is_some() {
+            conflict(&format!("--method {scheme} passes through all vertices and takes no normals or shape handles"));
+        }
+        if shape.subdivide == 0 {
+            conflict(&format!(
+                "--method {scheme} leaves the control mesh as it is: ask for the surface with --subdivide"
+            ));
+        }
+        // Its topology is that of the scheme which is named where none is.
+        arguments.mesh.scheme = Some(Scheme::Loop);
+    }
+    cli::exit(|| {
+        arguments.common.apply()?;
+        run(&arguments)
+    })
+}
+
+/// Whether the output is the input: who names one file twice wants it replaced, read-only or not (as by `sed -i`).
+fn is_file_of(input: &str, output: &Path) -> bool {
+    let [input, output] = [Path::new(input), output].map(|path| path.canonicalize().ok());
+    input.is_some_and(|input| output.is_some_and(|output| input == output && input.is_file()))
+}
+
+/// Whether the output is a control mesh that is not refined, as tools take it.
+fn is_control(arguments: &Arguments) -> bool {
+    !arguments.shape.limit && arguments.shape.subdivide == 0
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.mesh.print_defects(&[&arguments.input], &arguments.common)? {
+        return Ok(());
+    }
+    io::check_name(&arguments.output)?;
+    let in_place = is_file_of(&arguments.input, &arguments.output);
+    if !in_place {
+        check_target(&arguments.output)?;
+    }
+    let input = arguments.mesh.input(&arguments.input, &arguments.common)?;
+    let refinement = match arguments.method {
+        Choice::Keeping(scheme) => scheme,
+        _ => input.scheme.refinement(),
+    };
+    refinement.check_size(&input.surface, arguments.shape.subdivide.into()).map_err(|e| input.named(e))?;
+    let per_vertex = VertexOptions::read(&arguments.shape, &input)?;
+    let named = |e: Error| match e {
+        Error::Io { .. } | Error::Parse { .. } | Error::Memory { .. } => e,
+        other => input.named(other),
+    };
+    let mut result = match (&per_vertex.alpha, arguments.method) {
+        (Some(alpha), _) => unified(arguments, &input, alpha).map_err(named)?,
+        (None, Choice::Halstead) => fairest(arguments, &input, &per_vertex).map_err(named)?,
+        (None, Choice::Keeping(scheme)) => keeping(arguments, &input, scheme).map_err(named)?,
+        (None, _) => {
+            let request = request(arguments, &per_vertex);
+            check(&input.surface, input.scheme, &request).map_err(named)?;
+            let control = control_mesh(arguments, &input, &per_vertex)?;
+            refine(&input, &request, control).map_err(named)?
+        }
+    };
+    leave(&input.frame, &mut result);
+    require_finite(&input, &result.made)?;
+
+    let start = Instant::now();
+    if in_place {
+        allow_replacing(&arguments.output)?;
+    }
+    let made = &result.made;
+    let normals = made.normals.as_deref();
+    // The surface itself is its faces.
+    let is_control = is_control(arguments);
+    let subdivision = if is_control { subdivision_of(input.scheme) } else { Subdivision::None };
+    // The fairest control mesh is refined, and has other edges than the file.
+    let tags = match (is_control, made.surface.len() == input.surface.len()) {
+        (true, true) => input.file_tags(),
+        (true, false) => Cow::Owned(made.surface.tags()),
+        (false, _) => Cow::Owned(Tags::default()),
+    };
+    let write = |mesh: &Mesh, normals: Option<&[DVec3]>| {
+        io::write_control(&arguments.output, mesh, normals, subdivision, &tags)
+    };
+    let remark = match input.welded.as_ref().filter(|_| made.surface.len() == input.surface.len()) {
+        None => write(made.surface.mesh(), normals)?,
+        // The file's own vertices and faces, one position for each that was made one.
+        Some((place, faces)) => {
+            let spread = |values: &[DVec3]| -> Vec<DVec3> { place.iter().map(|&v| values[v as usize]).collect() };
+            let mesh = Mesh::new(spread(made.surface.positions()), faces.clone());
+            write(&mesh, normals.map(spread).as_deref())?
+        }
+    };
+    if let Some(remark) = remark {
+        arguments.common.remark(format_args!("{}: {remark}", arguments.output.display()));
+    }
+    result.seconds.write = start.elapsed().as_secs_f64();
+    print_summary(arguments, &input, &per_vertex, &result)
+}

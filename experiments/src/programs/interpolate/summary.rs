@@ -1,0 +1,97 @@
+//! Summary of a run: remarks on standard error, and the JSON object.
+
+use crate::cli::{self, Input, advice, number};
+use crate::studies::histories;
+use glam::DVec3;
+use limitlab::Result;
+use serde_json::{Value, json};
+
+use super::arguments::{Arguments, Choice};
+use super::is_control;
+use super::surfaces::Finished;
+use super::vertex_options::VertexOptions;
+
+pub fn print_summary(
+    arguments: &Arguments,
+    input: &Input,
+    per_vertex: &VertexOptions,
+    result: &Finished,
+) -> Result<()> {
+    let Finished { made, errors, seconds, .. } = result;
+    let common = &arguments.common;
+    if !made.not_flattened.is_empty() {
+        common.remark(format_args!(
+            "{}: the faces of {} vertices have no average normal and were moved, not flattened (first: vertex {})",
+            input.name,
+            made.not_flattened.len(),
+            made.not_flattened[0]
+        ));
+    }
+    let without = made.normals.iter().flatten().filter(|n| **n == DVec3::ZERO).count();
+    if without > 0 {
+        common.remark(format_args!(
+            "{}: the surface has no normal at {without} vertices; (0, 0, 0) is written",
+            input.name
+        ));
+    }
+    common.remark(format_args!(
+        "{}: {} by {}, {} iterations, max error {:.3e}, mean {:.3e} (mesh units)",
+        arguments.output.display(),
+        match arguments.method {
+            Choice::Keeping(scheme) => scheme.name(),
+            _ => input.scheme.name(),
+        },
+        result.method,
+        result.iterations,
+        errors.max,
+        errors.mean
+    ));
+    if is_control(arguments) {
+        common.remark(format_args!("its surface: {}", advice::of_tools(input.scheme)));
+    }
+    common.remark(format_args!(
+        "seconds: read {:.3}, assemble {:.3}, solve {:.3}, subdivide {:.3}, write {:.3}",
+        input.read_seconds, seconds.assemble, seconds.solve, seconds.subdivide, seconds.write
+    ));
+    if !arguments.json {
+        return Ok(());
+    }
+    let marked = |marks: &Vec<bool>| marks.iter().filter(|&&m| m).count();
+    let given = |normals: &Vec<Option<DVec3>>| normals.iter().flatten().count();
+    let mut object = input.json(json!({
+        "method": result.method,
+        "iterations": result.iterations,
+        "status": result.status,
+        "max_error": number(errors.max),
+        "mean_error": number(errors.mean),
+        "tolerance": number(result.tolerance),
+        "history": histories::json(&result.history),
+        "output": arguments.output.display().to_string(),
+        "interpolated": per_vertex.interpolated.as_ref().map_or(input.surface.len(), marked),
+        "subdivide": arguments.shape.subdivide,
+        "limit": arguments.shape.limit,
+        "surface": {
+            "vertices": made.surface.len(),
+            "faces": made.surface.faces().len(),
+        },
+        "normals": per_vertex.normals.as_ref().map_or(Value::Null, |n| json!({
+            "given": given(n),
+            "set": made.normals_set,
+        })),
+        "fairness": result.fairness.map_or(Value::Null, |e| json!({
+            "thin_plate": number(e.thin_plate),
+            "membrane": number(e.membrane),
+        })),
+        "seconds": {
+            "read": number(input.read_seconds),
+            "assemble": number(seconds.assemble),
+            "solve": number(seconds.solve),
+            "subdivide": number(seconds.subdivide),
+            "write": number(seconds.write),
+        },
+    }));
+    if let Choice::Keeping(scheme) = arguments.method {
+        object["scheme"] = json!(scheme.name());
+    }
+    cli::print_json(&object)
+}

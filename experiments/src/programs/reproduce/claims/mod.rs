@@ -1,0 +1,350 @@
+//! The ledger: every statement of the four papers that a computation can confirm, correct or refute, with the
+//! numbers that decide it. All numbers are computed in each run, and verdicts follow from them by stated thresholds.
+//!
+//! - [`finding`]: numbers, thresholds, verdicts;
+//! - [`lab`]: the meshes and small tools that claims share;
+//! - one file a paper, and beside it one each for subjects of their own: [`thall`], [`zheng_cai`], [`pia`], [`lin_luo`];
+//! - [`open`]: what two of them leave to open meshes;
+//! - [`findings`]: the page on what is settled and what is wrong, filled with the ledger's numbers.
+
+mod finding;
+pub mod findings;
+mod lab;
+mod lin_luo;
+mod open;
+mod pia;
+mod pia_catmull_clark;
+mod thall;
+mod thall_masks;
+mod thall_surfaces;
+mod zheng_cai;
+mod zheng_cai_faces;
+mod zheng_cai_speed;
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use serde_json::{Value as Json, json};
+
+use crate::cli::number;
+use crate::report::{Column, Columns, Table, readable};
+use limitlab::error::Error;
+use limitlab::output::write_file;
+use limitlab::{Result, names};
+
+use crate::programs::reproduce::context::{Context, Item};
+use finding::{Evidence, Finding, Value, Verdict};
+use lab::Lab;
+
+pub const LEDGER: Item = Item { id: "claims", title: "The papers' claims one by one, with verdicts", run: run_ledger };
+
+pub const FINDINGS: Item =
+    Item { id: "findings", title: "Findings: what the papers left open or state wrongly", run: run_findings };
+
+/// A statement of a paper.
+pub struct Claim {
+    /// As in `--only ID`: the paper's letter and a number.
+    pub id: &'static str,
+    pub title: &'static str,
+    /// Where in the paper.
+    pub place: &'static str,
+    /// What it says there, in our words.
+    pub printed: &'static str,
+    /// Too slow for a quick run.
+    pub slow: bool,
+    pub check: fn(&Lab) -> Result<Finding>,
+}
+
+/// A claim with what came of it.
+pub struct Record {
+    pub claim: &'static Claim,
+    pub finding: Finding,
+}
+
+/// The papers by the letter of their claims.
+const PAPERS: [(char, &str); 4] = [
+    ('T', "Thall 2003, Fast C² Interpolating Subdivision Surfaces"),
+    ('Z', "Zheng & Cai 2005, Making Doo-Sabin surface interpolation always work"),
+    ('P', "Progressive Iterative Interpolation for Subdivision Surfaces"),
+    ('L', "Lin & Luo, A Unified √3 Subdivision Scheme"),
+];
+
+/// All claims in the order of the ledger.
+pub fn all() -> impl Iterator<Item = &'static Claim> {
+    let zheng_cai = [zheng_cai::CLAIMS, open::ZHENG_CAI];
+    let pia = [pia::CLAIMS, open::PIA];
+    [thall::CLAIMS, thall_masks::CLAIMS].into_iter().chain(zheng_cai).chain(pia).chain([lin_luo::CLAIMS]).flatten()
+}
+
+pub fn find(id: &str) -> Option<&'static Claim> {
+    all().find(|c| names::same(c.id, id))
+}
+
+/// Computes some claims, prints them, and holds them against the ledger in `--check`; writes nothing.
+///
+/// # Errors
+/// Those of the computations.
+pub fn run_alone(context: &mut Context, claims: &[&'static Claim]) -> Result<()> {
+    let records = compute(context, claims.iter().copied())?;
+    let sections: Vec<String> = records.iter().map(|r| section(r, shown)).collect();
+    context.printer.page(&sections.join("\n"))?;
+    context.compare(&table(&records))?;
+    context.ledger = records;
+    Ok(())
+}
+
+fn run_ledger(context: &mut Context) -> Result<()> {
+    let quick = context.quick;
+    let records = compute(context, all().filter(|c| !(quick && c.slow)))?;
+    let table = table(&records);
+    let folder = context.folder();
+    let write = |name: &str, text: &str| write_file(&folder.join(name), |out| out.write_all(text.as_bytes()));
+    let page = page(context, &records);
+    write("claims.md", &page)?;
+    write("claims.csv", &table.to_csv())?;
+    write("claims.json", &format!("{:#}\n", json(&records)))?;
+    context.printer.page(&page)?;
+    context.made.pages += 1;
+    context.note_table(&table);
+    context.compare(&table)?;
+    context.times(|_| Ok(times(&records)))?;
+    context.ledger = records;
+    Ok(())
+}
+
+fn run_findings(context: &mut Context) -> Result<()> {
+    if context.quick {
+        // The page quotes claims that a quick run leaves out.
+        return Ok(());
+    }
+    if context.ledger.is_empty() {
+        context.ledger = compute(context, all())?;
+    }
+    let page = findings::page(&context.note_on_meshes(), &context.ledger)?;
+    write_file(&context.folder().join("findings.md"), |out| out.write_all(page.as_bytes()))?;
+    context.made.pages += 1;
+    context.printer.page(&page)
+}
+
+fn compute(context: &Context, claims: impl Iterator<Item = &'static Claim>) -> Result<Vec<Record>> {
+    let lab = Lab::new(context);
+    claims
+        .map(|claim| {
+            let finding = (claim.check)(&lab).map_err(|e| Error::Computation(format!("claim {}: {e}", claim.id)))?;
+            Ok(Record { claim, finding })
+        })
+        .collect()
+}
+
+/// A number with the claim that it decides.
+type Line<'a> = (&'a Record, &'a Evidence);
+
+/// One row for every number of every claim; the durations among them have their values in [`times`] alone, so that
+/// this table is the same from run to run.
+fn table(records: &[Record]) -> Table {
+    // Of a claim without numbers.
+    let none = Evidence::shown("", f64::NAN);
+    let number = |e: &Evidence| match e.value {
+        Value::Number(x) if !e.quantity.is_empty() => Some(x),
+        _ => None,
+    };
+    let count = |e: &Evidence| match e.value {
+        Value::Count(n) => Some(n),
+        _ => None,
+    };
+    let columns = Columns::<Line>::new()
+        .col(Column::key("claim"), |(r, _)| r.claim.id)
+        .col(Column::key("quantity"), |(_, e)| e.quantity.clone())
+        .col(Column::remark("title"), |(r, _)| r.claim.title)
+        // What is measured with a random start or by sums of many terms differs in the last digits.
+        .col(Column::number("value", 1e-4, 6).floor(1e-9), move |(_, e)| number(e))
+        .col(Column::count("count"), move |(_, e)| count(e))
+        .col(Column::text("relation"), |(_, e)| e.test.map(|t| t.0.sign()))
+        .col(Column::number("threshold", 1e-9, 6), |(_, e)| e.test.map(|t| t.1))
+        .col(Column::text("holds"), |(_, e)| e.holds().map(|h| if h { "yes" } else { "no" }))
+        .col(Column::text("verdict"), |(r, _)| r.finding.verdict().name())
+        .col(Column::remark("remark"), |(r, _)| r.finding.remark.clone());
+    let lines: Vec<Line> = records
+        .iter()
+        .flat_map(|r| {
+            let evidence = match r.finding.evidence.as_slice() {
+                [] => std::slice::from_ref(&none),
+                evidence => evidence,
+            };
+            evidence.iter().map(move |e| (r, e))
+        })
+        .collect();
+    columns.table(LEDGER.id, LEDGER.title, &lines)
+}
+
+/// The durations, and ratios of durations, among the numbers of the claims.
+fn times(records: &[Record]) -> Table {
+    let columns = Columns::<(&Record, &Evidence, f64)>::new()
+        .col(Column::key("claim"), |(r, ..)| r.claim.id)
+        .col(Column::key("quantity"), |(_, e, _)| e.quantity.clone())
+        .col(Column::time("time"), |&(_, _, time)| time);
+    let lines: Vec<_> = records
+        .iter()
+        .flat_map(|r| r.finding.evidence.iter().map(move |e| (r, e)))
+        .filter_map(|(r, e)| if let Value::Time(time) = e.value { Some((r, e, time)) } else { None })
+        .collect();
+    columns.table(format!("{}--times", LEDGER.id), "Seconds, and their ratios, that claims speak of", &lines)
+}
+
+pub fn json(records: &[Record]) -> Json {
+    let evidence = |e: &Evidence| {
+        let value = match e.value {
+            Value::Count(n) => n.into(),
+            Value::Number(x) => number(x),
+            Value::Time(_) => Json::Null,
+        };
+        json!({
+            "quantity": e.quantity,
+            "value": value,
+            "relation": e.test.map(|t| t.0.sign()),
+            "threshold": e.test.map(|t| t.1),
+            "holds": e.holds(),
+        })
+    };
+    let record = |Record { claim, finding }: &Record| {
+        json!({
+            "id": claim.id,
+            "title": claim.title,
+            "source": source(claim),
+            "printed": claim.printed,
+            "verdict": finding.verdict().name(),
+            "evidence": finding.evidence.iter().map(evidence).collect::<Vec<_>>(),
+            "remark": finding.remark,
+        })
+    };
+    records.iter().map(record).collect()
+}
+
+fn paper(claim: &Claim) -> &'static str {
+    let letter = claim.id.chars().next();
+    let found = PAPERS.iter().find(|(l, _)| Some(*l) == letter);
+    found.map_or("", |(_, name)| name)
+}
+
+fn source(claim: &Claim) -> String {
+    format!("{}, {}", paper(claim), claim.place)
+}
+
+/// How many claims have each verdict, those that occur, as `12 reproduced, 3 corrected`.
+fn counts(records: &[Record]) -> String {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for record in records {
+        *counts.entry(record.finding.verdict().name()).or_default() += 1;
+    }
+    let parts = Verdict::ALL.iter().filter_map(|v| counts.get(v.name()).map(|n| format!("{n} {}", v.name())));
+    parts.collect::<Vec<_>>().join(", ")
+}
+
+/// A line for each verdict that occurs: how many claims have it, and which, unless they are as printed.
+pub fn verdicts(records: &[Record]) -> String {
+    let mut text = String::new();
+    for verdict in Verdict::ALL {
+        let with = records.iter().filter(|r| r.finding.verdict() == verdict);
+        let ids: Vec<&str> = with.map(|r| r.claim.id).collect();
+        if ids.is_empty() {
+            continue;
+        }
+        let named = if verdict == Verdict::Reproduced { String::new() } else { ids.join(" ") };
+        let line = format!("{:5} {:17} {named}", ids.len(), verdict.name());
+        let _ = writeln!(text, "{}", line.trim_end());
+    }
+    text
+}
+
+/// The claims that a quick run leaves out.
+pub fn left_out() -> Vec<&'static str> {
+    all().filter(|c| c.slow).map(|c| c.id).collect()
+}
+
+/// The whole ledger for people: a list with verdicts, then a section a claim.
+fn page(context: &Context, records: &[Record]) -> String {
+    let mut page = format!(
+        "# {}\n\n{}\n\nEach number was computed in the run that wrote this page; each verdict follows from the \
+         numbers by the thresholds beside them. *Reproduced*: as printed. *Corrected*: a slip; the right form holds, \
+         the printed one does not. *Refuted*: by the counterexample given. *Settled*: left open or not said in the \
+         paper, decided here. *Not reproducible*: with the reason. *Not confirmed*: a number is on the wrong side of \
+         its threshold. Random meshes are {} closed ones of at most {} vertices with valences from 3, from fixed \
+         seeds; L is the diagonal of a mesh's bounding box. `claims.csv` has a row for every number, `claims.json` \
+         both, `claims--times.csv` (written with `--times`) the durations.\n\n{} claims: {}.\n",
+        LEDGER.title,
+        context.note_on_meshes(),
+        lab::RANDOM_MESHES,
+        lab::RANDOM_VERTICES,
+        records.len(),
+        counts(records),
+    );
+    if context.quick {
+        let _ = write!(page, "\nQuick run, without {}.\n", left_out().join(", "));
+    }
+    for (_, name) in PAPERS {
+        let own = || records.iter().filter(move |r| paper(r.claim) == name);
+        let _ = write!(page, "\n## {name}\n\n| ID | claim | verdict |\n| --- | --- | --- |\n");
+        for Record { claim, finding } in own() {
+            let verdict = finding.verdict().name();
+            let _ = writeln!(page, "| {} | {} | {verdict} |", claim.id, claim.title);
+        }
+        for record in own() {
+            let _ = write!(page, "\n{}", section(record, shown_by_reference));
+        }
+    }
+    page
+}
+
+/// A claim for people, its numbers written by `show`.
+fn section(Record { claim, finding }: &Record, show: fn(Value) -> String) -> String {
+    let mut text = format!(
+        "### {} {} — {}\n\n{}. {}\n\n",
+        claim.id,
+        claim.title,
+        finding.verdict().name(),
+        claim.place,
+        claim.printed
+    );
+    for e in &finding.evidence {
+        let _ = write!(text, "- {}: {}", e.quantity, show(e.value));
+        if let Some((relation, threshold)) = e.test {
+            let missed = if e.holds() == Some(false) { "; it is not" } else { "" };
+            let _ = write!(text, " (to be {} {}{missed})", relation.sign(), shown(threshold.into()));
+        }
+        text.push('\n');
+    }
+    if !finding.remark.is_empty() {
+        let gap = if finding.evidence.is_empty() { "" } else { "\n" };
+        let _ = writeln!(text, "{gap}{}", finding.remark);
+    }
+    text
+}
+
+/// A number for people: six digits at most, whole numbers as such.
+fn shown(value: Value) -> String {
+    let x = value.number();
+    match value {
+        Value::Count(n) => n.to_string(),
+        Value::Time(_) => readable(x, 2),
+        Value::Number(_) if x.fract() == 0.0 && x.abs() < 1e6 => x.to_string(),
+        Value::Number(_) if x.abs() < 1e-3 => readable(x, 2),
+        Value::Number(_) => {
+            let text = readable(x, 6);
+            match text.contains('.') && !text.contains('e') {
+                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+                false => text,
+            }
+        }
+    }
+}
+
+/// As [`shown`]; durations are named by their place, so that the page is the same from run to run.
+fn shown_by_reference(value: Value) -> String {
+    match value {
+        Value::Time(_) => format!("see {}--times.csv", LEDGER.id),
+        Value::Number(_) | Value::Count(_) => shown(value),
+    }
+}
+
+#[cfg(test)]
+mod tests;

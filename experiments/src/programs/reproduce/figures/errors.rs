@@ -1,0 +1,126 @@
+//! Maps of interpolation errors, and of the modes in which they last.
+
+use glam::DVec3;
+
+use crate::report::{ColourScale, Picture, ShadedMesh};
+use limitlab::Result;
+use limitlab::analysis::spectrum::spectrum;
+use limitlab::assemble::LimitSystem;
+use limitlab::error::Error;
+use limitlab::mesh::builtin;
+use limitlab::schemes::Scheme;
+use limitlab::solvers::{Method, System};
+
+use super::{Album, FINE_EDGE, Line, control, plain, power, sheet, view};
+use crate::programs::reproduce::corpus::{self, Model};
+
+/// Iterates of the maps.
+const SHOWN: [usize; 6] = [0, 1, 2, 5, 10, 20];
+
+/// ‖p_i − (A v)_i‖ on the mesh while PIA goes on.
+pub fn maps(album: &mut Album) -> Result<()> {
+    let subject = album.subject(&corpus::HORSE)?;
+    let system = subject.system(Scheme::Loop)?;
+    let size = subject.surface.diagonal();
+    let scale = ColourScale::logarithmic("error / L", (1e-6, 1e-1));
+    let view = view(DVec3::Y, 30.0, 12.0);
+    let mut panels = Vec::new();
+    let mut last = 0.0;
+    for (i, k) in SHOWN.into_iter().enumerate() {
+        let (iterate, error) = control(&subject, &system, Method::Pia, k);
+        last = error;
+        let errors = (0..system.len())
+            .map(|v| (subject.surface.positions()[v] - system.row(v, iterate.positions())).length() / size)
+            .collect();
+        let surface =
+            ShadedMesh::smooth(subject.surface.mesh().clone()).scalars(errors, scale.clone()).edges(FINE_EDGE);
+        let mut picture = Picture::new(format!("k = {k}: {}", power(error / size)), view).surface(surface);
+        if i % 3 == 2 {
+            picture = picture.colour_bar(scale.clone());
+        }
+        panels.push(picture);
+    }
+    let line = Line {
+        name: "error-maps",
+        shows: "PIA, Loop: ‖p_i − (A v)_i‖ at every vertex after 0, 1, 2, 5, 10, 20 updates, L the bounding box's \
+                diagonal",
+        subject: subject.points(),
+        iterations: SHOWN.last().copied(),
+        error: Some(last),
+    };
+    album.add(&line, &sheet(3, (110, 108), panels))
+}
+
+/// The eigenvectors of Catmull-Clark's matrix that PIA is slowest to remove.
+pub fn slow_modes(album: &mut Album) -> Result<()> {
+    let plain = |name: &str| plain(name, builtin::builtin(name)?);
+    let mut subjects = vec![plain("truncated-octahedron")?, plain("prism:17")?, plain("torus:24x12")?];
+    subjects.push(album.subject(&Model { stand_in: "irregular-quad:226", ..corpus::SPOT_COARSE })?);
+    let scale = ColourScale::signed("eigenvector / largest", 1.0);
+    let mut panels = Vec::new();
+    for (i, subject) in subjects.iter().enumerate() {
+        let system = subject.system(Scheme::CatmullClark)?;
+        let (lambda, mode) = slowest(&system, &subject.name)?;
+        let view = view(DVec3::Y, 30.0, 25.0);
+        // Where the mode is; elsewhere there is nothing to see.
+        let framed: Vec<DVec3> =
+            (subject.surface.positions().iter().zip(&mode)).filter(|(_, x)| x.abs() > 0.01).map(|(&p, _)| p).collect();
+        let caption = format!("λ = {}", significant(lambda));
+        let mut picture = Picture::new(caption, view)
+            .surface(ShadedMesh::flat(subject.surface.mesh().clone()).scalars(mode, scale.clone()).edges(FINE_EDGE));
+        picture.framed = Some(framed);
+        if i % 2 == 1 {
+            picture = picture.colour_bar(scale.clone());
+        }
+        panels.push(picture);
+    }
+    let line = Line {
+        name: "slow-modes",
+        shows: "Catmull-Clark: the eigenvector of the least eigenvalue of A on the truncated octahedron (whose matrix \
+                is singular), a 17-sided prism, a 24×12 torus and this mesh, where it is not zero",
+        subject: subjects[3].points(),
+        iterations: None,
+        error: None,
+    };
+    album.add(&line, &sheet(2, (126, 112), panels))
+}
+
+/// Steps of the power iteration; it ends before where it has converged.
+const STEPS: usize = 200_000;
+
+/// The least eigenvalue of A and an eigenvector whose largest entry is 1: the power iteration on I − A, whose
+/// eigenvalues lie in [0, 1).
+///
+/// # Errors
+/// If the eigenvalue is not the one that the spectrum has.
+fn slowest(system: &LimitSystem, name: &str) -> Result<(f64, Vec<f64>)> {
+    let n = system.len();
+    // Multiples of the golden ratio: no symmetry of the mesh is one of the start.
+    let mut x: Vec<f64> = (1..=n).map(|i| (i as f64 * 0.618_033_988_749_895).fract() - 0.5).collect();
+    let mut residual = f64::INFINITY;
+    for _ in 0..STEPS {
+        let mut next: Vec<f64> = (0..n).map(|i| x[i] - system.a.row_times(i, &x)).collect();
+        let largest = next.iter().copied().fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
+        next.iter_mut().for_each(|v| *v /= largest);
+        residual = (x.iter().zip(&next)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        x = next;
+        if residual < 1e-9 {
+            break;
+        }
+    }
+    let at = (0..n).fold(0, |best, i| if x[i].abs() > x[best].abs() { i } else { best });
+    let lambda = system.a.row_times(at, &x) / x[at];
+    let known = spectrum(system)?.a.min;
+    if (lambda - known).abs() > 1e-6 {
+        return Err(Error::Computation(format!(
+            "{name}: the power iteration ended at eigenvalue {lambda} with a change of {residual:.1e} a step, but the \
+             least is {known}"
+        )));
+    }
+    Ok((lambda, x))
+}
+
+/// Three digits; rounding is 0.
+fn significant(x: f64) -> String {
+    if x.abs() < 1e-9 { "0".into() } else { format!("{x:.4}") }
+}
