@@ -11,10 +11,11 @@ use proptest::prelude::*;
 type Read = fn(&[u8], &Path) -> limitlab::Result<Loaded>;
 type Save = fn(&mut dyn Write, &Mesh, Option<&[DVec3]>) -> std::io::Result<()>;
 
-const FORMATS: [(&str, Read, Save); 4] = [
+const FORMATS: [(&str, Read, Save); 5] = [
     ("obj", obj::read_bytes, obj::write_to),
     ("off", off::read_bytes, off::write_to),
     ("ply", ply::read_bytes, ply::write_to),
+    ("text ply", ply::read_bytes, ply::write_text_to),
     ("usda", usd::read_bytes, usd::write_to),
 ];
 
@@ -64,10 +65,9 @@ proptest! {
             prop_assert_eq!(&loaded.mesh.faces, &mesh.faces);
             if name == "obj" {
                 prop_assert!(loaded.normals.is_none());
-                prop_assert_eq!(loaded.remarks.len(), usize::from(with_normals));
+                prop_assert_eq!(loaded.attributes.normals.len(), normals.map_or(0, <[DVec3]>::len));
             } else {
                 prop_assert_eq!(loaded.normals.as_deref().map(bits), normals.map(bits));
-                prop_assert!(loaded.remarks.is_empty());
             }
         }
     }
@@ -220,7 +220,7 @@ fn a_file_cut_anywhere_is_refused_or_says_so() {
                         assert_eq!(told, cut.last() != Some(&b'\n'));
                     }
                     // Without the last line end, nothing is missing.
-                    "off" => assert_eq!((length, &loaded.mesh), (bytes.len() - 1, &mesh)),
+                    "off" | "text ply" => assert_eq!((length, &loaded.mesh), (bytes.len() - 1, &mesh)),
                     "usda" => assert_eq!((length, &loaded.mesh.faces), (bytes.len() - 1, &mesh.faces)),
                     _ => panic!("{length} of {} bytes were taken for the whole", bytes.len()),
                 }
@@ -252,6 +252,33 @@ fn by_position(mesh: &Mesh) -> Vec<Vec<[u64; 3]>> {
     mesh.faces.iter().map(|face| face.iter().map(|&v| positions[v as usize]).collect()).collect()
 }
 
+/// What `tobj` makes of an OBJ file: for every run of faces its group, its material, and of its corners the position, the
+/// texture coordinates and the normal.
+fn seen_by_tobj(bytes: &[u8]) -> Vec<(String, Option<usize>, Vec<[Vec<f64>; 3]>)> {
+    let named = |name: &str| tobj::Material { name: name.into(), ..Default::default() };
+    let materials = |_: &Path| {
+        let names = ["wood", "dark stone"];
+        Ok((names.map(named).into(), names.into_iter().map(String::from).zip(0..).collect()))
+    };
+    let mut reader = std::io::BufReader::new(bytes);
+    let (models, _) = tobj::load_obj_buf(&mut reader, &tobj::LoadOptions::default(), materials).unwrap();
+    let of_model = |tobj::Model { mesh, name }| {
+        let at = |values: &[f64], indices: &[u32], k: usize, size: usize| -> Vec<f64> {
+            let place = indices.get(k).map_or(0, |&i| i as usize) * size;
+            values.get(place..place + size).unwrap_or_default().to_vec()
+        };
+        let corner = |k: usize| {
+            [
+                at(&mesh.positions, &mesh.indices, k, 3),
+                at(&mesh.texcoords, &mesh.texcoord_indices, k, 2),
+                at(&mesh.normals, &mesh.normal_indices, k, 3),
+            ]
+        };
+        (name, mesh.material_id, (0..mesh.indices.len()).map(corner).collect())
+    };
+    models.into_iter().map(of_model).collect()
+}
+
 /// What `tobj` makes of an OBJ file. It gives each group vertices of its own, numbered by first use.
 fn by_position_tobj(bytes: &[u8]) -> Vec<Vec<[u64; 3]>> {
     let options = tobj::LoadOptions::default();
@@ -276,6 +303,36 @@ fn by_position_tobj(bytes: &[u8]) -> Vec<Vec<[u64; 3]>> {
 }
 
 proptest! {
+    /// Texture coordinates, normals, groups and materials are the same to another reader after we have read and written them.
+    #[test]
+    fn attributes_reach_tobj_unchanged(
+        faces in prop::collection::vec(
+            (prop::collection::vec((1..6i64, 1..8i64, 1..5i64), 3..7), 0..4usize, any::<bool>(), 0..7usize),
+            1..20,
+        ),
+    ) {
+        let mut text = String::from("mtllib a.mtl\n");
+        (0..5).for_each(|k| text += &format!("v {k} {} 0.1\n", k * k));
+        (0..7).for_each(|k| text += &format!("vt 0.{k} {k}e-3\n"));
+        (0..4).for_each(|k| text += &format!("vn {k} 0 -1\n"));
+        for (corners, form, negative, before) in faces {
+            text += ["g one\n", "o two\n", "usemtl wood\n", "usemtl dark stone\n", "s 1\n", "s off\n", ""][before];
+            text += "f";
+            for (v, t, n) in corners {
+                let back = if negative { [6, 8, 5] } else { [0; 3] };
+                let [v, t, n] = [v - back[0], t - back[1], n - back[2]];
+                text += &[format!(" {v}"), format!(" {v}/{t}"), format!(" {v}//{n}"), format!(" {v}/{t}/{n}")][form];
+            }
+            text += "\n";
+        }
+        let loaded = obj::read_bytes(text.as_bytes(), Path::new("a.obj")).unwrap();
+        prop_assert!(loaded.remarks.is_empty(), "{:?}", loaded.remarks);
+        let mut written = Vec::new();
+        let options = io::WriteOptions { attributes: Some(&loaded.attributes), ..Default::default() };
+        obj::write_control_to(&mut written, &loaded.mesh, &options).unwrap();
+        prop_assert_eq!(seen_by_tobj(&written), seen_by_tobj(text.as_bytes()));
+    }
+
     /// Random meshes written in all the ways that OBJ has, read by us and by `tobj`.
     #[test]
     fn obj_agrees_with_tobj(

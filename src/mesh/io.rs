@@ -6,16 +6,19 @@
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::Path;
+use std::str::FromStr;
 
 use glam::DVec3;
 
+use super::attributes::Attributes;
 use super::features::Tags;
 use super::file_tags::{FileTags, Subdivision};
 use super::validate::Boundary;
 use super::{Faces, Mesh, obj, obj_normals, off, ply, usd};
 use crate::memory::require;
 use crate::output::write_file;
-use crate::{Error, Result};
+use crate::text::{push_point, push_unsigned};
+use crate::{Error, Result, names};
 
 /// A mesh with what its file tells about it.
 #[derive(Clone, Debug)]
@@ -31,6 +34,8 @@ pub struct Loaded {
     pub normals: Option<Vec<DVec3>>,
     /// What is sharp. OBJ and USD only.
     pub tags: FileTags,
+    /// Texture coordinates, normals of corners, groups, materials. OBJ only.
+    pub attributes: Attributes,
     /// The scheme that the file is made for, if it says that. USD only.
     pub subdivision: Option<Subdivision>,
     /// What a user should know, a sentence each: above all what the file holds and the mesh does not keep.
@@ -49,16 +54,49 @@ pub struct Lines {
 /// Memory for each byte of a file while it is read, itself included; measured on the densest format, binary PLY.
 const BYTES: u64 = 3;
 
-#[derive(Clone, Copy)]
-enum Format {
+/// The formats of mesh files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Wavefront OBJ, `.obj`.
     Obj,
+    /// Object File Format, `.off`.
     Off,
+    /// Stanford polygon file format, `.ply`: text and binary are read.
     Ply,
+    /// USD as text, `.usda`.
     Usd,
 }
 
+/// What is written with a mesh beside positions and faces, and how. The default is nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WriteOptions<'a> {
+    /// One a vertex.
+    pub normals: Option<&'a [DVec3]>,
+    /// The scheme that refines a control mesh. USD only.
+    pub subdivision: Subdivision,
+    /// Sharp edges and vertices, and the rule of the boundary. OBJ and USD only.
+    pub tags: Option<&'a Tags>,
+    /// What the file of the mesh, whose faces these are, said of them. OBJ only.
+    pub attributes: Option<&'a Attributes>,
+    /// PLY as text; the other formats always are.
+    pub ascii: bool,
+}
+
+impl FromStr for Format {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let all = [("off", Format::Off), ("obj", Format::Obj), ("ply", Format::Ply), ("usda", Format::Usd)];
+        names::find("format", text, &all, &[("usd", Format::Usd)])
+    }
+}
+
 impl Format {
-    fn of(path: &Path) -> Result<Self> {
+    /// The format that the ending of a name tells.
+    ///
+    /// # Errors
+    /// [`Error::Parse`] for an unknown ending, and for none, but for names in `/dev`, which are taken for OBJ.
+    pub fn of(path: &Path) -> Result<Self> {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         match extension.to_ascii_lowercase().as_str() {
             "obj" => Ok(Format::Obj),
@@ -76,28 +114,59 @@ impl Format {
         }
     }
 
-    /// Reads a file, all of it only if its first bytes can be of this format and memory has room for the mesh.
+    /// Reads a file.
     fn read_file(self, path: &Path) -> Result<Vec<u8>> {
+        let refused = |e| Error::io(path, "read", e);
+        let file = File::open(path).map_err(refused)?;
+        let found = file.metadata().map_err(refused)?;
+        self.read_all(file, path, found.is_file().then_some(found.len()))
+    }
+
+    /// Reads all bytes, of which there are so many if that is known, only if the first can be of this format and memory
+    /// has room for the mesh.
+    fn read_all(self, mut source: impl Read, path: &Path, size: Option<u64>) -> Result<Vec<u8>> {
         const HEAD: u64 = 1 << 16;
         let refused = |e| Error::io(path, "read", e);
-        let mut file = File::open(path).map_err(refused)?;
+        let has_room = |size: u64| {
+            require(BYTES.saturating_mul(size), || format!("{}: the mesh", path.display()), "use a smaller one")
+        };
         let mut bytes = Vec::new();
-        (&mut file).take(HEAD).read_to_end(&mut bytes).map_err(refused)?;
-        if bytes.len() as u64 == HEAD {
-            // Whole lines, unless the last is longer than a header's lines are.
-            let end = bytes.iter().rev().take(1 << 12).position(|&b| matches!(b, b'\n' | b'\r'));
-            let lines = bytes.len() - end.unwrap_or(0);
-            match self {
-                Format::Obj => obj::check_head(&bytes[..lines], path),
-                Format::Off => off::check_head(&bytes[..lines], path),
-                Format::Ply => ply::check_head(&bytes[..lines], path),
-                Format::Usd => usd::check_head(&bytes[..lines], path),
-            }?;
-            let size = file.metadata().map_err(refused)?.len();
-            require(BYTES * size, || format!("{}: the mesh", path.display()), "use a smaller one")?;
-            file.read_to_end(&mut bytes).map_err(refused)?;
+        source.by_ref().take(HEAD).read_to_end(&mut bytes).map_err(refused)?;
+        if (bytes.len() as u64) < HEAD {
+            return Ok(bytes);
         }
-        Ok(bytes)
+        // Whole lines, unless the last is longer than a header's lines are.
+        let end = bytes.iter().rev().take(1 << 12).position(|&b| matches!(b, b'\n' | b'\r'));
+        let lines = bytes.len() - end.unwrap_or(0);
+        match self {
+            Format::Obj => obj::check_head(&bytes[..lines], path),
+            Format::Off => off::check_head(&bytes[..lines], path),
+            Format::Ply => ply::check_head(&bytes[..lines], path),
+            Format::Usd => usd::check_head(&bytes[..lines], path),
+        }?;
+        if let Some(size) = size {
+            has_room(size)?;
+            source.read_to_end(&mut bytes).map_err(refused)?;
+            return Ok(bytes);
+        }
+        // As much again as is there already, until there is no more.
+        loop {
+            let there = bytes.len();
+            has_room(2 * there as u64)?;
+            source.by_ref().take(there as u64).read_to_end(&mut bytes).map_err(refused)?;
+            if bytes.len() < 2 * there {
+                return Ok(bytes);
+            }
+        }
+    }
+
+    fn parse(self, bytes: &[u8], path: &Path) -> Result<Loaded> {
+        match self {
+            Format::Obj => obj::read_bytes(bytes, path),
+            Format::Off => off::read_bytes(bytes, path),
+            Format::Ply => ply::read_bytes(bytes, path),
+            Format::Usd => usd::read_bytes(bytes, path),
+        }
     }
 }
 
@@ -122,13 +191,23 @@ pub fn check_name(path: &Path) -> Result<()> {
 /// its format says.
 pub fn read(path: &Path) -> Result<Loaded> {
     let format = Format::of(path)?;
-    let bytes = format.read_file(path)?;
-    match format {
-        Format::Obj => obj::read_bytes(&bytes, path),
-        Format::Off => off::read_bytes(&bytes, path),
-        Format::Ply => ply::read_bytes(&bytes, path),
-        Format::Usd => usd::read_bytes(&bytes, path),
-    }
+    format.parse(&format.read_file(path)?, path)
+}
+
+/// Reads a mesh from a stream, to its end, such as standard input; `name` is for messages.
+///
+/// # Errors
+/// As [`read`].
+///
+/// ```
+/// use limitlab::mesh::io::{Format, read_from};
+/// let text = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+/// let loaded = read_from(text.as_bytes(), Format::Off, "standard input".as_ref())?;
+/// assert_eq!(loaded.mesh.len(), 3);
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn read_from(source: impl Read, format: Format, name: &Path) -> Result<Loaded> {
+    format.parse(&format.read_all(source, name, None)?, name)
 }
 
 /// Reads the normals of a mesh file, one a vertex and zero for a vertex without, as in the file; `None` if it has none.
@@ -157,44 +236,61 @@ pub fn read_normals(path: &Path) -> Result<Option<Vec<DVec3>>> {
 /// # Panics
 /// If there are not as many normals as vertices.
 pub fn write(path: &Path, mesh: &Mesh, normals: Option<&[DVec3]>) -> Result<()> {
-    write_control(path, mesh, normals, Subdivision::None, &Tags::default()).map(drop)
+    write_control(path, mesh, &WriteOptions { normals, ..WriteOptions::default() })
 }
 
-/// As [`write()`], a control mesh: with its sharp edges and vertices and the rule of its boundary, where the format has
-/// them (OBJ, USD), and the scheme that refines it, where the format knows that (USD). What a reader would miss is said.
+/// As [`write()`], a control mesh: with what of `options` the format has. [`left_out`] says what it has not.
 ///
 /// # Errors
 /// As [`write()`].
 ///
 /// # Panics
 /// If there are not as many normals as vertices.
-pub fn write_control(
-    path: &Path,
-    mesh: &Mesh,
-    normals: Option<&[DVec3]>,
-    subdivision: Subdivision,
-    tags: &Tags,
-) -> Result<Option<&'static str>> {
+pub fn write_control(path: &Path, mesh: &Mesh, options: &WriteOptions) -> Result<()> {
     let format = Format::of(path)?;
-    write_file(path, |out| match format {
-        Format::Obj => {
-            obj::write_to(out, mesh, normals)?;
-            obj::write_tags_to(out, tags)
+    write_file(path, |out| write_control_to(out, format, mesh, options))
+}
+
+/// As [`write_control`], to a stream.
+///
+/// # Errors
+/// Those of the stream.
+///
+/// # Panics
+/// If there are not as many normals as vertices.
+pub fn write_control_to(out: &mut dyn Write, format: Format, mesh: &Mesh, options: &WriteOptions) -> io::Result<()> {
+    match format {
+        Format::Obj => obj::write_control_to(out, mesh, options),
+        Format::Off => off::write_to(out, mesh, options.normals),
+        Format::Ply if options.ascii => ply::write_text_to(out, mesh, options.normals),
+        Format::Ply => ply::write_to(out, mesh, options.normals),
+        Format::Usd => usd::write_control_to(out, mesh, options),
+    }
+}
+
+/// What a reader of the file would miss, because the format has no place for it: a sentence each.
+pub fn left_out(format: Format, options: &WriteOptions) -> Vec<String> {
+    let mut left_out = Vec::new();
+    let has_sharp = options.tags.is_some_and(|tags| !(tags.creases.is_empty() && tags.corners.is_empty()));
+    // Edge-and-corner is what is taken where a file says nothing.
+    let has_rule = options.tags.is_some_and(|t| matches!(t.boundary, Boundary::EdgeOnly | Boundary::AsInterior));
+    match format {
+        Format::Obj | Format::Usd => {}
+        Format::Off | Format::Ply if has_sharp => {
+            left_out.push("creases and corners are not written: use .usda or .obj".into());
         }
-        Format::Off => off::write_to(out, mesh, normals),
-        Format::Ply => ply::write_to(out, mesh, normals),
-        Format::Usd => usd::write_control_to(out, mesh, normals, subdivision, tags),
-    })?;
-    let has_sharp = !(tags.creases.is_empty() && tags.corners.is_empty());
-    Ok(match format {
-        Format::Obj | Format::Usd => None,
-        Format::Off | Format::Ply if has_sharp => Some("creases and corners are not written: use .usda or .obj"),
-        // Edge-and-corner is what is taken where a file says nothing.
-        Format::Off | Format::Ply if matches!(tags.boundary, Boundary::EdgeOnly | Boundary::AsInterior) => {
-            Some("the rule of the boundary is not written: use .usda or .obj")
+        Format::Off | Format::Ply if has_rule => {
+            left_out.push("the rule of the boundary is not written: use .usda or .obj".into());
         }
-        Format::Off | Format::Ply => None,
-    })
+        Format::Off | Format::Ply => {}
+    }
+    match (format, options.attributes) {
+        (Format::Off | Format::Ply | Format::Usd, Some(attributes)) if !attributes.is_empty() => {
+            left_out.push(format!("not written: {attributes}: use .obj"));
+        }
+        (Format::Obj | Format::Off | Format::Ply | Format::Usd, _) => {}
+    }
+    left_out
 }
 
 /// What is wrong with a face of fewer than three corners.
@@ -221,6 +317,28 @@ pub(super) fn write_rows(
         out.write_all(&text)?;
     }
     Ok(())
+}
+
+/// Writes positions and faces as OFF and text PLY have them: `x y z` and, where there are normals, `nx ny nz`; then a face's
+/// size and its vertices.
+pub(super) fn write_text_rows(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<()> {
+    write_rows(out, mesh.len(), |text, v| {
+        push_point(text, mesh.positions[v])?;
+        if let Some(normals) = normals {
+            text.push(b' ');
+            push_point(text, normals[v])?;
+        }
+        Ok(())
+    })?;
+    write_rows(out, mesh.faces.len(), |text, f| {
+        let face = mesh.faces.face(f);
+        push_unsigned(text, face.len() as u64);
+        for &v in face {
+            text.push(b' ');
+            push_unsigned(text, u64::from(v));
+        }
+        Ok(())
+    })
 }
 
 /// A mesh while it is read, within the limits of 32-bit indices. What is refused is said without the place, which
@@ -266,6 +384,11 @@ impl Builder {
         self.offsets.len() - 1
     }
 
+    /// Those of the face being read too.
+    pub fn corners(&self) -> usize {
+        self.corners.len()
+    }
+
     pub fn vertex(&mut self, position: DVec3, line: usize) -> std::result::Result<(), String> {
         if self.positions.len() == u32::MAX as usize {
             return Err("more vertices than 32-bit indices can name".into());
@@ -304,6 +427,7 @@ impl Builder {
             lines: self.lines,
             normals,
             tags: FileTags::default(),
+            attributes: Attributes::default(),
             subdivision: None,
             remarks,
         }

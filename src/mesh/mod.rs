@@ -1,6 +1,7 @@
 //! Polygon meshes: positions and faces, topology, validation, files, built-in meshes, vertex orders.
 //! This room knows no matrices.
 
+pub mod attributes;
 mod boundary;
 pub mod breadth_first;
 pub mod builtin;

@@ -6,21 +6,17 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::Mesh;
+use super::attributes::{Attributes, STATEMENTS};
 use super::features::Tags;
 use super::file_tags::{CornerTag, CreaseTag, FileTags, check_sharpness};
-use super::io::{Builder, Lines, Loaded, check_normals, write_rows};
+use super::io::{Builder, Lines, Loaded, WriteOptions, check_normals, write_rows};
 use super::magic::other_kind;
 use super::validate::Boundary;
 use crate::text::{Scanner, continues_line, leading_digits, push_number, push_point, push_unsigned};
 use crate::{Error, Result};
 
 /// Statements that are read over, by what they are about.
-const DROPPED: [(&str, &[&[u8]]); 9] = [
-    ("texture coordinates (vt)", &[b"vt"]),
-    ("normals (vn)", &[b"vn"]),
-    ("group names (g, o)", &[b"g", b"o"]),
-    ("smoothing groups (s)", &[b"s"]),
-    ("material statements", &[b"usemtl", b"mtllib", b"usemap", b"maplib"]),
+const DROPPED: [(&str, &[&[u8]]); 4] = [
     ("lines (l)", &[b"l"]),
     ("points (p)", &[b"p"]),
     ("tags that are not of sharpness (t)", &[b"t"]),
@@ -61,11 +57,13 @@ const NAMES: [&[u8]; 6] = [b"g", b"o", b"usemtl", b"mtllib", b"usemap", b"maplib
 /// Reads the bytes of an OBJ file; `path` is for messages.
 ///
 /// Corners may be `v`, `v/vt`, `v//vn`, `v/vt/vn`, and negative to count back from the last vertex read so far; a
-/// backslash continues a statement of numbers, but no name, for Windows paths may end with it. One remark names with counts what
-/// the mesh does not keep: all other statements but OpenSubdiv's tags of sharpness (vertices from 0 there),
-/// `t crease 2/1/0 a b sharpness`, `t corner 1/1/0 v sharpness` and `t interpolateboundary 1/0/0 k` (k: 0 none, 1 edge and
-/// corner, 2 edge only), of which a line may hold several edges or vertices, with a sharpness for all or one each; weights and colours after coordinates. Another tells if the last line has no end, for an OBJ file announces no
-/// counts by which a cut could be noticed.
+/// backslash continues a statement of numbers, but no name, for Windows paths may end with it. Kept are, as
+/// [tags](FileTags), OpenSubdiv's of sharpness (vertices from 0 there), `t crease 2/1/0 a b sharpness`,
+/// `t corner 1/1/0 v sharpness` and `t interpolateboundary 1/0/0 k` (k: 0 none, 1 edge and corner, 2 edge only), of which a
+/// line may hold several edges or vertices, with a sharpness for all or one each; and, as [`Attributes`], `vt` and `vn` with
+/// the corners that refer to them, `g`, `o`, `s`, `usemtl` and `mtllib`. One remark names with counts what the mesh does not
+/// keep: all other statements; weights and colours after coordinates. Another tells if the last line has no end, for an OBJ
+/// file announces no counts by which a cut could be noticed.
 ///
 /// # Errors
 /// [`Error::Parse`] with the line: another kind of file; a coordinate that is no number, a corner that is none or that reaches before the
@@ -86,6 +84,7 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     let mut dropped = [0usize; DROPPED.len()];
     let (mut weighted, mut unequal, mut coloured) = (0usize, 0usize, 0usize);
     let mut tags = TagLines::default();
+    let mut attributes = Attributes::default();
     let mut not_continued = None;
     let mut unknown: Option<(usize, Error)> = None;
     loop {
@@ -121,7 +120,13 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
                     if s.at_line_end() {
                         break;
                     }
-                    builder.corner(corner(&mut s, &builder)?);
+                    let (vertex, references) = corner(&mut s, &builder)?;
+                    if !references.is_empty() {
+                        let [texture, normal] = parsed(references);
+                        texture.into_iter().for_each(|t| attributes.texture.refer(builder.corners(), t));
+                        normal.into_iter().for_each(|n| attributes.normals.refer(builder.corners(), n));
+                    }
+                    builder.corner(vertex);
                 }
                 builder.end_face(line).map_err(at)?;
             }
@@ -130,15 +135,20 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
                 tags.read(&mut s, line)?;
             }
             keyword => {
-                match kind_of(keyword) {
-                    Some(kind) => dropped[kind] += 1,
-                    None => match &mut unknown {
-                        Some((count, _)) => *count += 1,
-                        None => unknown = Some((1, s.unexpected("an OBJ statement"))),
-                    },
-                }
-                if skip_statement(&mut s, keyword) {
+                let unexpected = s.clone();
+                let (statement, ends_with_backslash) = skip_statement(&mut s, keyword);
+                if ends_with_backslash {
                     not_continued.get_or_insert(line);
+                }
+                match (keyword, kind_of(keyword)) {
+                    (b"vt", _) => attributes.texture.push(statement),
+                    (b"vn", _) => attributes.normals.push(statement),
+                    (_, Some(Kind::Kept)) => attributes.statements.push((builder.faces() as u32, statement.into())),
+                    (_, Some(Kind::Dropped(kind))) => dropped[kind] += 1,
+                    (_, None) => match &mut unknown {
+                        Some((count, _)) => *count += 1,
+                        None => unknown = Some((1, unexpected.unexpected("an OBJ statement"))),
+                    },
                 }
             }
         }
@@ -186,9 +196,14 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     if s.ends_within_a_line() {
         remarks.push("the last line has no end: was the file cut off?".into());
     }
+    let corners = builder.corners();
+    let missing = attributes.texture.finish(corners) + attributes.normals.finish(corners);
+    if missing > 0 {
+        remarks.push(format!("{missing} references of corners to texture coordinates or normals that the file lacks"));
+    }
     tags.found.check_vertices(path, builder.vertices())?;
     let loaded = builder.finish(path, None, remarks);
-    Ok(Loaded { tags: tags.found, ..loaded })
+    Ok(Loaded { tags: tags.found, attributes, ..loaded })
 }
 
 /// Refuses the first bytes of a file, whole lines, if all that they hold is no OBJ.
@@ -199,7 +214,7 @@ pub(super) fn check_head(head: &[u8], path: &Path) -> Result<()> {
     let first = s.unexpected("an OBJ statement");
     while !s.at_end() {
         let keyword = s.token();
-        if matches!(keyword, b"v" | b"f") || kind_of(keyword).is_some() {
+        if is_known(keyword) {
             return Ok(());
         }
         s.skip_line();
@@ -218,9 +233,24 @@ fn check_kind(bytes: &[u8], path: &Path) -> Result<()> {
     }
 }
 
-/// Which of [`DROPPED`] a keyword is.
-fn kind_of(keyword: &[u8]) -> Option<usize> {
-    DROPPED.iter().position(|(_, words)| words.contains(&keyword))
+/// A statement that is not one of geometry.
+enum Kind {
+    /// By [`Attributes`].
+    Kept,
+    /// Which of [`DROPPED`] it is.
+    Dropped(usize),
+}
+
+fn kind_of(keyword: &[u8]) -> Option<Kind> {
+    let is_kept = matches!(keyword, b"vt" | b"vn") || STATEMENTS.iter().any(|(_, words)| words.contains(&keyword));
+    if is_kept {
+        return Some(Kind::Kept);
+    }
+    DROPPED.iter().position(|(_, words)| words.contains(&keyword)).map(Kind::Dropped)
+}
+
+fn is_known(keyword: &[u8]) -> bool {
+    matches!(keyword, b"v" | b"f") || kind_of(keyword).is_some()
 }
 
 /// Skips blanks, over line ends that a backslash continues.
@@ -233,19 +263,22 @@ pub(super) fn skip_blanks(s: &mut Scanner) {
     }
 }
 
-/// Skips what is left of a statement: its line, and those that continue it. Only statements of numbers are continued;
-/// whether a backslash ends another one is given back.
-pub(super) fn skip_statement(s: &mut Scanner, keyword: &[u8]) -> bool {
-    let is_known = matches!(keyword, b"v" | b"f") || kind_of(keyword).is_some();
-    let continues = is_known && !NAMES.contains(&keyword);
+/// Skips what is left of a statement: its line, and those that continue it. Only statements of numbers are continued.
+/// Gives the text without the end of its line, and whether a backslash ends it that continues nothing.
+pub(super) fn skip_statement<'a>(s: &mut Scanner<'a>, keyword: &[u8]) -> (&'a [u8], bool) {
+    let continues = is_known(keyword) && !NAMES.contains(&keyword);
+    let whole = s.rest();
     loop {
         let start = s.rest();
         s.skip_to_line_end();
         let line = &start[..start.len() - s.rest().len()];
+        let text = &whole[..whole.len() - s.rest().len()];
         s.skip_line_break();
         let has_backslash = line.last() == Some(&b'\\');
-        if !continues || !has_backslash {
-            return has_backslash;
+        // At the end of the file there is no line that it could continue with.
+        if !continues || !has_backslash || s.at_end() {
+            let text = if continues { text.strip_suffix(b"\\").unwrap_or(text) } else { text };
+            return (text.trim_ascii_end(), has_backslash && !continues);
         }
     }
 }
@@ -385,8 +418,8 @@ fn more_numbers(s: &mut Scanner, vertex: usize) -> Result<(usize, f64)> {
     }
 }
 
-/// One corner of the face being read, as the vertex it names.
-fn corner(s: &mut Scanner, builder: &Builder) -> Result<u32> {
+/// One corner of the face being read: the vertex it names, and what follows, `/vt/vn`.
+fn corner<'a>(s: &mut Scanner<'a>, builder: &Builder) -> Result<(u32, &'a [u8])> {
     let token = s.peek_token();
     let refuse = || {
         let face = builder.faces();
@@ -416,15 +449,13 @@ fn corner(s: &mut Scanner, builder: &Builder) -> Result<u32> {
     };
     let vertex = u32::try_from(vertex).map_err(|_| refuse())?;
     s.advance(token.len());
-    Ok(vertex)
+    Ok((vertex, references))
 }
 
-/// The numbers of the vertex and the normal of a corner `v//vn` or `v/vt/vn`; `None` without a normal.
-pub(super) fn corner_references(token: &[u8]) -> Option<(i64, i64)> {
-    let mut parts = std::str::from_utf8(token).ok()?.split('/');
-    let vertex = parts.next()?.parse().ok()?;
-    let normal = parts.nth(1)?.parse().ok()?;
-    Some((vertex, normal))
+/// The numbers of texture coordinates and normal in `/vt`, `//vn` or `/vt/vn`.
+pub(super) fn parsed(references: &[u8]) -> [Option<i64>; 2] {
+    let mut parts = references.split(|&b| b == b'/').skip(1);
+    [(); 2].map(|()| std::str::from_utf8(parts.next()?).ok()?.parse().ok())
 }
 
 /// Writes `mesh` as OBJ: `v` lines, `vn` lines if there are `normals` (one a vertex), `f` lines.
@@ -432,35 +463,66 @@ pub(super) fn corner_references(token: &[u8]) -> Option<(i64, i64)> {
 /// # Panics
 /// If there are not as many normals as vertices.
 pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<()> {
+    write_control_to(out, mesh, &WriteOptions { normals, ..WriteOptions::default() })
+}
+
+/// As [`write_to`], with tags of sharpness, and with attributes as their file had them; `normals` take the place of those at
+/// its corners.
+///
+/// # Panics
+/// If there are not as many normals as vertices.
+pub fn write_control_to(out: &mut dyn Write, mesh: &Mesh, options: &WriteOptions) -> io::Result<()> {
+    let &WriteOptions { normals, tags, attributes, .. } = options;
     check_normals(mesh, normals);
+    let none = Attributes::default();
+    let attributes = attributes.unwrap_or(&none);
     write_rows(out, mesh.len(), |text, v| {
         text.extend_from_slice(b"v ");
         push_point(text, mesh.positions[v])
     })?;
+    attributes.texture.write_to(out)?;
     if let Some(normals) = normals {
         write_rows(out, normals.len(), |text, v| {
             text.extend_from_slice(b"vn ");
             push_point(text, normals[v])
         })?;
+    } else {
+        attributes.normals.write_to(out)?;
     }
+    let mut statements = attributes.statements.iter().peekable();
     write_rows(out, mesh.faces.len(), |text, f| {
+        while let Some((_, statement)) = statements.next_if(|(face, _)| *face as usize <= f) {
+            text.extend_from_slice(statement);
+            text.push(b'\n');
+        }
         text.push(b'f');
-        for &v in mesh.faces.face(f) {
-            let number = u64::from(v) + 1;
+        for c in mesh.faces.range(f) {
+            let vertex = mesh.faces.corners()[c];
             text.push(b' ');
-            push_unsigned(text, number);
-            if normals.is_some() {
-                text.extend_from_slice(b"//");
-                push_unsigned(text, number);
+            push_unsigned(text, u64::from(vertex) + 1);
+            let texture = attributes.texture.of_corner(c);
+            let normal = if normals.is_some() { Some(vertex) } else { attributes.normals.of_corner(c) };
+            if texture.is_some() || normal.is_some() {
+                text.push(b'/');
+                texture.into_iter().for_each(|t| push_unsigned(text, u64::from(t) + 1));
+            }
+            if let Some(normal) = normal {
+                text.push(b'/');
+                push_unsigned(text, u64::from(normal) + 1);
             }
         }
         Ok(())
-    })
+    })?;
+    for (_, statement) in statements {
+        out.write_all(statement)?;
+        out.write_all(b"\n")?;
+    }
+    tags.map_or(Ok(()), |tags| write_tags_to(out, tags))
 }
 
 /// Writes the sharp edges and vertices and the rule of the boundary as OpenSubdiv's tags, a line each; a boundary that is
 /// treated as interior is its rule 0.
-pub fn write_tags_to(out: &mut dyn Write, tags: &Tags) -> io::Result<()> {
+fn write_tags_to(out: &mut dyn Write, tags: &Tags) -> io::Result<()> {
     let rule = match tags.boundary {
         Boundary::AsInterior => Some(0),
         Boundary::EdgeAndCorner => Some(1),
@@ -513,28 +575,71 @@ mod tests {
         let lines = loaded.lines.unwrap();
         assert_eq!(lines.vertices, [2, 5, 6, 7, 14]);
         assert_eq!(lines.faces, [8, 9, 10, 15]);
-        assert_eq!(loaded.remarks, ["the last line has no end: was the file cut off?"]);
+        let missing = "7 references of corners to texture coordinates or normals that the file lacks";
+        assert_eq!(loaded.remarks, ["the last line has no end: was the file cut off?", missing]);
     }
+
+    const KITCHEN_SINK: &str = "mtllib a.mtl\no thing\nv 0 0 0 1 0 0\nv 1 0 0 2\nv 0 1 0\nvt 0 0\nvt 1 0\nvn 0 0 1\n\
+                                g a b\ns 1\nusemtl c:\\m\\name\nvp 0 \\\n0\nf 1 2 3\nl 1 2\np 1\nblob 1\nblob 2\nend";
 
     #[test]
     fn what_is_not_kept_is_named_with_counts() {
-        let text = "mtllib a.mtl\no thing\nv 0 0 0 1 0 0\nv 1 0 0 2\nv 0 1 0\nvt 0 0\nvt 1 0\nvn 0 0 1\n\
-                    g a b\ns 1\nusemtl c:\\m\\name\nvp 0 \\\n0\nf 1 2 3\nl 1 2\np 1\nblob 1\nblob 2\nend";
-        let loaded = parse(text).unwrap();
+        let loaded = parse(KITCHEN_SINK).unwrap();
         assert_eq!(loaded.mesh.len(), 3);
         assert_eq!(loaded.normals, None);
         assert_eq!(
             loaded.remarks,
             [
-                "not kept: 2 texture coordinates (vt), 1 normals (vn), 2 group names (g, o), \
-                 1 smoothing groups (s), 2 material statements, 1 lines (l), 1 points (p), \
-                 2 free-form and display statements, \
+                "not kept: 1 lines (l), 1 points (p), 2 free-form and display statements, \
                  weights of 1 vertices (1 of them are not 1: the coordinates are not divided by them), \
                  colours of 1 vertices",
                 "2 unknown statements passed over, the first at a.obj, line 17: \"blob\" is not an OBJ statement",
                 "the last line has no end: was the file cut off?",
             ]
         );
+        assert_eq!(
+            loaded.attributes.to_string(),
+            "2 texture coordinates (vt), 1 normals (vn), 2 group names (g, o), 1 smoothing groups (s), \
+             2 material statements"
+        );
+        assert!(Attributes::default().is_empty() && Attributes::default().to_string().is_empty());
+    }
+
+    fn written(loaded: &Loaded, normals: Option<&[DVec3]>) -> String {
+        let mut text = Vec::new();
+        let options = WriteOptions { normals, attributes: Some(&loaded.attributes), ..WriteOptions::default() };
+        write_control_to(&mut text, &loaded.mesh, &options).unwrap();
+        String::from_utf8(text).unwrap()
+    }
+
+    #[test]
+    fn attributes_are_written_as_the_file_had_them() {
+        let values = "vt 0.250 1 # a\nvt 0\nvt 1 1 0.5\nvn 0 0 1\nvn 0 0 -1.#IND\n";
+        let faces = "mtllib a b.mtl\no thing\ng left \\\nusemtl Wood\\Dark\\\ns 1\nf 1/1/1 2/2/1 3/3/2\ns off\n\
+                     f 1/3 3/1 2/2\nf 1//2 3//2 2//1\nf 1 2/1 3//1\ng after\n";
+        let text = format!("{TRIANGLE}{values}{faces}");
+        let loaded = parse(&text).unwrap();
+        assert_eq!(written(&loaded, None), text);
+        // Normals of the surface take the place of those at the corners.
+        let with_normals = written(&loaded, Some(&[DVec3::Z; 3]));
+        assert!(with_normals.contains("f 1/1/1 2/2/2 3/3/3\ns off\nf 1/3/1 3/1/3 2/2/2\nf 1//1 3//3 2//2\n"));
+        assert_eq!(with_normals.matches("vn ").count(), 3);
+    }
+
+    #[test]
+    fn references_of_all_forms_mean_lines_by_number() {
+        // Back from what has been read, ahead of what has not, and to nothing.
+        let text = "v 0 0 0\nv 1 0 0\nvt 1\nv 0 1 0\nf 1/-1/1 2/2/1 3/-2/9\nvt 2 \\\n 3\nvn 1 1 1 \\";
+        let loaded = parse(text).unwrap();
+        let texture: Vec<_> = (0..3).map(|c| loaded.attributes.texture.of_corner(c)).collect();
+        assert_eq!(texture, [Some(0), Some(1), None]);
+        let normals: Vec<_> = (0..3).map(|c| loaded.attributes.normals.of_corner(c)).collect();
+        assert_eq!(normals, [Some(0), Some(0), None]);
+        assert_eq!(loaded.remarks[0], "the last line has no end: was the file cut off?");
+        assert_eq!(loaded.remarks[1], "2 references of corners to texture coordinates or normals that the file lacks");
+        let again = written(&loaded, None);
+        assert_eq!(again, format!("{TRIANGLE}vt 1\nvt 2 \\\n 3\nvn 1 1 1\nf 1/1/1 2/2/1 3\n"));
+        assert_eq!(parse(&again).unwrap().attributes, loaded.attributes);
     }
 
     #[test]
@@ -543,7 +648,7 @@ mod tests {
             let loaded = parse(&format!("{TRIANGLE}{statement}\nf 1 2 3\n")).unwrap();
             assert_eq!(loaded.mesh.faces.len(), 1);
             assert!(
-                loaded.remarks.len() == 2 && loaded.remarks[1].starts_with("a backslash ends line 4"),
+                loaded.remarks.last().is_some_and(|remark| remark.starts_with("a backslash ends line 4")),
                 "{:?}",
                 loaded.remarks
             );

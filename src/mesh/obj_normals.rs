@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::obj::{corner_references, skip_blanks, skip_statement};
+use super::obj::{parsed, skip_blanks, skip_statement};
 use crate::text::Scanner;
 use crate::{Error, Result};
 
@@ -53,7 +53,10 @@ pub(super) fn read(bytes: &[u8], path: &Path, vertices: usize) -> Result<Option<
                         break;
                     }
                     let token = s.peek_token();
-                    if let Some((vertex, normal)) = corner_references(token) {
+                    let (vertex, references) =
+                        token.split_at(token.iter().position(|&b| b == b'/').unwrap_or(token.len()));
+                    let vertex = std::str::from_utf8(vertex).ok().and_then(|v| v.parse().ok());
+                    if let (Some(vertex), [_, Some(normal)]) = (vertex, parsed(references)) {
                         let place = |reference: i64, count: usize| {
                             let index = if reference < 0 { count as i64 + reference } else { reference - 1 };
                             u64::try_from(index).unwrap_or(u64::MAX)

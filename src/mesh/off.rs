@@ -6,9 +6,9 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::Mesh;
-use super::io::{Builder, Lines, Loaded, check_normals, write_rows};
+use super::io::{Builder, Lines, Loaded, check_normals, write_text_rows};
 use super::magic::other_kind;
-use crate::text::{Scanner, push_point, push_unsigned, quoted};
+use crate::text::{Scanner, quoted};
 use crate::{Error, Result};
 
 /// What a vertex holds besides its position, by the letters before `OFF`.
@@ -313,23 +313,7 @@ pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> 
     check_normals(mesh, normals);
     let word = if normals.is_some() { "NOFF" } else { "OFF" };
     writeln!(out, "{word}\n{} {} 0", mesh.len(), mesh.faces.len())?;
-    write_rows(out, mesh.len(), |text, v| {
-        push_point(text, mesh.positions[v])?;
-        if let Some(normals) = normals {
-            text.push(b' ');
-            push_point(text, normals[v])?;
-        }
-        Ok(())
-    })?;
-    write_rows(out, mesh.faces.len(), |text, f| {
-        let face = mesh.faces.face(f);
-        push_unsigned(text, face.len() as u64);
-        for &v in face {
-            text.push(b' ');
-            push_unsigned(text, u64::from(v));
-        }
-        Ok(())
-    })
+    write_text_rows(out, mesh, normals)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::Mesh;
-use super::io::{Builder, Lines, Loaded, check_normals};
+use super::io::{Builder, Lines, Loaded, check_normals, write_text_rows};
 use crate::Result;
 use crate::text::Scanner;
 
@@ -168,20 +168,7 @@ fn first_of<T: AsRef<str>>(names: &[T], separator: &str) -> String {
 /// # Panics
 /// If there are not as many normals as vertices.
 pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<()> {
-    check_normals(mesh, normals);
-    let faces = &mesh.faces;
-    // The usual types unless something does not fit them.
-    let short = faces.iter().all(|f| f.len() <= usize::from(u8::MAX));
-    let length = if short { "uchar" } else { "uint" };
-    let fits_int = faces.corners().iter().all(|&v| i32::try_from(v).is_ok());
-    let index = if fits_int { "int" } else { "uint" };
-    let coordinates = if normals.is_some() { 6 } else { 3 };
-    write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", mesh.len())?;
-    for name in &COORDINATES[..coordinates] {
-        writeln!(out, "property double {name}")?;
-    }
-    write!(out, "element face {}\nproperty list {length} {index} vertex_indices\nend_header\n", faces.len())?;
-
+    let short = write_header(out, "binary_little_endian", mesh, normals)?;
     let mut row = Vec::new();
     let push_point = |row: &mut Vec<u8>, p: DVec3| {
         for coordinate in p.to_array() {
@@ -196,7 +183,7 @@ pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> 
         }
         out.write_all(&row)?;
     }
-    for face in faces.iter() {
+    for face in mesh.faces.iter() {
         row.clear();
         let size = (face.len() as u32).to_le_bytes();
         row.extend_from_slice(if short { &size[..1] } else { &size });
@@ -206,6 +193,33 @@ pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> 
         out.write_all(&row)?;
     }
     Ok(())
+}
+
+/// As [`write_to`], as text, a vertex or a face a line; all doubles read back equal.
+///
+/// # Panics
+/// If there are not as many normals as vertices.
+pub fn write_text_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<()> {
+    write_header(out, "ascii", mesh, normals)?;
+    write_text_rows(out, mesh, normals)
+}
+
+/// Writes the header. Whether a byte holds the size of every face.
+fn write_header(out: &mut dyn Write, format: &str, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<bool> {
+    check_normals(mesh, normals);
+    let faces = &mesh.faces;
+    // The usual types unless something does not fit them.
+    let short = faces.iter().all(|f| f.len() <= usize::from(u8::MAX));
+    let length = if short { "uchar" } else { "uint" };
+    let fits_int = faces.corners().iter().all(|&v| i32::try_from(v).is_ok());
+    let index = if fits_int { "int" } else { "uint" };
+    let coordinates = if normals.is_some() { 6 } else { 3 };
+    write!(out, "ply\nformat {format} 1.0\nelement vertex {}\n", mesh.len())?;
+    for name in &COORDINATES[..coordinates] {
+        writeln!(out, "property double {name}")?;
+    }
+    write!(out, "element face {}\nproperty list {length} {index} vertex_indices\nend_header\n", faces.len())?;
+    Ok(short)
 }
 
 #[cfg(test)]

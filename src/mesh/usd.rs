@@ -10,9 +10,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::features::Tags;
-use super::file_tags::Subdivision;
-use super::io::{Loaded, check_normals};
+use super::io::{Loaded, WriteOptions, check_normals};
 use super::magic::other_kind;
 use super::validate::Boundary;
 use super::{Mesh, bounding_box};
@@ -89,10 +87,10 @@ pub(super) fn check_head(head: &[u8], path: &Path) -> Result<()> {
 /// # Panics
 /// If there are not as many normals as vertices.
 pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<()> {
-    write_control_to(out, mesh, normals, Subdivision::None, &Tags::default())
+    write_control_to(out, mesh, &WriteOptions { normals, ..WriteOptions::default() })
 }
 
-/// Writes `mesh` as a mesh prim that is refined by `subdivision`, with its sharp edges (a crease each), sharp vertices and
+/// Writes `mesh` as a mesh prim that is refined by the subdivision of `options`, with its sharp edges (a crease each), sharp vertices and
 /// the rule of its boundary; a boundary that is treated as interior is USD's `none`.
 ///
 /// USD has points in single precision (`point3f`), and nine significant digits are written, which hold it: read here, a
@@ -100,17 +98,12 @@ pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> 
 ///
 /// # Panics
 /// If there are not as many normals as vertices.
-pub fn write_control_to(
-    out: &mut dyn Write,
-    mesh: &Mesh,
-    normals: Option<&[DVec3]>,
-    subdivision: Subdivision,
-    tags: &Tags,
-) -> io::Result<()> {
+pub fn write_control_to(out: &mut dyn Write, mesh: &Mesh, options: &WriteOptions) -> io::Result<()> {
+    let &WriteOptions { normals, subdivision, tags, .. } = options;
     check_normals(mesh, normals);
     out.write_all(b"#usda 1.0\n(\n    defaultPrim = \"mesh\"\n)\n\ndef Mesh \"mesh\"\n{\n")?;
     writeln!(out, "    uniform token subdivisionScheme = \"{subdivision}\"")?;
-    if let Some(rule) = boundary_token(tags.boundary) {
+    if let Some(rule) = tags.and_then(|tags| boundary_token(tags.boundary)) {
         writeln!(out, "    uniform token interpolateBoundary = \"{rule}\"")?;
     }
     if let Some((lo, hi)) = bounding_box(&mesh.positions) {
@@ -135,7 +128,7 @@ pub fn write_control_to(
         write_points(out, "normal3f[] normals", normals)?;
         out.write_all(b" (\n        interpolation = \"vertex\"\n    )\n")?;
     }
-    let (creases, corners) = (&tags.creases, &tags.corners);
+    let (creases, corners) = tags.map_or((&[][..], &[][..]), |tags| (&tags.creases, &tags.corners));
     if !creases.is_empty() {
         write_whole(out, "creaseIndices", 2 * creases.len(), |k| creases[k / 2].0[k % 2])?;
         write_whole(out, "creaseLengths", creases.len(), |_| 2)?;

@@ -12,10 +12,11 @@ use super::{CommonFlags, StopFlags, advice};
 use limitlab::assemble::Stages;
 use limitlab::error::{Error, Result, short};
 use limitlab::interpolate::solver::require_memory;
+use limitlab::mesh::attributes::Attributes;
 use limitlab::mesh::features::{Features, Rule, SHARP, Tags, creases_by_angle};
 use limitlab::mesh::file_tags::{FileTags, Subdivision};
 use limitlab::mesh::frame::Frame;
-use limitlab::mesh::io::{self, Loaded, has_mesh_ending};
+use limitlab::mesh::io::{self, Format, Loaded, has_mesh_ending};
 use limitlab::mesh::noise::{Noise, move_vertices};
 use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::weld::seams;
@@ -25,7 +26,7 @@ use limitlab::schemes::Scheme;
 use limitlab::solvers::Stop;
 
 /// How a mesh is read and prepared.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct MeshFlags {
     /// Scheme: catmull-clark, loop, sqrt3, nasri, zheng-cai or mid-edge; loop on triangles, else catmull-clark, unless told
     #[arg(long, value_name = "NAME")]
@@ -37,6 +38,9 @@ pub struct MeshFlags {
     /// the file, edge-only (the curve is smooth there), as-interior (boundary vertices as interior ones: loop, sqrt3 and mid-edge only) or refuse
     #[arg(long, value_name = "RULE")]
     pub boundary: Option<Boundary>,
+    /// The format of a mesh on standard input or output, whose name is -: obj, off, ply or usda
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<Format>,
     /// Make one vertex of those at the same position: seams are closed; the control mesh keeps the file's vertices
     #[arg(long)]
     pub weld: bool,
@@ -68,6 +72,8 @@ pub struct Input {
     pub scheme: Scheme,
     /// What is sharp, by the file and by the flags. The rule of the boundary is to refuse it where there is none.
     pub tags: Tags,
+    /// What the file says of its faces beyond what is computed with.
+    pub attributes: Attributes,
     /// Where the vertices of the file went, and its faces, with --weld.
     pub welded: Option<(Vec<u32>, Faces)>,
     /// Reading the file or making the built-in mesh.
@@ -75,6 +81,9 @@ pub struct Input {
     /// Validation and topology.
     pub check_seconds: f64,
 }
+
+/// What stands for standard input and output where a file may be named.
+pub const STANDARD_STREAM: &str = "-";
 
 /// The noise that built-in meshes carry where they stand in for real ones.
 pub const STAND_IN_NOISE: Noise = Noise { amplitude: 0.1, seed: 1 };
@@ -101,12 +110,17 @@ impl MeshFlags {
         }
     }
 
-    /// Reads the file, or makes the built-in mesh, called `name`.
+    /// Reads the file or standard input, or makes the built-in mesh, called `name`.
     ///
     /// # Errors
-    /// As the readers; an unknown name lists the built-in ones.
+    /// As the readers; standard input without its format; an unknown name lists the built-in ones.
     pub fn load(&self, name: &str) -> Result<Loaded> {
         let path = Path::new(name);
+        if name == STANDARD_STREAM {
+            let what = "it has no name that tells the format: give --format obj, off, ply or usda";
+            let format = self.format.ok_or_else(|| Error::mesh("standard input", what))?;
+            return io::read_from(std::io::stdin().lock(), format, Path::new("standard input"));
+        }
         if path.is_dir() {
             let what = "it is a folder, and a mesh is needed: a file, or a built-in name (a folder is a system if it holds \
                         M.mtx and P.mtx; compare-solvers, sweep-omega and spectrum take it)";
@@ -125,6 +139,7 @@ impl MeshFlags {
             lines: None,
             normals: None,
             tags: FileTags::default(),
+            attributes: Attributes::default(),
             subdivision: None,
             remarks: Vec::new(),
         })
@@ -152,9 +167,9 @@ impl MeshFlags {
     fn loaded(&self, name: &str, common: &CommonFlags) -> Result<Loaded> {
         let loaded = self.load(name)?;
         for remark in &loaded.remarks {
-            common.remark(format_args!("{name}: {remark}"));
+            common.remark(format_args!("{}: {remark}", loaded.name));
         }
-        require_memory(&loaded.mesh).map_err(|e| Error::mesh(name, e.to_string()))?;
+        require_memory(&loaded.mesh).map_err(|e| Error::mesh(&loaded.name, e.to_string()))?;
         Ok(loaded)
     }
 
@@ -168,7 +183,8 @@ impl MeshFlags {
         let loaded = self.loaded(name, common)?;
         let read_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let Loaded { mut mesh, mut lines, tags, subdivision, .. } = loaded;
+        let Loaded { name, mut mesh, mut lines, tags, attributes, subdivision, .. } = loaded;
+        let name = &name[..];
         let welded = self.weld.then(|| self.welded(name, &mut mesh, &mut lines, common)).flatten();
         let surface = Surface::examined(mesh, numbers(&lines), self.rule(&tags)).map_err(|report| {
             report.remarks.iter().for_each(|remark| common.remark(format_args!("{name}: {remark}")));
@@ -203,6 +219,7 @@ impl MeshFlags {
             frame,
             scheme,
             tags,
+            attributes,
             welded,
             read_seconds,
             check_seconds: start.elapsed().as_secs_f64(),

@@ -8,7 +8,7 @@ mod problem;
 mod process;
 mod progress;
 
-pub use input::{Input, MeshFlags, STAND_IN_NOISE, subdivision_of};
+pub use input::{Input, MeshFlags, STAND_IN_NOISE, STANDARD_STREAM, subdivision_of};
 pub use json::print_json;
 pub use monitor::MonitorFlags;
 pub use problem::{Given, Matrix, Problem, Subject};
@@ -16,6 +16,7 @@ pub use process::{exit, say};
 pub use progress::Progress;
 
 use std::collections::BTreeMap;
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::PathBuf;
 
 use clap::Args;
@@ -176,14 +177,24 @@ where
     }
 }
 
-/// Prints to standard output. A reader that has gone away is no failure: the rest is not wanted.
+/// Prints to standard output.
+///
+/// # Errors
+/// As [`write_standard`].
+pub fn print(text: &str) -> Result<()> {
+    write_standard(|out| {
+        out.write_all(text.as_bytes())?;
+        out.write_all(b"\n")
+    })
+}
+
+/// Writes to standard output what `fill` gives. A reader that has gone away is no failure: the rest is not wanted.
 ///
 /// # Errors
 /// Any other failure to write.
-pub fn print(text: &str) -> Result<()> {
-    use std::io::{ErrorKind, Write};
-    let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
+pub fn write_standard(fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
+    let mut out = BufWriter::new(std::io::stdout().lock());
+    match fill(&mut out).and_then(|()| out.flush()) {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::io("standard output".as_ref(), "write", e)),
         _ => Ok(()),
     }
@@ -304,16 +315,7 @@ mod tests {
 
     #[test]
     fn a_tolerance_is_relative_to_the_mesh_unless_it_is_absolute() {
-        let flags = MeshFlags {
-            scheme: None,
-            noise: None,
-            boundary: None,
-            creases: None,
-            corners: None,
-            crease_angle: None,
-            weld: false,
-            defects: false,
-        };
+        let flags = MeshFlags::default();
         let common = CommonFlags { threads: None, quiet: true };
         let cube = flags.input("cube", &common).expect("valid");
         let stop = |tol_absolute| {

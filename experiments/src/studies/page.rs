@@ -329,16 +329,7 @@ mod tests {
 
     #[test]
     fn a_mesh_too_large_to_be_shown_is_thinned_out() {
-        let flags = MeshFlags {
-            scheme: None,
-            noise: Some(STAND_IN_NOISE),
-            boundary: None,
-            creases: None,
-            corners: None,
-            crease_angle: None,
-            weld: false,
-            defects: false,
-        };
+        let flags = MeshFlags { noise: Some(STAND_IN_NOISE), ..MeshFlags::default() };
         let stop = StopFlags { tol: 1e-6, tol_absolute: None, max_iter: 1000 };
         let common = CommonFlags { threads: None, quiet: true };
         let problem = flags.problem("torus:160x130", &stop, Order::File, &common).unwrap();

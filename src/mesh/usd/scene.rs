@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::super::attributes::Attributes;
 use super::super::file_tags::{CornerTag, CreaseTag, FileTags, Subdivision, check_sharpness, not_there};
 use super::super::io::{Lines, Loaded, few_corners};
 use super::super::validate::Boundary;
@@ -301,6 +302,7 @@ impl<'a> Parts<'a> {
             mesh: Mesh::new(points.values, Faces::from_parts(offsets, indices.values)),
             lines: Some(lines),
             normals: normals.map(|list| list.values),
+            attributes: Attributes::default(),
             tags,
             subdivision: self.subdivision,
             remarks,

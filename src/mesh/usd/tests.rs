@@ -1,6 +1,7 @@
 use super::*;
 use crate::mesh::Faces;
-use crate::mesh::file_tags::{CornerTag, CreaseTag, FileTags};
+use crate::mesh::features::Tags;
+use crate::mesh::file_tags::{CornerTag, CreaseTag, FileTags, Subdivision};
 use proptest::prelude::*;
 
 fn parse(text: &str) -> Result<Loaded> {
@@ -293,7 +294,13 @@ fn what_is_written_is_short_and_has_its_tags() {
     let tags =
         Tags { boundary: Boundary::EdgeOnly, creases: vec![([0, 1], 10.0), ([2, 1], 12.5)], corners: vec![(2, 10.0)] };
     let mut text = Vec::new();
-    write_control_to(&mut text, &mesh, Some(&[DVec3::Z; 3]), Subdivision::CatmullClark, &tags).unwrap();
+    let options = WriteOptions {
+        normals: Some(&[DVec3::Z; 3]),
+        subdivision: Subdivision::CatmullClark,
+        tags: Some(&tags),
+        ..WriteOptions::default()
+    };
+    write_control_to(&mut text, &mesh, &options).unwrap();
     let expected = r#"#usda 1.0
 (
     defaultPrim = "mesh"
@@ -370,7 +377,9 @@ proptest! {
         let mesh = Mesh::new(positions.clone(), Faces::from_lists(faces));
         let written = |mesh: &Mesh, normals: Option<&[DVec3]>| {
             let mut bytes = Vec::new();
-            write_control_to(&mut bytes, mesh, normals, Subdivision::ALL[scheme], &tags).unwrap();
+            let options =
+                WriteOptions { normals, subdivision: Subdivision::ALL[scheme], tags: Some(&tags), ..WriteOptions::default() };
+            write_control_to(&mut bytes, mesh, &options).unwrap();
             bytes
         };
         let bytes = written(&mesh, with_normals.then_some(&positions[..]));

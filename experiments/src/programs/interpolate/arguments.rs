@@ -1,11 +1,11 @@
 //! Command line of `interpolate`.
 
-use std::path::PathBuf;
+use std::path::{Display, Path, PathBuf};
 
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser};
 
-use crate::cli::{self, CommonFlags, MeshFlags, MonitorFlags, StopFlags, WHICH_METHOD};
+use crate::cli::{self, CommonFlags, MeshFlags, MonitorFlags, STANDARD_STREAM, StopFlags, WHICH_METHOD};
 use limitlab::mesh::order::Order;
 use limitlab::schemes::Refinement;
 use limitlab::solvers::Method;
@@ -20,12 +20,17 @@ use limitlab::{Result, names};
 #[derive(Parser)]
 #[command(name = "interpolate", version = cli::VERSION, after_help = WHICH_METHOD)]
 pub struct Arguments {
-    /// A mesh file (.obj, .off, .ply, .usda) or a built-in name
+    /// A mesh file (.obj, .off, .ply, .usda), a built-in name, or - for standard input (with --format)
     #[arg(value_name = "MESH")]
     pub input: String,
-    /// The mesh to write (.obj, .off, .ply, .usda): the control mesh, or the surface with --subdivide or --limit
+    /// The mesh to write (.obj, .off, .ply, .usda; - for standard output, with --format): the control mesh, or the surface
+    /// with --subdivide or --limit. In .obj a control mesh has the texture coordinates, groups, materials and normals (vn)
+    /// of an .obj read; these normals shade the faces of the file, --write-normals writes those of the surface
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// Write .ply as text; the other formats always are
+    #[arg(long)]
+    pub ascii: bool,
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
     /// pcg-ssor, pcg-ic0, anderson, heavy-ball; two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); halstead (the fairest
     /// surface, with --scheme catmull-clark: a control mesh two refinements down); butterfly and labsik-greiner (with
@@ -51,6 +56,14 @@ pub struct Arguments {
     pub monitor: MonitorFlags,
     #[command(flatten)]
     pub common: CommonFlags,
+}
+
+impl Arguments {
+    /// The output in words.
+    pub fn output_name(&self) -> Display<'_> {
+        let is_stream = self.output.as_os_str() == STANDARD_STREAM;
+        if is_stream { Path::new("standard output").display() } else { self.output.display() }
+    }
 }
 
 /// What is asked of the surface.

@@ -13,13 +13,14 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use crate::cli::{self, subdivision_of};
+use crate::cli::{self, Input, STANDARD_STREAM, subdivision_of};
 use limitlab::Result;
 use limitlab::error::Error;
 use limitlab::interpolate::surface::check;
+use limitlab::mesh::Mesh;
 use limitlab::mesh::features::Tags;
 use limitlab::mesh::file_tags::Subdivision;
-use limitlab::mesh::{Mesh, io};
+use limitlab::mesh::io::{self, Format, WriteOptions, left_out};
 use limitlab::output::{allow_replacing, check_target};
 use limitlab::schemes::Scheme;
 
@@ -72,6 +73,14 @@ pub fn main(mut arguments: Arguments) -> ExitCode {
         // Its topology is that of the scheme which is named where none is.
         arguments.mesh.scheme = Some(Scheme::Loop);
     }
+    if arguments.output.as_os_str() == STANDARD_STREAM {
+        if arguments.json {
+            conflict("--json and the mesh would both go to standard output: name a file for one (-o FILE)");
+        }
+        if arguments.mesh.format.is_none() {
+            conflict("-o - has no name that tells the format: give --format obj, off, ply or usda");
+        }
+    }
     cli::exit(|| {
         arguments.common.apply()?;
         run(&arguments)
@@ -89,14 +98,62 @@ fn is_control(arguments: &Arguments) -> bool {
     !arguments.shape.limit && arguments.shape.subdivide == 0
 }
 
+/// Where the mesh is written: standard output, or a file.
+struct Target<'a> {
+    file: Option<&'a Path>,
+    format: Format,
+}
+
+impl<'a> Target<'a> {
+    fn of(arguments: &'a Arguments) -> Result<Self> {
+        let path = &arguments.output;
+        Ok(match arguments.mesh.format.filter(|_| path.as_os_str() == STANDARD_STREAM) {
+            Some(format) => Target { file: None, format },
+            None => Target { file: Some(path), format: Format::of(path)? },
+        })
+    }
+
+    fn write(&self, mesh: &Mesh, options: &WriteOptions) -> Result<()> {
+        match self.file {
+            Some(path) => io::write_control(path, mesh, options),
+            None => cli::write_standard(|out| io::write_control_to(out, self.format, mesh, options)),
+        }
+    }
+}
+
+/// Says what the file that was read holds and the one that was written does not, or holds as it was.
+fn remark_on_output(arguments: &Arguments, input: &Input, target: &Target, options: &WriteOptions) {
+    let mut remarks = left_out(target.format, options);
+    match options.attributes {
+        None if !input.attributes.is_empty() => {
+            remarks.push(format!("not written, for they are about the faces of the file: {}", input.attributes));
+        }
+        Some(attributes) if target.format == Format::Obj && options.normals.is_none() => {
+            let count = attributes.normals.len();
+            if count > 0 {
+                remarks.push(format!(
+                    "its {count} normals (vn) are those of the file, not of the surface (--write-normals)"
+                ));
+            }
+        }
+        _ => {}
+    }
+    if options.ascii && target.format != Format::Ply {
+        remarks.push("--ascii is about .ply: this format is text in any case".into());
+    }
+    for remark in remarks {
+        arguments.common.remark(format_args!("{}: {remark}", arguments.output_name()));
+    }
+}
+
 fn run(arguments: &Arguments) -> Result<()> {
     if arguments.mesh.print_defects(&[&arguments.input], &arguments.common)? {
         return Ok(());
     }
-    io::check_name(&arguments.output)?;
-    let in_place = is_file_of(&arguments.input, &arguments.output);
-    if !in_place {
-        check_target(&arguments.output)?;
+    let target = Target::of(arguments)?;
+    let in_place = target.file.is_some_and(|file| is_file_of(&arguments.input, file));
+    if let Some(file) = target.file.filter(|_| !in_place) {
+        check_target(file)?;
     }
     let input = arguments.mesh.input(&arguments.input, &arguments.common)?;
     let refinement = match arguments.method {
@@ -124,35 +181,36 @@ fn run(arguments: &Arguments) -> Result<()> {
     require_finite(&input, &result.made)?;
 
     let start = Instant::now();
-    if in_place {
-        allow_replacing(&arguments.output)?;
+    if let Some(file) = target.file.filter(|_| in_place) {
+        allow_replacing(file)?;
     }
     let made = &result.made;
-    let normals = made.normals.as_deref();
-    // The surface itself is its faces.
+    // The surface itself is its faces; the fairest control mesh is refined, and has other edges than the file.
     let is_control = is_control(arguments);
-    let subdivision = if is_control { subdivision_of(input.scheme) } else { Subdivision::None };
-    // The fairest control mesh is refined, and has other edges than the file.
-    let tags = match (is_control, made.surface.len() == input.surface.len()) {
+    let keeps_faces = arguments.shape.subdivide == 0 && made.surface.len() == input.surface.len();
+    let tags = match (is_control, keeps_faces) {
         (true, true) => input.file_tags(),
         (true, false) => Cow::Owned(made.surface.tags()),
         (false, _) => Cow::Owned(Tags::default()),
     };
-    let write = |mesh: &Mesh, normals: Option<&[DVec3]>| {
-        io::write_control(&arguments.output, mesh, normals, subdivision, &tags)
+    let options = WriteOptions {
+        normals: made.normals.as_deref(),
+        subdivision: if is_control { subdivision_of(input.scheme) } else { Subdivision::None },
+        tags: Some(&tags),
+        attributes: keeps_faces.then_some(&input.attributes),
+        ascii: arguments.ascii,
     };
-    let remark = match input.welded.as_ref().filter(|_| made.surface.len() == input.surface.len()) {
-        None => write(made.surface.mesh(), normals)?,
+    match input.welded.as_ref().filter(|_| keeps_faces) {
+        None => target.write(made.surface.mesh(), &options)?,
         // The file's own vertices and faces, one position for each that was made one.
         Some((place, faces)) => {
             let spread = |values: &[DVec3]| -> Vec<DVec3> { place.iter().map(|&v| values[v as usize]).collect() };
             let mesh = Mesh::new(spread(made.surface.positions()), faces.clone());
-            write(&mesh, normals.map(spread).as_deref())?
+            let normals = options.normals.map(spread);
+            target.write(&mesh, &WriteOptions { normals: normals.as_deref(), ..options })?;
         }
-    };
-    if let Some(remark) = remark {
-        arguments.common.remark(format_args!("{}: {remark}", arguments.output.display()));
     }
+    remark_on_output(arguments, &input, &target, &options);
     result.seconds.write = start.elapsed().as_secs_f64();
     print_summary(arguments, &input, &per_vertex, &result)
 }

@@ -36,7 +36,7 @@ pub fn print_summary(
     }
     common.remark(format_args!(
         "{}: {} by {}, {} iterations, max error {:.3e}, mean {:.3e} (mesh units)",
-        arguments.output.display(),
+        arguments.output_name(),
         match arguments.method {
             Choice::Keeping(scheme) => scheme.name(),
             _ => input.scheme.name(),

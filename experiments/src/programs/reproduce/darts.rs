@@ -10,8 +10,8 @@ use crate::report::{Column, Columns};
 use limitlab::Result;
 use limitlab::analysis::singularity::Singularity;
 use limitlab::mesh::features::{Rule, SHARP, Tags};
-use limitlab::mesh::file_tags::Subdivision;
 use limitlab::mesh::generate::{dual, flip_edges, merge_faces, quad_split, ring_sphere};
+use limitlab::mesh::io::WriteOptions;
 use limitlab::mesh::random::random_edge;
 use limitlab::mesh::{Mesh, Surface, builtin, io};
 use limitlab::schemes::Scheme;
@@ -247,7 +247,8 @@ fn run(context: &mut Context) -> Result<()> {
         if let Some(best) = &climb.best {
             smooth = Some(smooth_rho(search, &best.surface)?);
             let name = format!("{}--{}.obj", DARTS.id, k + 1);
-            io::write_control(&context.folder().join(&name), best.surface.mesh(), None, Subdivision::None, &best.tags)?;
+            let options = WriteOptions { tags: Some(&best.tags), ..WriteOptions::default() };
+            io::write_control(&context.folder().join(&name), best.surface.mesh(), &options)?;
             file = Some(name);
         }
         rows.push(Row { search, climb, smooth, file });
