@@ -85,6 +85,14 @@ impl CornerLines {
         missing
     }
 
+    fn of_corners(&self, corners: &[u32]) -> Self {
+        let of_corner = match self.of_corner.is_empty() {
+            true => Vec::new(),
+            false => corners.iter().map(|&c| self.of_corner[c as usize]).collect(),
+        };
+        CornerLines { of_corner, ..self.clone() }
+    }
+
     pub(super) fn write_to(&self, out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&self.lines)
     }
@@ -94,6 +102,21 @@ impl Attributes {
     /// Whether the file says nothing of the kind.
     pub fn is_empty(&self) -> bool {
         self.texture.is_empty() && self.normals.is_empty() && self.statements.is_empty()
+    }
+
+    /// Those of a mesh whose faces and corners were these, the faces in their order.
+    ///
+    /// # Panics
+    /// If a corner does not exist.
+    pub fn of_corners(&self, faces: &[u32], corners: &[u32]) -> Self {
+        let statements = self.statements.iter();
+        Attributes {
+            texture: self.texture.of_corners(corners),
+            normals: self.normals.of_corners(corners),
+            statements: statements
+                .map(|(face, text)| (faces.partition_point(|f| f < face) as u32, text.clone()))
+                .collect(),
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::Surface;
 use super::features::{Tags, checked};
+use super::origin::Origin;
 use super::validate::Boundary;
 use crate::error::short;
 use crate::{Error, Result};
@@ -84,25 +85,22 @@ impl FileTags {
         self.creases.is_empty() && self.corners.is_empty()
     }
 
-    /// The tags for a surface of the file's faces, where `boundary` is the rule; `place` tells where each vertex of the
-    /// file is among those of the surface, if they were renumbered. O(tags).
+    /// The tags for a surface of the file's faces, where `boundary` is the rule; `origin` tells where each vertex of the
+    /// file went, if it is not the same one. O(tags).
     ///
     /// # Errors
     /// [`Error::Parse`] with the line: an edge that the surface lacks, a sharpness that has no rows.
     ///
     /// # Panics
-    /// If the mesh, or `place`, lacks a vertex of a tag: then it is not the file's.
-    pub fn checked(&self, path: &Path, surface: &Surface, place: Option<&[u32]>, boundary: Boundary) -> Result<Tags> {
-        let placed = |v: u32| place.map_or(v, |place| place[v as usize]);
+    /// If the mesh, or `origin`, lacks a vertex of a tag: then it is not the file's.
+    pub fn checked(&self, path: &Path, surface: &Surface, origin: Option<&Origin>, boundary: Boundary) -> Result<Tags> {
         let mut tags = Tags { boundary, creases: Vec::new(), corners: Vec::new() };
         for &CreaseTag { ends, sharpness, line } in &self.creases {
-            let ends_there = ends.map(placed);
-            check_crease(path, line as usize, surface, ends, ends_there, sharpness)?;
-            tags.creases.push((ends_there, sharpness));
+            check_crease(path, line as usize, surface, ends, origin, sharpness, &mut tags.creases)?;
         }
         for &CornerTag { vertex, sharpness, line } in &self.corners {
             check_corner(path, line as usize, vertex, sharpness)?;
-            tags.corners.push((placed(vertex), sharpness));
+            tags.corners.extend(there(origin, vertex).map(|v| (v, sharpness)));
         }
         Ok(tags)
     }
@@ -131,17 +129,30 @@ pub(super) fn check_sharpness(sharpness: f64) -> std::result::Result<(), String>
     Err(format!("the sharpness {}: a number from 0 on is needed", short(sharpness)))
 }
 
-/// Refuses a crease that is no edge of the surface, where its ends may have other numbers, or has no rows.
+/// The vertices that a vertex of a file became.
+pub(super) fn there(origin: Option<&Origin>, v: u32) -> impl Iterator<Item = u32> + Clone + '_ {
+    let same = origin.is_none().then_some(v);
+    same.into_iter().chain(origin.into_iter().flat_map(move |origin| origin.of_vertex(v)))
+}
+
+/// Adds a crease of the file to those of the surface, on all edges that it became. Refuses one that is no edge of the
+/// surface, or has no rows.
 pub(super) fn check_crease(
     path: &Path,
     line: usize,
     surface: &Surface,
     ends: [u32; 2],
-    ends_there: [u32; 2],
+    origin: Option<&Origin>,
     sharpness: f64,
+    creases: &mut Vec<([u32; 2], f64)>,
 ) -> Result<()> {
     let refuse = |what: String| Error::parse(path, Some(line), format!("edge {}–{} {what}", ends[0], ends[1]));
-    if surface.incidence().half_edge(surface.faces(), ends_there).is_none() {
+    let before = creases.len();
+    let [from, to] = ends.map(|v| there(origin, v));
+    let pairs = from.flat_map(|a| to.clone().map(move |b| [a, b]));
+    let is_edge = |&ends: &[u32; 2]| surface.incidence().half_edge(surface.faces(), ends).is_some();
+    creases.extend(pairs.filter(is_edge).map(|ends| (ends, sharpness)));
+    if creases.len() == before {
         return Err(refuse("is not in the mesh: its vertices, numbered from 0, share no edge".into()));
     }
     checked(sharpness).map_err(refuse)

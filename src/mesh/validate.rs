@@ -8,6 +8,7 @@ pub use super::boundary::Boundary;
 use super::defect::counted;
 pub use super::defect::{Defect, DefectKind};
 use super::incidence::{Incidence, next_in, prev_in};
+use super::repair::repair;
 use super::topology::{NONE, Topology, join};
 use super::{Faces, Mesh, degenerate};
 use crate::parallel;
@@ -63,19 +64,22 @@ pub struct Validation {
     pub counts: Option<Counts>,
     /// Present if an edge has its two faces in the same direction.
     pub orientation: Option<Orientation>,
+    /// Whether [`repair`] leaves no defects. False where there are none.
+    pub is_repairable: bool,
     /// Absent if a face names a vertex that does not exist.
     pub(super) topology: Option<Topology>,
 }
 
 impl Serialize for Validation {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
-        let mut report = serializer.serialize_struct("Validation", 6)?;
+        let mut report = serializer.serialize_struct("Validation", 7)?;
         report.serialize_field("valid", &self.is_valid())?;
         report.serialize_field("totals", &self.totals())?;
         report.serialize_field("defects", &self.defects)?;
         report.serialize_field("remarks", &self.remarks)?;
         report.serialize_field("counts", &self.counts)?;
         report.serialize_field("orientation", &self.orientation)?;
+        report.serialize_field("repairable", &self.is_repairable)?;
         report.end()
     }
 }
@@ -163,7 +167,7 @@ impl Validation {
 ///
 /// Time is linear in the corners for bounded valences and face sizes, but for the sorts that find duplicate
 /// positions and faces; vertices are examined in parallel and reported in the same order with any number of
-/// threads.
+/// threads. A mesh with defects is repaired to see whether that helps, which takes some times as long.
 ///
 /// ```
 /// use limitlab::mesh::{Faces, Mesh, validate::{validate, Boundary}};
@@ -173,8 +177,35 @@ impl Validation {
 /// assert!(report.summary_line().contains("3 boundary edges (first: face 0, vertices 0 and 1)"));
 /// ```
 pub fn validate(mesh: &Mesh, lines: Option<(&[u32], &[u32])>, boundary: Boundary) -> Validation {
-    let mut report =
-        Validation { defects: Vec::new(), remarks: Vec::new(), counts: None, orientation: None, topology: None };
+    let mut report = examine(mesh, boundary);
+    if !report.is_valid() {
+        report.is_repairable = repair(mesh).is_some_and(|repaired| examine(&repaired.mesh, boundary).is_valid());
+    }
+    if let Some((vertex_lines, face_lines)) = lines {
+        for d in &mut report.defects {
+            let line = match (d.face, d.vertex) {
+                (Some(f), _) => face_lines.get(f as usize),
+                (None, Some(v)) => vertex_lines.get(v as usize),
+                (None, None) => None,
+            };
+            d.line = line.copied();
+            let other = d.other_face.and_then(|f| face_lines.get(f as usize));
+            d.other_line = other.copied();
+        }
+    }
+    report
+}
+
+/// The report without lines.
+fn examine(mesh: &Mesh, boundary: Boundary) -> Validation {
+    let mut report = Validation {
+        defects: Vec::new(),
+        remarks: Vec::new(),
+        counts: None,
+        orientation: None,
+        is_repairable: false,
+        topology: None,
+    };
     if mesh.is_empty() {
         report.defects.push(Defect::new(DefectKind::NoVertices));
     }
@@ -199,18 +230,6 @@ pub fn validate(mesh: &Mesh, lines: Option<(&[u32], &[u32])>, boundary: Boundary
         counts.components -= isolated;
     }
     report.defects.sort_by_key(|d| d.kind);
-    if let Some((vertex_lines, face_lines)) = lines {
-        for d in &mut report.defects {
-            let line = match (d.face, d.vertex) {
-                (Some(f), _) => face_lines.get(f as usize),
-                (None, Some(v)) => vertex_lines.get(v as usize),
-                (None, None) => None,
-            };
-            d.line = line.copied();
-            let other = d.other_face.and_then(|f| face_lines.get(f as usize));
-            d.other_line = other.copied();
-        }
-    }
     report
 }
 
@@ -423,9 +442,40 @@ impl Link {
     }
 }
 
-/// Walks over all faces across edges with two sides, noting which must be turned round to agree with the first
-/// of their component. Linear.
+/// What must be turned round to orient the mesh. Linear.
 fn examine_orientation(faces: &Faces, topology: &Topology) -> Orientation {
+    let mut verdict = Orientation { faces_to_flip: 0, first: None, unorientable_components: 0 };
+    visit_orientations(faces, topology, |side| {
+        if side.has_conflict {
+            verdict.unorientable_components += 1;
+            return;
+        }
+        verdict.faces_to_flip += side.fewest().count();
+        verdict.first = verdict.first.into_iter().chain(side.fewest()).min();
+    });
+    verdict
+}
+
+/// A component of faces, and which of them run against its first.
+pub(super) struct Sides<'a> {
+    component: &'a [usize],
+    turned: &'a [Option<bool>],
+    /// Whether no turning makes all of them agree, as on a Möbius band.
+    has_conflict: bool,
+}
+
+impl Sides<'_> {
+    /// The faces of the smaller side of the two.
+    pub fn fewest(&self) -> impl Iterator<Item = u32> + '_ {
+        let ones = self.component.iter().filter(|&&f| self.turned[f] == Some(true)).count();
+        let fewer = 2 * ones <= self.component.len();
+        self.component.iter().filter(move |&&f| self.turned[f] == Some(fewer)).map(|&f| f as u32)
+    }
+}
+
+/// Walks over all faces across edges with two sides, component by component, noting which run against the first of their
+/// component. Linear.
+pub(super) fn visit_orientations(faces: &Faces, topology: &Topology, mut visit: impl FnMut(Sides)) {
     let incidence = &topology.incidence;
     let mut same_direction = vec![NONE; faces.corners().len()];
     for edge in topology.irregular_edges().iter().filter(|e| e.is_misoriented()) {
@@ -434,7 +484,6 @@ fn examine_orientation(faces: &Faces, topology: &Topology) -> Orientation {
         same_direction[b as usize] = a;
     }
     let mut turned: Vec<Option<bool>> = vec![None; faces.len()];
-    let mut verdict = Orientation { faces_to_flip: 0, first: None, unorientable_components: 0 };
     let mut component = Vec::new();
     for seed in 0..faces.len() {
         if turned[seed].is_some() {
@@ -443,7 +492,7 @@ fn examine_orientation(faces: &Faces, topology: &Topology) -> Orientation {
         turned[seed] = Some(false);
         component.clear();
         component.push(seed);
-        let mut conflict = false;
+        let mut has_conflict = false;
         let mut next = 0;
         while next < component.len() {
             let f = component[next];
@@ -460,24 +509,12 @@ fn examine_orientation(faces: &Faces, topology: &Topology) -> Orientation {
                     turned[g] = wanted;
                     component.push(g);
                 } else {
-                    conflict |= turned[g] != wanted;
+                    has_conflict |= turned[g] != wanted;
                 }
             }
         }
-        if conflict {
-            verdict.unorientable_components += 1;
-            continue;
-        }
-        let ones = component.iter().filter(|&&f| turned[f] == Some(true)).count();
-        let fewer = 2 * ones <= component.len();
-        verdict.faces_to_flip += ones.min(component.len() - ones);
-        let first = component.iter().filter(|&&f| turned[f] == Some(fewer)).min().map(|&f| f as u32);
-        verdict.first = match (verdict.first, first) {
-            (Some(a), Some(b)) => Some(a.min(b)),
-            (a, b) => a.or(b),
-        };
+        visit(Sides { component: &component, turned: &turned, has_conflict });
     }
-    verdict
 }
 
 #[cfg(test)]

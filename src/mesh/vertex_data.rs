@@ -4,8 +4,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::file_tags::{check_corner, check_crease, not_there};
+use super::file_tags::{check_corner, check_crease, not_there, there};
 use super::io::{self, has_mesh_ending};
+use super::origin::Origin;
 use super::{Surface, magic};
 use crate::error::{Error, Result};
 use crate::text::{Scanner, quoted};
@@ -95,31 +96,29 @@ pub fn numbers(text: &str, vertices: usize, otherwise: f64) -> Result<Vec<f64>> 
 }
 
 /// Reads sharp edges: lines `a b sharpness`, a and b the ends of an edge. Where vertices are numbered otherwise than those of
-/// the surface, `place` tells where each went.
+/// the surface, `origin` tells where each went.
 ///
 /// # Errors
 /// Lines of another form, an edge that the mesh lacks, a sharpness that is none, with the line.
-pub fn creases(path: &Path, surface: &Surface, place: Option<&[u32]>) -> Result<Vec<([u32; 2], f64)>> {
+pub fn creases(path: &Path, surface: &Surface, origin: Option<&Origin>) -> Result<Vec<([u32; 2], f64)>> {
     let mut creases = Vec::new();
-    let vertices = place.map_or(surface.len(), <[u32]>::len);
+    let vertices = origin.map_or(surface.len(), Origin::vertices);
     lines(path, vertices, "a b sharpness", |line, ends: [usize; 2], [sharpness]: [f64; 1]| {
-        let there = ends.map(|v| place.map_or(v as u32, |place| place[v]));
-        check_crease(path, line, surface, ends.map(|v| v as u32), there, sharpness)?;
-        creases.push((there, sharpness));
-        Ok(())
+        check_crease(path, line, surface, ends.map(|v| v as u32), origin, sharpness, &mut creases)
     })?;
     Ok(creases)
 }
 
-/// Reads sharp vertices: lines `vertex sharpness`.
+/// Reads sharp vertices of a surface: lines `vertex sharpness`, numbered as in [`creases`].
 ///
 /// # Errors
 /// Lines of another form, a vertex that the mesh lacks, a sharpness that is none, with the line.
-pub fn corners(path: &Path, vertices: usize) -> Result<Vec<(u32, f64)>> {
+pub fn corners(path: &Path, surface: &Surface, origin: Option<&Origin>) -> Result<Vec<(u32, f64)>> {
     let mut corners = Vec::new();
+    let vertices = origin.map_or(surface.len(), Origin::vertices);
     lines(path, vertices, "vertex sharpness", |line, [v]: [usize; 1], [sharpness]: [f64; 1]| {
         check_corner(path, line, v as u32, sharpness)?;
-        corners.push((v as u32, sharpness));
+        corners.extend(there(origin, v as u32).map(|v| (v, sharpness)));
         Ok(())
     })?;
     Ok(corners)

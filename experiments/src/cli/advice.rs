@@ -11,13 +11,15 @@ use limitlab::solvers::Outcome;
 const ANOTHER_SYSTEM: &str = "use --scheme nasri, which is never singular, or --scheme catmull-clark with --method \
                               halstead, whose control mesh is two refinements finer";
 
-/// The defects of a mesh, and the flags that would do without mending them.
+/// The defects of a mesh, and the flag that would do.
 pub fn of_defects(report: &Validation) -> String {
     let line = report.summary_line();
-    match report.is_open_only() {
-        true => format!("{line}, or leave out --boundary refuse"),
-        false => line,
-    }
+    let or = match (report.is_open_only(), report.is_repairable) {
+        (true, _) => ", or leave out --boundary refuse",
+        (false, true) => "; --repair makes it valid",
+        (false, false) => "",
+    };
+    line + or
 }
 
 /// Which tools show the surface of a control mesh of `scheme`, and what to ask for where they do not.

@@ -18,10 +18,11 @@ use limitlab::mesh::file_tags::{FileTags, Subdivision};
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::io::{self, Format, Loaded, has_mesh_ending};
 use limitlab::mesh::noise::{Noise, move_vertices};
+use limitlab::mesh::origin::Origin;
+use limitlab::mesh::repair::{Repair, Repaired, repair};
 use limitlab::mesh::validate::{Boundary, validate};
-use limitlab::mesh::weld::seams;
-use limitlab::mesh::weld::{Welded, weld};
-use limitlab::mesh::{Faces, Mesh, Surface, bounding_box, builtin, vertex_data};
+use limitlab::mesh::weld::{seams, weld};
+use limitlab::mesh::{Mesh, Surface, bounding_box, builtin, vertex_data};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::Stop;
 
@@ -44,6 +45,11 @@ pub struct MeshFlags {
     /// Make one vertex of those at the same position: seams are closed; the control mesh keeps the file's vertices
     #[arg(long)]
     pub weld: bool,
+    /// Mend what can be mended without moving a vertex: drop vertices of no face, repeated corners and doubled faces, turn
+    /// faces to agree, cut edges with more than two faces and vertices between sheets; says what it did. The control mesh
+    /// keeps the file's vertices; copies of those that were cut come after them
+    #[arg(long)]
+    pub repair: bool,
     /// Sharp edges, beside those of the mesh file (.usda, .obj): a file with lines `a b sharpness`, vertices numbered from
     /// 0; 10 and more is sharp for ever, less is taken 1 at each level (semi-sharp: catmull-clark and loop)
     #[arg(long, value_name = "FILE")]
@@ -74,8 +80,10 @@ pub struct Input {
     pub tags: Tags,
     /// What the file says of its faces beyond what is computed with.
     pub attributes: Attributes,
-    /// Where the vertices of the file went, and its faces, with --weld.
-    pub welded: Option<(Vec<u32>, Faces)>,
+    /// Where the vertices of the file went, with --weld and --repair.
+    pub origin: Option<Origin>,
+    /// What was mended, with --repair.
+    pub repairs: Vec<Repair>,
     /// Reading the file or making the built-in mesh.
     pub read_seconds: f64,
     /// Validation and topology.
@@ -183,20 +191,22 @@ impl MeshFlags {
         let loaded = self.loaded(name, common)?;
         let read_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let Loaded { name, mut mesh, mut lines, tags, attributes, subdivision, .. } = loaded;
+        let Loaded { name, mesh, mut lines, tags, mut attributes, subdivision, .. } = loaded;
         let name = &name[..];
-        let welded = self.weld.then(|| self.welded(name, &mut mesh, &mut lines, common)).flatten();
-        let surface = Surface::examined(mesh, numbers(&lines), self.rule(&tags)).map_err(|report| {
+        let rule = self.rule(&tags);
+        let (mesh, origin, repairs) = self.mended(name, mesh, &mut lines, &mut attributes, rule, common);
+        let surface = Surface::examined(mesh, numbers(&lines), rule).map_err(|report| {
             report.remarks.iter().for_each(|remark| common.remark(format_args!("{name}: {remark}")));
             Error::mesh(name, advice::of_defects(&report))
         })?;
-        let place = welded.as_ref().map(|(place, _)| &place[..]);
-        let (mut surface, tags) = self.with_features(name, surface, (&tags, place), common)?;
+        self.check_seams(name, &surface, &repairs, common)?;
+        let (mut surface, tags) = self.with_tags(name, surface, &tags, origin.as_ref())?;
         for remark in surface.remarks() {
             common.remark(format_args!("{name}: {remark}"));
         }
         let frame = self.place(&mut surface).map_err(|(v, what)| {
             let line = lines.as_ref().map_or_else(String::new, |l| format!(", line {}", l.vertices[v]));
+            let v = origin.as_ref().map_or(v as u32, |origin| origin.sources()[v]);
             Error::mesh(name, format!("vertex {v}{line}: {what}"))
         })?;
         let scheme = self.scheme.unwrap_or_else(|| {
@@ -220,40 +230,67 @@ impl MeshFlags {
             scheme,
             tags,
             attributes,
-            welded,
+            origin,
+            repairs,
             read_seconds,
             check_seconds: start.elapsed().as_secs_f64(),
         })
     }
 
-    /// Makes one vertex of those at the same position, unless a face names a vertex that is not there, which validation
-    /// tells.
-    fn welded(
+    /// Welds and repairs, as the flags say, unless a face names a vertex that is not there, which validation tells; repairs
+    /// only if no defect is left then, so that errors are about the mesh as it was given.
+    fn mended(
         &self,
         name: &str,
-        mesh: &mut Mesh,
+        file: Mesh,
         lines: &mut Option<io::Lines>,
+        attributes: &mut Attributes,
+        rule: Boundary,
         common: &CommonFlags,
-    ) -> Option<(Vec<u32>, Faces)> {
-        let n = mesh.len();
-        if mesh.faces.corners().iter().any(|&v| v as usize >= n) {
-            return None;
+    ) -> (Mesh, Option<Origin>, Vec<Repair>) {
+        let n = file.len();
+        let is_asked = self.weld || self.repair;
+        if !is_asked || file.faces.corners().iter().any(|&v| v as usize >= n) {
+            return (file, None, Vec::new());
         }
-        let Welded { mesh: joined, place } = weld(mesh);
-        let faces = std::mem::replace(mesh, joined).faces;
-        if let Some(lines) = lines {
-            // The line of the first vertex at each position.
-            let mut next = 0;
-            let first = (0..n).filter(|&v| {
-                place[v] == next && {
-                    next += 1;
-                    true
+        let welded = self.weld.then(|| weld(&file));
+        if let Some(welded) = &welded {
+            common.remark(format_args!("{name}: {n} vertices at {} positions", welded.mesh.len()));
+        }
+        // The first vertex at each position.
+        let first = welded.as_ref().map(|welded| {
+            let mut first = vec![0; welded.mesh.len()];
+            (0..n).rev().for_each(|v| first[welded.place[v] as usize] = v as u32);
+            first
+        });
+        let mesh = welded.as_ref().map_or(&file, |welded| &welded.mesh);
+        let is_mended = |r: &Repaired| !r.repairs.is_empty() && validate(&r.mesh, None, rule).is_valid();
+        let repaired = self.repair.then(|| repair(mesh)).flatten().filter(is_mended);
+        let (mesh, corners, repairs) = match repaired {
+            None => (welded.map_or_else(|| file.clone(), |welded| welded.mesh), None, Vec::new()),
+            Some(Repaired { mesh, faces, corners, mut repairs }) => {
+                if let Some(first) = &first {
+                    repairs.iter_mut().for_each(|r| r.vertices.iter_mut().for_each(|v| *v = first[*v as usize]));
                 }
-            });
-            lines.vertices = first.map(|v| lines.vertices[v]).collect();
+                *attributes = attributes.of_corners(&faces, &corners);
+                if let Some(lines) = lines {
+                    lines.faces = faces.iter().map(|&f| lines.faces[f as usize]).collect();
+                }
+                (mesh, Some(corners), repairs)
+            }
+        };
+        for repair in &repairs {
+            common.remark(format_args!("{name}: repaired: {repair}"));
         }
-        common.remark(format_args!("{name}: {n} vertices at {} positions", mesh.len()));
-        Some((place, faces))
+        let origin = Origin::new(&file, &mesh, corners.as_deref());
+        if let Some(lines) = lines {
+            // Every vertex of a repaired mesh has a face; a welded one may have defects to be told.
+            let sources = if repairs.is_empty() { first.as_deref() } else { Some(origin.sources()) };
+            if let Some(sources) = sources {
+                lines.vertices = sources.iter().map(|&v| lines.vertices[v as usize]).collect();
+            }
+        }
+        (mesh, Some(origin), repairs)
     }
 
     /// What boundary edges are: by the flag, by the file, or as the programs take them.
@@ -261,61 +298,53 @@ impl MeshFlags {
         self.boundary.or(of_file.boundary).unwrap_or(Boundary::EdgeAndCorner)
     }
 
-    /// The mesh with the sharp edges and vertices that its file and the flags ask for, and these; refused if nine tenths of
-    /// its boundary are a seam, unless the flag says that it is wanted: files say what boundaries are whether there are any or
-    /// not.
-    fn with_features(
-        &self,
-        name: &str,
-        surface: Surface,
-        of_file: (&FileTags, Option<&[u32]>),
-        common: &CommonFlags,
-    ) -> Result<(Surface, Tags)> {
-        if let (None, Some((edges, [a, b]))) = (self.boundary, seams(&surface)) {
-            let all = surface.boundary_edges();
-            let of = if edges == all { format!("all {all}") } else { format!("{edges} of {all}") };
-            // Real openings have seams at their ends now and then.
-            if 10 * edges < 9 * all {
-                common.remark(format_args!(
-                    "{name}: {of} boundary edges lie on each other (first: vertices {a} and {b}): seams, which --weld closes"
-                ));
-                return self.with_tags(name, surface, of_file);
-            }
-            let which = if self.weld { "" } else { "use --weld to make one of them, or " };
-            return Err(Error::mesh(
-                name,
-                format!(
-                    "{of} boundary edges lie on each other (first: vertices {a} and {b}): a seam of duplicate vertices \
-                     at the same positions, no opening; {which}use --boundary edge-and-corner to keep it open"
-                ),
-            ));
+    /// Refuses a mesh of whose boundary nine tenths are a seam, unless the flag says that it is wanted, or sheets were cut
+    /// apart: files say what boundaries are whether there are any or not.
+    fn check_seams(&self, name: &str, surface: &Surface, repairs: &[Repair], common: &CommonFlags) -> Result<()> {
+        if self.boundary.is_some() || repairs.iter().any(Repair::is_cut) {
+            return Ok(());
         }
-        self.with_tags(name, surface, of_file)
+        let Some((edges, [a, b])) = seams(surface) else { return Ok(()) };
+        let all = surface.boundary_edges();
+        let of = if edges == all { format!("all {all}") } else { format!("{edges} of {all}") };
+        // Real openings have seams at their ends now and then.
+        if 10 * edges < 9 * all {
+            common.remark(format_args!(
+                "{name}: {of} boundary edges lie on each other (first: vertices {a} and {b}): seams, which --weld closes"
+            ));
+            return Ok(());
+        }
+        let which = if self.weld { "" } else { "use --weld to make one of them, or " };
+        Err(Error::mesh(
+            name,
+            format!(
+                "{of} boundary edges lie on each other (first: vertices {a} and {b}): a seam of duplicate vertices                  at the same positions, no opening; {which}use --boundary edge-and-corner to keep it open"
+            ),
+        ))
     }
 
+    /// The mesh with the sharp edges and vertices that its file and the flags ask for, and these.
     fn with_tags(
         &self,
         name: &str,
         surface: Surface,
-        (of_file, place): (&FileTags, Option<&[u32]>),
+        of_file: &FileTags,
+        origin: Option<&Origin>,
     ) -> Result<(Surface, Tags)> {
         let rule = self.rule(of_file);
         let rule_there = if surface.is_closed() { Boundary::Refuse } else { rule };
         if of_file.is_empty() && self.creases.is_none() && self.corners.is_none() && self.crease_angle.is_none() {
             return Ok((surface, Tags { boundary: rule_there, ..Tags::default() }));
         }
-        let mut tags = of_file.checked(Path::new(name), &surface, place, rule)?;
+        let mut tags = of_file.checked(Path::new(name), &surface, origin, rule)?;
         if let Some(path) = &self.creases {
-            tags.creases.extend(vertex_data::creases(path, &surface, place)?);
+            tags.creases.extend(vertex_data::creases(path, &surface, origin)?);
         }
         if let Some(degrees) = self.crease_angle {
             tags.creases.extend(creases_by_angle(&surface, degrees).into_iter().map(|ends| (ends, SHARP)));
         }
         if let Some(path) = &self.corners {
-            let vertices = place.map_or(surface.len(), <[u32]>::len);
-            let there = |v: u32| place.map_or(v, |place| place[v as usize]);
-            let corners = vertex_data::corners(path, vertices)?;
-            tags.corners.extend(corners.into_iter().map(|(v, sharpness)| (there(v), sharpness)));
+            tags.corners.extend(vertex_data::corners(path, &surface, origin)?);
         }
         let surface = surface.into_tagged(&tags).map_err(|e| Error::mesh(name, e.to_string()))?;
         Ok((surface, Tags { boundary: rule_there, ..tags }))
@@ -381,21 +410,24 @@ impl Input {
 
     /// The number of vertices of the file.
     pub fn file_len(&self) -> usize {
-        self.welded.as_ref().map_or(self.surface.len(), |(place, _)| place.len())
+        self.origin.as_ref().map_or(self.surface.len(), Origin::vertices)
     }
 
-    /// Values of the file's vertices as values of the surface's: of those that were made one the first that is not `absent`.
+    /// Values of the file's vertices as values of the surface's: of those that were made one the first that is not `absent`,
+    /// and the same for all that one became.
     ///
     /// # Panics
     /// If there is not one a vertex of the file.
     pub fn joined<T: Clone + PartialEq>(&self, values: Vec<T>, absent: T) -> Vec<T> {
         assert_eq!(values.len(), self.file_len(), "one value a vertex of the file");
-        let Some((place, _)) = &self.welded else { return values };
+        let Some(origin) = &self.origin else { return values };
         let mut joined = vec![absent.clone(); self.surface.len()];
-        for (value, &v) in values.into_iter().zip(place) {
-            let slot = &mut joined[v as usize];
-            if *slot == absent {
-                *slot = value;
+        for (v, value) in (0..).zip(values) {
+            for there in origin.of_vertex(v) {
+                let slot = &mut joined[there as usize];
+                if *slot == absent {
+                    *slot = value.clone();
+                }
             }
         }
         joined
@@ -410,9 +442,11 @@ impl Input {
         points
     }
 
-    /// What is sharp, in the vertices of the file: with --weld, on every face at the edge, and at every vertex there.
+    /// What is sharp, in the vertices that are written for those of the file: on every face at the edge, and at every vertex
+    /// there.
     pub fn file_tags(&self) -> Cow<'_, Tags> {
-        let Some((place, faces)) = &self.welded else { return Cow::Borrowed(&self.tags) };
+        let Some(origin) = &self.origin else { return Cow::Borrowed(&self.tags) };
+        let place: Vec<Option<u32>> = origin.places().collect();
         let ordered = |[a, b]: [u32; 2]| if a < b { [a, b] } else { [b, a] };
         let mut sharp: Vec<_> = self.tags.creases.iter().map(|&(ends, sharpness)| (ordered(ends), sharpness)).collect();
         // Of an edge that is named twice the greater one counts, and comes first.
@@ -420,10 +454,11 @@ impl Input {
         sharp.dedup_by_key(|&mut (ends, _)| ends);
         let mut creases = Vec::new();
         if !sharp.is_empty() {
-            for face in faces.iter() {
+            for face in origin.faces().iter() {
                 for (k, &a) in face.iter().enumerate() {
                     let ends = [a, face[(k + 1) % face.len()]];
-                    let there = ordered(ends.map(|v| place[v as usize]));
+                    let [Some(from), Some(to)] = ends.map(|v| place[v as usize]) else { continue };
+                    let there = ordered([from, to]);
                     if let Ok(at) = sharp.binary_search_by_key(&there, |&(ends, _)| ends) {
                         creases.push((ordered(ends), sharp[at].1));
                     }
@@ -436,7 +471,7 @@ impl Input {
         for &(v, s) in &self.tags.corners {
             sharpness[v as usize] = s.max(sharpness[v as usize]);
         }
-        let at = |v: usize| sharpness[place[v] as usize];
+        let at = |v: usize| place[v].map_or(0.0, |there| sharpness[there as usize]);
         let corners = (0..place.len()).filter(|&v| at(v) > 0.0).map(|v| (v as u32, at(v))).collect();
         Cow::Owned(Tags { boundary: self.tags.boundary, creases, corners })
     }
@@ -488,6 +523,7 @@ impl Input {
             "corners": count(Rule::Corner),
             "darts": count(Rule::Dart),
             "semi_sharp": count(Rule::SemiSharp),
+            "repair": self.repairs,
             "blocks": {
                 "corners": count(Rule::Corner),
                 "curves": count(Rule::Crease),

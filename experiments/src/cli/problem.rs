@@ -194,6 +194,7 @@ impl MeshFlags {
             ("--corners", self.corners.is_some()),
             ("--crease-angle", self.crease_angle.is_some()),
             ("--weld", self.weld),
+            ("--repair", self.repair),
         ];
         if let Some((flag, _)) = flags.into_iter().find(|f| f.1) {
             return refuse(format!("{flag} is about a mesh, and this is a system without one: leave it out"));

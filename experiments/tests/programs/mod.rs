@@ -3,6 +3,7 @@
 mod bad_input;
 mod contract;
 mod darts;
+mod exchange;
 mod guide;
 mod histories;
 mod metadata;

@@ -11,9 +11,8 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use glam::DVec3;
-
 use crate::cli::{self, Input, STANDARD_STREAM, subdivision_of};
+
 use limitlab::Result;
 use limitlab::error::Error;
 use limitlab::interpolate::surface::check;
@@ -200,13 +199,12 @@ fn run(arguments: &Arguments) -> Result<()> {
         attributes: keeps_faces.then_some(&input.attributes),
         ascii: arguments.ascii,
     };
-    match input.welded.as_ref().filter(|_| keeps_faces) {
+    match input.origin.as_ref().filter(|_| keeps_faces) {
         None => target.write(made.surface.mesh(), &options)?,
-        // The file's own vertices and faces, one position for each that was made one.
-        Some((place, faces)) => {
-            let spread = |values: &[DVec3]| -> Vec<DVec3> { place.iter().map(|&v| values[v as usize]).collect() };
-            let mesh = Mesh::new(spread(made.surface.positions()), faces.clone());
-            let normals = options.normals.map(spread);
+        // In the numbering of the file.
+        Some(origin) => {
+            let normals = options.normals.map(|normals| origin.spread(normals));
+            let mesh = origin.written(made.surface.positions());
             target.write(&mesh, &WriteOptions { normals: normals.as_deref(), ..options })?;
         }
     }
