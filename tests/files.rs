@@ -252,9 +252,11 @@ fn by_position(mesh: &Mesh) -> Vec<Vec<[u64; 3]>> {
     mesh.faces.iter().map(|face| face.iter().map(|&v| positions[v as usize]).collect()).collect()
 }
 
-/// What `tobj` makes of an OBJ file: for every run of faces its group, its material, and of its corners the position, the
-/// texture coordinates and the normal.
-fn seen_by_tobj(bytes: &[u8]) -> Vec<(String, Option<usize>, Vec<[Vec<f64>; 3]>)> {
+/// Of a corner the position, the texture coordinates and the normal.
+type SeenCorner = [Vec<f64>; 3];
+
+/// What `tobj` makes of an OBJ file: for every run of faces its group, its material, and its corners.
+fn seen_by_tobj(bytes: &[u8]) -> Vec<(String, Option<usize>, Vec<SeenCorner>)> {
     let named = |name: &str| tobj::Material { name: name.into(), ..Default::default() };
     let materials = |_: &Path| {
         let names = ["wood", "dark stone"];

@@ -218,16 +218,13 @@ fn cycle(face: &[u32]) -> Vec<u32> {
 fn without_doubles(mesh: &Mesh, work: Work, repairs: &mut Vec<Repair>) -> Work {
     let topology = Topology::new(&work.faces, mesh.len());
     let mut first: BTreeMap<Vec<u32>, u32> = BTreeMap::new();
-    let mut doubled = Vec::new();
-    let mut is_doubled = vec![false; work.faces.len()];
-    for f in 0..work.faces.len() {
+    let is_double = |f: usize| {
         let leader = *first.entry(cycle(work.faces.face(f))).or_insert(f as u32) as usize;
         let meets_leader = |c: usize| topology.twin(c as u32).is_some_and(|d| topology.incidence.face_of(d) == leader);
-        if leader != f && !work.faces.range(f).all(meets_leader) {
-            is_doubled[f] = true;
-            doubled.push(work.from[f]);
-        }
-    }
+        leader != f && !work.faces.range(f).all(meets_leader)
+    };
+    let is_doubled: Vec<bool> = (0..work.faces.len()).map(is_double).collect();
+    let doubled: Vec<u32> = (0..work.faces.len()).filter(|&f| is_doubled[f]).map(|f| work.from[f]).collect();
     note(repairs, RepairKind::DoubledFaces, &doubled);
     if doubled.is_empty() {
         return work;
