@@ -162,6 +162,14 @@ impl Named<'_> {
         }
     }
 
+    /// [Passes](Method::passes) over the matrix in an iteration, where they are known.
+    pub fn passes(&self) -> Option<usize> {
+        match self {
+            Named::Ours(method) => method.passes(),
+            Named::Own(_) => None,
+        }
+    }
+
     /// Whether it is known to factor the matrix.
     pub fn is_direct(&self) -> bool {
         matches!(self, Named::Ours(method) if method.is_direct())

@@ -181,23 +181,37 @@ impl<'a> Method<'a> {
 
     /// Whether the method factors the matrix.
     pub fn is_direct(self) -> bool {
+        self.passes().is_none()
+    }
+
+    /// Passes over the entries of the matrix that an iteration makes, the test of its error included: what iterations of
+    /// different methods cost beside each other. Both triangles of a factor without fill are one pass. `None` for a method
+    /// that factors the matrix.
+    ///
+    /// ```
+    /// use limitlab::solvers::Method;
+    ///
+    /// assert_eq!(Method::Pia.passes(), Some(1));
+    /// assert_eq!(Method::GaussSeidel { order: None }.passes(), Some(2));
+    /// ```
+    pub fn passes(self) -> Option<usize> {
         match self {
-            Method::Lu | Method::Cholesky | Method::SecondCholesky | Method::Ldlt => true,
+            Method::Lu | Method::Cholesky | Method::SecondCholesky | Method::Ldlt => None,
+            // One product gives both the error and the step.
             Method::Jacobi { .. }
             | Method::Thall
-            | Method::GaussSeidel { .. }
-            | Method::Sor { .. }
-            | Method::Ssor { .. }
             | Method::Pia
             | Method::WPia { .. }
             | Method::Chebyshev { .. }
+            | Method::Anderson { .. }
+            | Method::HeavyBall { .. }
             | Method::Cg
             | Method::PlainCg
-            | Method::PcgJacobi
-            | Method::PcgSsor { .. }
-            | Method::PcgIc0
-            | Method::Anderson { .. }
-            | Method::HeavyBall { .. } => false,
+            | Method::PcgJacobi => Some(1),
+            // The sweep, or both triangular solves, and a product.
+            Method::GaussSeidel { .. } | Method::Sor { .. } | Method::PcgIc0 => Some(2),
+            // Two sweeps and a product.
+            Method::Ssor { .. } | Method::PcgSsor { .. } => Some(3),
         }
     }
 

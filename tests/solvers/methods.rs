@@ -1,11 +1,18 @@
 //! All methods with their parameters on one system, and runs that hold what every run must.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use glam::DVec3;
 use limitlab::analysis::dense;
 use limitlab::assemble::LimitSystem;
-use limitlab::solvers::{Accelerated, Method, Outcome, Recorded, Solution, Stop, run};
+use limitlab::assemble::bounds::SpectralBounds;
+use limitlab::assemble::weights::Point;
+use limitlab::mesh::builtin::builtin;
+use limitlab::schemes::Scheme;
+use limitlab::solvers::system::Entries;
+use limitlab::solvers::{Accelerated, Method, Outcome, Recorded, Solution, Stop, System, run};
 
-use crate::common::tol;
+use crate::common::{meshes, tol};
 
 pub const DIRECT: [(&str, Method<'static>); 4] = [
     ("lu", Method::Lu),
@@ -89,4 +96,57 @@ pub fn checked(system: &LimitSystem, points: &[DVec3], method: Method, stop: &St
         assert!(truth <= stop.tolerance);
     }
     solution
+}
+
+/// A system that counts the rows it is asked for.
+struct Counted<'a> {
+    system: &'a LimitSystem,
+    rows: AtomicUsize,
+}
+
+impl System for Counted<'_> {
+    fn len(&self) -> usize {
+        self.system.len()
+    }
+
+    fn weights(&self) -> &[f64] {
+        System::weights(self.system)
+    }
+
+    fn diagonal(&self) -> &[f64] {
+        System::diagonal(self.system)
+    }
+
+    fn bounds(&self) -> SpectralBounds {
+        System::bounds(self.system)
+    }
+
+    fn stored(&self) -> Option<Entries<'_>> {
+        self.system.stored()
+    }
+
+    fn row<P: Point>(&self, i: usize, x: &[P]) -> P {
+        self.rows.fetch_add(1, Ordering::Relaxed);
+        self.system.row(i, x)
+    }
+}
+
+#[test]
+fn iterations_make_as_many_passes_as_is_said() {
+    let system = meshes::system(&builtin("irregular-quad:400").unwrap(), Scheme::CatmullClark);
+    let points: Vec<DVec3> =
+        (0..system.len()).map(|i| DVec3::new((i as f64).sin(), (7 * i) as f64 % 5.0, 1.0)).collect();
+    for (name, method) in iterative(&system, &reversed(system.len())) {
+        // Four iterations more: what a start takes is in both. After more, conjugate gradients evaluate drift at times.
+        let rows = [2, 6].map(|max_iterations| {
+            let counted = Counted { system: &system, rows: AtomicUsize::new(0) };
+            let report = run(&counted, &points, method, &Stop { tolerance: 1e-300, max_iterations }).report;
+            assert_eq!(report.iterations, max_iterations, "{name}");
+            counted.rows.into_inner()
+        });
+        let products = (rows[1] - rows[0]) as f64 / (4 * system.len()) as f64;
+        // The triangular solves read the factor.
+        let of_factors = if method == Method::PcgIc0 { 1.0 } else { 0.0 };
+        assert_eq!(method.passes().map(|passes| passes as f64), Some(products + of_factors), "{name}");
+    }
 }

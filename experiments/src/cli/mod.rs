@@ -23,7 +23,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::report::Table;
+use crate::report::{Figure, Format, Table};
 use limitlab::error::{Error, Result};
 use limitlab::solvers::Stop;
 
@@ -96,15 +96,32 @@ impl StopFlags {
     }
 }
 
+/// What figures are written as.
+#[derive(Args, Clone, Debug)]
+pub struct FigureFlags {
+    /// Write figures as these, separated by commas: png, svg, pdf
+    #[arg(long, value_name = "FORMAT,…", default_value = "png")]
+    figure: List<Format>,
+}
+
+impl FigureFlags {
+    /// The formats that are asked for.
+    pub fn formats(&self) -> &[Format] {
+        &self.figure.0
+    }
+}
+
 /// Where results go.
 #[derive(Args, Clone, Debug)]
 pub struct OutputFlags {
-    /// Folder for the CSV, Markdown and PNG files
+    /// Folder for the tables (CSV, Markdown) and figures
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
     /// Print one JSON object on standard output, and nothing else there
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    figures: FigureFlags,
 }
 
 impl OutputFlags {
@@ -114,6 +131,14 @@ impl OutputFlags {
     /// If the folder cannot be created.
     pub fn prepare(&self) -> Result<()> {
         limitlab::output::create_dir(&self.out)
+    }
+
+    /// Writes a figure there in every format that is asked for.
+    ///
+    /// # Errors
+    /// As [`Figure::write`].
+    pub fn figure(&self, stem: &str, figure: &Figure) -> Result<()> {
+        figure.write(&self.out, stem, self.figures.formats())
     }
 }
 

@@ -34,6 +34,14 @@ pub struct Subject {
 }
 
 impl Subject {
+    /// The title of a picture, with no more of a path than the name of the file.
+    pub fn caption(&self) -> String {
+        match Path::new(&self.name).file_name() {
+            Some(file) => self.title.replacen(&self.name, &file.to_string_lossy(), 1),
+            None => self.title.clone(),
+        }
+    }
+
     /// A stem for file names, after the program's `prefix`.
     pub fn stem(&self, prefix: &str) -> String {
         format!("{prefix}{}", self.stem)

@@ -95,8 +95,8 @@ fn run(arguments: &Arguments) -> Result<()> {
         let stem = problem.subject.stem("compare-solvers");
         let table = study::table(stem.clone(), format!("All methods on {}", problem.subject.title), about, &rows);
         table.write(&arguments.output.out)?;
-        let figure = study::figure(problem.subject.title.clone(), problem.subject.unit, &rows);
-        figure.render()?.save(&arguments.output.out.join(format!("{stem}.png")))?;
+        let figure = study::figure(problem.subject.caption(), problem.subject.unit, &rows);
+        arguments.output.figure(&stem, &figure)?;
         let histories = rows.iter().map(|row| &row.solution.report.history);
         let runs = rows.iter().map(|row| [row.method.to_string(), row.parameter.clone()]);
         histories::write(

@@ -206,8 +206,8 @@ fn run(arguments: &Arguments) -> Result<()> {
         }
         if let Some(full) = &findings.full {
             full_table(&subject, full).write(out)?;
-            let png = out.join(format!("{}.png", subject.stem("spectrum-histogram")));
-            histogram(&subject, full, &findings.promise).render()?.save(&png)?;
+            let figure = histogram(&subject, full, &findings.promise);
+            arguments.output.figure(&subject.stem("spectrum-histogram"), &figure)?;
         }
         if !findings.modes.is_empty() {
             mode_table(&subject, &findings.modes).write(out)?;
@@ -239,7 +239,7 @@ fn complex(input: &Input, arguments: &Arguments) -> Result<Value> {
     }
     if arguments.full {
         found.full_table(&subject).write(out)?;
-        found.figure(&subject).render()?.save(&out.join(format!("{}.png", subject.stem("spectrum-eigenvalues"))))?;
+        arguments.output.figure(&subject.stem("spectrum-eigenvalues"), &found.figure(&subject))?;
     }
     Ok(subject.json(found.json(arguments.full)))
 }
@@ -526,7 +526,7 @@ fn histogram(subject: &Subject, full: &dense::Eigenvalues, promise: &Promise) ->
         vertical_lines: vec![Rule::new(bounds.min, "proven bounds"), Rule::new(bounds.max, "")],
         ..LinePlot::default()
     };
-    let a = LinePlot { title: subject.title.clone(), ..panel(&full.a, "A", "A (PIA, CG, Chebyshev)", promise.a) };
+    let a = LinePlot { title: subject.caption(), ..panel(&full.a, "A", "A (PIA, CG, Chebyshev)", promise.a) };
     let jacobi = panel(&full.jacobi, "D⁻¹A", "D⁻¹A (Jacobi)", promise.jacobi);
     let mut figure = Figure::stack([a, jacobi]);
     figure.share_x = false;

@@ -160,7 +160,7 @@ fn run(arguments: &Arguments, scheme: LocalScheme, valences: &[usize]) -> Result
         arguments.common.remark("no characteristic map to draw: the leading pairs are complex");
     }
     for (stem, figure) in &figures {
-        figure.render()?.save(&out.join(format!("{stem}.png")))?;
+        arguments.output.figure(stem, figure)?;
     }
     for table in &tables {
         table.write(out)?;

@@ -106,9 +106,8 @@ fn run(arguments: &Arguments) -> Result<()> {
         let (sweep, histories) = sweep_one(&problem, arguments, &write)?;
         write(&sweep)?;
         let table = table(&sweep);
-        study::plot(problem.subject.title.clone(), &arguments.method.0, &sweep)
-            .render()?
-            .save(&arguments.output.out.join(format!("{}.png", table.id)))?;
+        let figure = study::plot(problem.subject.caption(), &arguments.method.0, &sweep);
+        arguments.output.figure(&table.id, &figure)?;
         if arguments.history.is_some() {
             let runs = histories.iter().map(|of| ([of.method.to_string(), short(of.omega)], &of.history[..]));
             let path = arguments.output.out.join(format!("{}-history.csv", table.id));

@@ -1,36 +1,26 @@
-//! Strokes, markers and text on a bitmap, in points (1/72 inch) from the top left.
+//! Strokes, markers and text on a canvas, in points (1/72 inch) from the top left, as a list of shapes.
 //!
-//! The bitmap is drawn at [`SUPERSAMPLING`] times the final resolution and then averaged, because the backend
-//! fills without smoothing and places everything at whole pixels.
+//! What is drawn is kept, so that one drawing can be written in several formats: see [`super::bitmap`], [`super::svg`] and
+//! [`super::pdf`].
 
+use super::glyphs;
 use super::png::Image;
-use limitlab::{Error, Result};
-use plotters::backend::BitMapBackend;
-use plotters::coord::Shift;
-use plotters::drawing::{DrawingArea, IntoDrawingArea};
-use plotters::element::{BitMapElement, Circle, Polygon, Rectangle};
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{Color, FontDesc, FontFamily, FontStyle, FontTransform, IntoFont, WHITE, register_font};
-use std::fmt::Display;
-use std::sync::Once;
+use limitlab::Result;
+use serde::Serialize;
 
 /// A colour of red, green and blue, each from 0 to 255.
 pub use plotters::style::RGBColor as Colour;
 
-/// Pixels of the final image a point: 216 dots an inch.
+const WHITE: Colour = Colour(255, 255, 255);
+
+/// Pixels of an image a point: 216 dots an inch.
 pub(super) const PIXELS_PER_POINT: u32 = 3;
 
-/// Pixels drawn for each pixel of the final image, in both directions.
+/// Pixels drawn for each pixel of an image, in both directions.
 pub(super) const SUPERSAMPLING: u32 = 3;
 
 /// Drawn pixels a point.
-const SCALE: f64 = (PIXELS_PER_POINT * SUPERSAMPLING) as f64;
-
-const FONT: &str = "limitlab-sans";
-
-/// The backend takes the distance from ascent to descent as the size of a font; DejaVu Sans has
-/// (1901 + 483) / 2048 of an em there.
-const HEIGHT_PER_EM: f64 = 2384.0 / 2048.0;
+pub(super) const SCALE: f64 = (PIXELS_PER_POINT * SUPERSAMPLING) as f64;
 
 /// The height of digits and capitals in ems.
 pub(super) const CAP_HEIGHT: f64 = 0.73;
@@ -97,7 +87,7 @@ impl Rect {
 }
 
 /// How a line is broken.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum Dash {
     #[default]
     Solid,
@@ -138,37 +128,50 @@ pub(super) enum Anchor {
     End,
 }
 
-/// A bitmap to draw on.
-pub(super) struct Canvas<'a> {
-    area: DrawingArea<BitMapBackend<'a>, Shift>,
+/// What is drawn, one over the other.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Shape {
+    Rectangle {
+        area: Rect,
+        colour: Colour,
+    },
+    /// Polylines whose ends are cut square and whose joints are round.
+    Lines {
+        paths: Vec<Vec<Point>>,
+        width: f64,
+        colour: Colour,
+    },
+    Polygon {
+        corners: Vec<Point>,
+        colour: Colour,
+    },
+    Disc {
+        centre: Point,
+        radius: f64,
+        colour: Colour,
+    },
+    /// Text of one size from `at` on, a point of its baseline, to the right or upward.
+    Text {
+        text: String,
+        at: Point,
+        size: f64,
+        upright: bool,
+        colour: Colour,
+    },
+    /// An image of [`SCALE`] pixels a point with this corner at the top left.
+    Image {
+        corner: Point,
+        image: Image,
+    },
 }
 
-/// Draws an image of `width`×`height` points.
-pub(super) fn paint(width: u32, height: u32, draw: impl FnOnce(&Canvas<'_>) -> Result<()>) -> Result<Image> {
-    let scale = PIXELS_PER_POINT * SUPERSAMPLING;
-    let (width, height) = (width * scale, height * scale);
-    let mut rgb = vec![u8::MAX; 3 * width as usize * height as usize];
-    {
-        let area = BitMapBackend::with_buffer(&mut rgb, (width, height)).into_drawing_area();
-        let canvas = Canvas { area };
-        draw(&canvas)?;
-        drawn(canvas.area.present())?;
-    }
-    Ok(Image { width, height, rgb }.reduced(SUPERSAMPLING))
-}
-
-fn drawn<T, E: Display>(result: std::result::Result<T, E>) -> Result<T> {
-    result.map_err(|e| Error::Computation(format!("cannot draw the picture: {e}")))
-}
-
-/// The font whose em is `size` points.
-fn font(size: f64) -> FontDesc<'static> {
-    static REGISTERED: Once = Once::new();
-    REGISTERED.call_once(|| {
-        let parsed = register_font(FONT, FontStyle::Normal, dejavu::sans::regular());
-        assert!(parsed.is_ok(), "the embedded font is a font");
-    });
-    (FontFamily::Name(FONT), size * SCALE * HEIGHT_PER_EM).into_font()
+/// A page of shapes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Canvas {
+    /// In points.
+    pub width: u32,
+    pub height: u32,
+    pub shapes: Vec<Shape>,
 }
 
 /// A piece of text of one size: its size and its rise in ems of the whole.
@@ -205,171 +208,134 @@ fn runs(text: &str) -> Vec<Run<'_>> {
 }
 
 /// The advance of `text` at `size` points, in points.
-pub(super) fn text_width(text: &str, size: f64) -> Result<f64> {
-    let mut width = 0.0;
-    for run in runs(text) {
-        let ((left, _), (right, _)) = drawn(font(size * run.size).layout_box(run.text))?;
-        width += f64::from(right - left) / SCALE;
+pub(super) fn text_width(text: &str, size: f64) -> f64 {
+    runs(text).iter().map(|run| glyphs::width(run.text, size * run.size)).sum()
+}
+
+impl Canvas {
+    /// An empty page of this size.
+    pub fn new(width: u32, height: u32) -> Self {
+        Canvas { width, height, shapes: Vec::new() }
     }
-    Ok(width)
-}
 
-fn pixel((x, y): Point) -> (i32, i32) {
-    ((x * SCALE).round() as i32, (y * SCALE).round() as i32)
-}
-
-impl Canvas<'_> {
     /// Writes `text` with its baseline through `at`, to the right, or upward if `upright`.
-    pub fn text(&self, text: &str, at: Point, size: f64, anchor: Anchor, upright: bool, colour: Colour) -> Result<()> {
-        let width = text_width(text, size)?;
+    pub fn text(&mut self, text: &str, at: Point, size: f64, anchor: Anchor, upright: bool, colour: Colour) {
+        let width = text_width(text, size);
         let mut along = match anchor {
             Anchor::Start => 0.0,
             Anchor::Middle => -width / 2.0,
             Anchor::End => -width,
         };
         for run in runs(text) {
-            let em = size * run.size;
-            // The backend puts the baseline half the font's height below the anchor's top.
-            let above = em * HEIGHT_PER_EM / 2.0 + size * run.rise;
-            let (place, turn) = if upright {
-                ((at.0 - above, at.1 - along), FontTransform::Rotate270)
-            } else {
-                ((at.0 + along, at.1 - above), FontTransform::None)
-            };
-            let style = font(em).transform(turn).color(&colour).pos(Pos::new(HPos::Left, VPos::Top));
-            drawn(self.area.draw_text(run.text, &style, pixel(place)))?;
-            along += text_width(run.text, em)?;
+            let (em, rise) = (size * run.size, size * run.rise);
+            let at = if upright { (at.0 - rise, at.1 - along) } else { (at.0 + along, at.1 - rise) };
+            self.shapes.push(Shape::Text { text: run.text.to_owned(), at, size: em, upright, colour });
+            along += glyphs::width(run.text, em);
         }
-        Ok(())
     }
 
     /// Fills a rectangle.
-    pub fn fill(&self, rect: Rect, colour: Colour) -> Result<()> {
-        let (x0, y0) = pixel((rect.left, rect.top));
-        let (x1, y1) = pixel((rect.right, rect.bottom));
-        // The backend includes the last row and column.
-        let corners = [(x0, y0), ((x1 - 1).max(x0), (y1 - 1).max(y0))];
-        drawn(self.area.draw(&Rectangle::new(corners, colour.filled())))
+    pub fn fill(&mut self, area: Rect, colour: Colour) {
+        self.shapes.push(Shape::Rectangle { area, colour });
     }
 
     /// A straight upright line, its middle at `x`, that ends square at `from` and `to`.
-    pub fn upright(&self, x: f64, (from, to): (f64, f64), width: f64, colour: Colour) -> Result<()> {
-        let line = Rect { left: x - width / 2.0, right: x + width / 2.0, top: from, bottom: to };
-        self.fill(line, colour)
+    pub fn upright(&mut self, x: f64, (from, to): (f64, f64), width: f64, colour: Colour) {
+        self.fill(Rect { left: x - width / 2.0, right: x + width / 2.0, top: from, bottom: to }, colour);
     }
 
     /// A straight level line, its middle at `y`, that ends square at `from` and `to`.
-    pub fn level(&self, y: f64, (from, to): (f64, f64), width: f64, colour: Colour) -> Result<()> {
-        let line = Rect { left: from, right: to, top: y - width / 2.0, bottom: y + width / 2.0 };
-        self.fill(line, colour)
+    pub fn level(&mut self, y: f64, (from, to): (f64, f64), width: f64, colour: Colour) {
+        self.fill(Rect { left: from, right: to, top: y - width / 2.0, bottom: y + width / 2.0 }, colour);
     }
 
     /// Fills a rectangle with an image, made for its width and height in drawn pixels and the drawn pixels a point.
-    pub fn image(&self, rect: Rect, make: impl FnOnce(u32, u32, f64) -> Result<Image>) -> Result<()> {
-        let (x0, y0) = pixel((rect.left, rect.top));
-        let (x1, y1) = pixel((rect.right, rect.bottom));
-        let size = ((x1 - x0).max(1) as u32, (y1 - y0).max(1) as u32);
-        let image = make(size.0, size.1, SCALE)?;
-        match BitMapElement::with_owned_buffer((x0, y0), size, image.rgb) {
-            Some(bitmap) => drawn(self.area.draw(&bitmap)),
-            None => drawn(Err("an image of another size")),
-        }
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub fn image(&mut self, area: Rect, make: impl FnOnce(u32, u32, f64) -> Result<Image>) -> Result<()> {
+        let pixel = |length: f64| (length * SCALE).round();
+        let (left, top) = (pixel(area.left), pixel(area.top));
+        let size = |from: f64, to: f64| (pixel(to) - from).max(1.0) as u32;
+        let image = make(size(left, area.right), size(top, area.bottom), SCALE)?;
+        self.shapes.push(Shape::Image { corner: (left / SCALE, top / SCALE), image });
+        Ok(())
     }
 
     /// Draws the outline of a rectangle, its middle on the rectangle's edge.
-    pub fn outline(&self, rect: Rect, width: f64, colour: Colour) -> Result<()> {
+    pub fn outline(&mut self, rect: Rect, width: f64, colour: Colour) {
         let h = width / 2.0;
         for y in [rect.top, rect.bottom] {
-            self.level(y, (rect.left - h, rect.right + h), width, colour)?;
+            self.level(y, (rect.left - h, rect.right + h), width, colour);
         }
         for x in [rect.left, rect.right] {
-            self.upright(x, (rect.top - h, rect.bottom + h), width, colour)?;
+            self.upright(x, (rect.top - h, rect.bottom + h), width, colour);
         }
-        Ok(())
     }
 
     /// Draws the polyline through `path` as far as it lies in `window`. Dashes have their lengths along the line
     /// on paper, whatever the spacing of its points.
-    pub fn stroke(&self, path: &[Point], window: Rect, width: f64, dash: Dash, colour: Colour) -> Result<()> {
-        for piece in clipped(path, window) {
-            for piece in dashed(&piece, dash.pattern(), width) {
-                self.solid(&piece, width, colour)?;
-            }
+    pub fn stroke(&mut self, path: &[Point], window: Rect, width: f64, dash: Dash, colour: Colour) {
+        let visible = clipped(path, window);
+        let paths: Vec<_> = visible.iter().flat_map(|piece| dashed(piece, dash.pattern(), width)).collect();
+        if !paths.is_empty() {
+            self.shapes.push(Shape::Lines { paths, width, colour });
         }
-        Ok(())
     }
 
-    /// A solid polyline: one quadrilateral a segment, one disc a joint.
-    fn solid(&self, path: &[Point], width: f64, colour: Colour) -> Result<()> {
-        // The backend's shapes include their border pixels.
-        let half = ((width * SCALE - 1.0) / 2.0).max(0.0);
-        let px: Vec<Point> = path.iter().map(|&(x, y)| (x * SCALE, y * SCALE)).collect();
-        for segment in px.windows(2) {
-            let ((ax, ay), (bx, by)) = (segment[0], segment[1]);
-            let (dx, dy) = (bx - ax, by - ay);
-            let length = dx.hypot(dy);
-            if length == 0.0 {
-                continue;
-            }
-            let (nx, ny) = (-dy / length * half, dx / length * half);
-            let corners = [(ax + nx, ay + ny), (bx + nx, by + ny), (bx - nx, by - ny), (ax - nx, ay - ny)];
-            self.polygon(&corners, colour)?;
+    /// Draws an arrowhead with its tip at `to`, in the direction from `from`.
+    pub fn arrowhead(&mut self, (from, to): (Point, Point), colour: Colour) {
+        const LENGTH: f64 = 6.5;
+        const HALF_WIDTH: f64 = 2.7;
+        let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+        let length = dx.hypot(dy);
+        if length > 0.0 {
+            let (ux, uy) = (dx / length, dy / length);
+            let corner = |side: f64| (to.0 - LENGTH * ux - side * uy, to.1 - LENGTH * uy + side * ux);
+            self.shapes.push(Shape::Polygon { corners: vec![to, corner(HALF_WIDTH), corner(-HALF_WIDTH)], colour });
         }
-        for &centre in px.iter().skip(1).take(px.len().saturating_sub(2)) {
-            self.disc(centre, half, colour)?;
-        }
-        Ok(())
-    }
-
-    /// Fills the polygon with these corners in drawn pixels.
-    fn polygon(&self, corners: &[Point], colour: Colour) -> Result<()> {
-        let whole = |&(x, y): &Point| (x.round() as i32, y.round() as i32);
-        let corners: Vec<_> = corners.iter().map(whole).collect();
-        drawn(self.area.draw(&Polygon::new(corners, colour.filled())))
-    }
-
-    /// Fills a disc, in drawn pixels.
-    fn disc(&self, (x, y): Point, radius: f64, colour: Colour) -> Result<()> {
-        let centre = (x.round() as i32, y.round() as i32);
-        let disc = Circle::new(centre, radius.round() as i32, colour.filled());
-        drawn(self.area.draw(&disc))
     }
 
     /// Draws a marker of about `radius` points with a thin white rim that parts it from its neighbours.
-    pub fn marker(&self, at: Point, marker: Marker, radius: f64, colour: Colour) -> Result<()> {
+    pub fn marker(&mut self, at: Point, marker: Marker, radius: f64, colour: Colour) {
         const RIM: f64 = 0.5;
         match marker {
             Marker::Cross | Marker::Plus => {
                 let r = radius * if marker == Marker::Cross { 1.0 } else { 1.35 };
                 let arms = if marker == Marker::Cross { [(r, r), (r, -r)] } else { [(r, 0.0), (0.0, r)] };
-                for (dx, dy) in arms {
-                    let arm = [(at.0 - dx, at.1 - dy), (at.0 + dx, at.1 + dy)];
-                    self.solid(&arm, 0.5 * radius, colour)?;
-                }
-                Ok(())
+                let arm = |(dx, dy)| vec![(at.0 - dx, at.1 - dy), (at.0 + dx, at.1 + dy)];
+                self.shapes.push(Shape::Lines { paths: arms.map(arm).to_vec(), width: 0.5 * radius, colour });
             }
             _ => {
-                self.shape(at, marker, radius + RIM, WHITE)?;
-                self.shape(at, marker, radius, colour)
+                self.shape(at, marker, radius + RIM, WHITE);
+                self.shape(at, marker, radius, colour);
             }
         }
     }
 
     /// Fills a closed marker. The sizes give all shapes about the same area.
-    fn shape(&self, at: Point, marker: Marker, radius: f64, colour: Colour) -> Result<()> {
-        let (x, y, r) = (at.0 * SCALE, at.1 * SCALE, radius * SCALE);
+    fn shape(&mut self, at: Point, marker: Marker, radius: f64, colour: Colour) {
         let corners: &[Point] = match marker {
             Marker::Square => &[(-0.87, -0.87), (0.87, -0.87), (0.87, 0.87), (-0.87, 0.87)],
             Marker::Diamond => &[(0.0, -1.2), (1.2, 0.0), (0.0, 1.2), (-1.2, 0.0)],
             Marker::Triangle => &[(0.0, -1.25), (1.15, 0.75), (-1.15, 0.75)],
             Marker::InvertedTriangle => &[(0.0, 1.25), (1.15, -0.75), (-1.15, -0.75)],
             Marker::Circle | Marker::Cross | Marker::Plus => {
-                return self.disc((x, y), r, colour);
+                return self.shapes.push(Shape::Disc { centre: at, radius, colour });
             }
         };
-        let corners: Vec<Point> = corners.iter().map(|c| (x + r * c.0, y + r * c.1)).collect();
-        self.polygon(&corners, colour)
+        let corners = corners.iter().map(|c| (at.0 + radius * c.0, at.1 + radius * c.1)).collect();
+        self.shapes.push(Shape::Polygon { corners, colour });
     }
+}
+
+/// Where a polyline leaves `window` for good: the last segment inside, cut at the edge; `None` if it ends inside or never
+/// was there.
+pub(super) fn way_out(path: &[Point], window: Rect) -> Option<(Point, Point)> {
+    let pieces = clipped(path, window);
+    let piece = pieces.last()?;
+    let &[.., from, to] = piece.as_slice() else { return None };
+    (path.last() != Some(&to)).then_some((from, to))
 }
 
 /// The parts of a polyline inside `window`.
@@ -444,6 +410,15 @@ mod tests {
     }
 
     #[test]
+    fn a_line_that_leaves_for_good_does_so_somewhere() {
+        // Through the right side, after an excursion through the top.
+        let path = [(5.0, 5.0), (5.0, -5.0), (6.0, 5.0), (12.0, 5.0), (12.0, 7.0)];
+        assert_eq!(way_out(&path, WINDOW), Some(((6.0, 5.0), (10.0, 5.0))));
+        assert_eq!(way_out(&path[..3], WINDOW), None);
+        assert_eq!(way_out(&[(11.0, 0.0), (12.0, 0.0)], WINDOW), None);
+    }
+
+    #[test]
     fn dashes_do_not_depend_on_the_spacing_of_points() {
         // The same line of length 10 with 2 and with 1001 points; pattern 2 on, 1 off at width 1.
         let coarse = [(0.0, 0.0), (6.0, 8.0)];
@@ -475,8 +450,9 @@ mod tests {
         let window = Rect { left: 0.0, top: 0.0, right: 40.0, bottom: 20.0 };
         let line = [(5.0, 10.0), (35.0, 10.0)];
         let black = Colour(0, 0, 0);
-        let draw = |canvas: &Canvas<'_>| canvas.stroke(&line, window, 1.5, Dash::Solid, black);
-        let image = paint(40, 20, draw).unwrap();
+        let mut canvas = Canvas::new(40, 20);
+        canvas.stroke(&line, window, 1.5, Dash::Solid, black);
+        let image = canvas.to_image().unwrap();
         let final_px = |points: u32| points * PIXELS_PER_POINT;
         let ink: f64 = (0..image.height).map(|y| 1.0 - f64::from(image.pixel(final_px(20), y)[0]) / 255.0).sum();
         let expected = 1.5 * f64::from(PIXELS_PER_POINT);

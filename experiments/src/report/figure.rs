@@ -1,17 +1,19 @@
 //! Panels arranged in a grid and rendered to an image.
 
 use super::axis::{Axis, Scale};
-use super::canvas::{Anchor, Canvas, Rect, paint};
-use super::frame::{BARE_RIGHT, Slot, TEXT_COLOUR, title_room};
+use super::canvas::{Canvas, Rect};
+use super::frame::{BARE_RIGHT, Slot, draw_fitted, title_room};
 use super::plot::LinePlot;
 use super::png::Image;
 use super::render::Picture;
 use super::sparsity::SparsityPlot;
-use limitlab::{Error, Result};
+use limitlab::output::write_file;
+use limitlab::{Error, Result, names};
+use std::path::Path;
+use std::str::FromStr;
 
 const MARGIN: f64 = 6.0;
 const FIGURE_TITLE_SIZE: f64 = 12.0;
-const FIGURE_TITLE_ROOM: f64 = 22.0;
 /// A frame smaller than this shows nothing.
 const LEAST_FRAME: f64 = 40.0;
 
@@ -67,17 +69,17 @@ impl Panel {
         }
     }
 
-    fn left(&self, height: f64) -> Result<f64> {
+    fn left(&self, height: f64) -> f64 {
         match self {
             Panel::Lines(plot) => plot.left(height),
             Panel::Sparsity(plot) => plot.left(height),
-            Panel::Picture(picture) => Ok(picture.left()),
+            Panel::Picture(picture) => picture.left(),
         }
     }
 
     fn right(&self) -> Result<f64> {
         match self {
-            Panel::Lines(plot) => plot.right(),
+            Panel::Lines(plot) => Ok(plot.right()),
             Panel::Sparsity(_) => Ok(BARE_RIGHT),
             Panel::Picture(picture) => picture.right(),
         }
@@ -91,19 +93,51 @@ impl Panel {
         }
     }
 
-    fn draw(&self, canvas: &Canvas<'_>, slot: &Slot) -> Result<()> {
+    fn draw(&self, canvas: &mut Canvas, slot: &Slot) -> Result<()> {
         match self {
             Panel::Lines(plot) => plot.draw(canvas, slot),
             Panel::Sparsity(plot) => plot.draw(canvas, slot.frame),
-            Panel::Picture(picture) => picture.draw(canvas, slot),
+            Panel::Picture(picture) => picture.draw(canvas, slot)?,
         }
+        Ok(())
+    }
+}
+
+/// What a figure is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// An image of 216 pixels an inch.
+    Png,
+    Svg,
+    Pdf,
+}
+
+impl Format {
+    const ALL: [Format; 3] = [Format::Png, Format::Svg, Format::Pdf];
+
+    /// The name on the command line, and the end of the names of files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Png => "png",
+            Format::Svg => "svg",
+            Format::Pdf => "pdf",
+        }
+    }
+}
+
+impl FromStr for Format {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        names::find("figure format", name, &Format::ALL.map(|format| (format.name(), format)), &[])
     }
 }
 
 /// Panels in rows, all frames of one size and in line with each other.
 ///
 /// Sizes are in points; a point is 3 pixels of the image, so that a figure 600 points wide, with its text of 9 to
-/// 10 points, prints at 216 dots an inch. Rendering takes 243 bytes a square point (60 MB at 600×400).
+/// 10 points, prints at 216 dots an inch. Rendering takes 243 bytes a square point (60 MB at 600×400), and as much again
+/// for pictures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
     /// Above all panels; none if empty.
@@ -119,6 +153,9 @@ pub struct Figure {
 }
 
 impl Figure {
+    /// The height that a title takes, in points.
+    pub const TITLE_ROOM: u32 = 22;
+
     /// A single panel, 600×380 points.
     pub fn new(panel: impl Into<Panel>) -> Self {
         Figure { title: String::new(), width: 600, height: 380, columns: 1, share_x: false, panels: vec![panel.into()] }
@@ -164,18 +201,39 @@ impl Figure {
     /// # Panics
     /// If a range is empty, not finite, or reaches 0 on a logarithmic axis, or bars lack an edge.
     pub fn render(&self) -> Result<Image> {
-        let slots = self.slots()?;
-        paint(self.width, self.height, |canvas| {
-            if !self.title.is_empty() {
-                let place = (f64::from(self.width) / 2.0, MARGIN + FIGURE_TITLE_SIZE);
-                let size = FIGURE_TITLE_SIZE;
-                canvas.text(&self.title, place, size, Anchor::Middle, false, TEXT_COLOUR)?;
+        self.drawing()?.to_image()
+    }
+
+    /// Writes the files `STEM.png`, `STEM.svg` and `STEM.pdf`, as far as they are asked for.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render), and [`Error::Io`] if a file cannot be written.
+    ///
+    /// # Panics
+    /// As [`render`](Self::render).
+    pub fn write(&self, folder: &Path, stem: &str, formats: &[Format]) -> Result<()> {
+        let drawing = self.drawing()?;
+        formats.iter().try_for_each(|&format| {
+            let path = folder.join(format!("{stem}.{}", format.name()));
+            match format {
+                Format::Png => drawing.to_image()?.save(&path),
+                Format::Svg => write_bytes(&path, drawing.to_svg()?.as_bytes()),
+                Format::Pdf => write_bytes(&path, &drawing.to_pdf()),
             }
-            for (panel, slot) in self.panels.iter().zip(&slots) {
-                panel.draw(canvas, slot)?;
-            }
-            Ok(())
         })
+    }
+
+    fn drawing(&self) -> Result<Canvas> {
+        let mut canvas = Canvas::new(self.width, self.height);
+        if !self.title.is_empty() {
+            let width = f64::from(self.width);
+            let place = (width / 2.0, MARGIN + FIGURE_TITLE_SIZE);
+            draw_fitted(&mut canvas, &self.title, place, FIGURE_TITLE_SIZE, width - 2.0 * MARGIN);
+        }
+        for (panel, slot) in self.panels.iter().zip(self.slots()?) {
+            panel.draw(&mut canvas, &slot)?;
+        }
+        Ok(canvas)
     }
 
     /// Panels in a row, at least 1 and no more than there are.
@@ -214,7 +272,7 @@ impl Figure {
             above[row] = above[row].max(panel.top());
             below[row] = below[row].max(panel.bottom(self.is_labelled(index)));
         }
-        let title = if self.title.is_empty() { 0.0 } else { FIGURE_TITLE_ROOM };
+        let title = if self.title.is_empty() { 0.0 } else { f64::from(Self::TITLE_ROOM) };
         let used = title + 2.0 * MARGIN + above.iter().chain(&below).sum::<f64>();
         let height = (f64::from(self.height) - used) / rows as f64;
 
@@ -222,7 +280,7 @@ impl Figure {
         let (mut before, mut after) = (vec![0.0_f64; columns], vec![0.0_f64; columns]);
         for (index, panel) in self.panels.iter().enumerate() {
             let column = index % columns;
-            before[column] = before[column].max(panel.left(height.max(LEAST_FRAME))?);
+            before[column] = before[column].max(panel.left(height.max(LEAST_FRAME)));
             after[column] = after[column].max(panel.right()?);
         }
         let used = 2.0 * MARGIN + before.iter().chain(&after).sum::<f64>();
@@ -248,6 +306,10 @@ impl Figure {
         };
         Ok((0..self.panels.len()).map(slot).collect())
     }
+}
+
+fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_file(path, |out| out.write_all(bytes))
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 use super::super::canvas::Colour;
 use super::*;
-use crate::report::canvas::{Dash, Marker, PIXELS_PER_POINT};
+use crate::report::canvas::{Dash, Marker, PIXELS_PER_POINT, Shape};
 use crate::report::series::{Band, Bars, Rule, marker, palette};
-use crate::report::{Scale, Series};
+use crate::report::{ColourScale, Scale, Series, ShadedMesh, View};
 
 /// Twelve convergence histories, four of which diverge or stagnate.
 fn histories() -> Figure {
@@ -145,6 +145,122 @@ fn figures_have_their_size_are_drawn_and_come_out_the_same() {
         figure.render().unwrap().write_png(&mut second).unwrap();
         assert!(first == second, "the same figure gives the same bytes");
     }
+}
+
+/// A plot with letters of every kind and a surface with its bar of colours.
+fn mixed() -> Figure {
+    let mesh = limitlab::mesh::builtin::builtin("torus:8x6").unwrap();
+    let values = mesh.positions.iter().map(|p| p.x).collect();
+    let scale = ColourScale::linear("x", (-2.0, 2.0));
+    let surface = ShadedMesh::smooth(mesh).scalars(values, scale.clone());
+    let view = View::named("oblique").unwrap();
+    let picture = Picture { colour_bar: Some(scale), ..Picture::new("a & b < \"c\"", view).surface(surface) };
+    let Panel::Lines(plot) = sweep().panels.remove(0) else { unreachable!() };
+    Figure { width: 800, ..Figure::row([Panel::from(plot), Panel::from(picture)]) }.title("ω_{opt} ‖p − A v‖ 10⁻⁸")
+}
+
+/// The names of the elements of an XML text in order, every one closed, its attributes quoted, its entities known.
+fn elements(text: &str) -> Vec<&str> {
+    let (mut open, mut seen) = (Vec::new(), Vec::new());
+    let body = text.strip_prefix("<?xml version=\"1.0\" encoding=\"UTF-8\"?>").unwrap();
+    for tag in body.split('<').skip(1) {
+        let (tag, between) = tag.split_once('>').unwrap();
+        assert!(between.trim().is_empty(), "text outside attributes: {between}");
+        if let Some(name) = tag.strip_prefix('/') {
+            assert_eq!(open.pop(), Some(name));
+            continue;
+        }
+        let (name, attributes) = tag.trim_end_matches('/').split_once(' ').unwrap_or((tag, ""));
+        for (k, part) in attributes.split('"').enumerate() {
+            if k % 2 == 0 {
+                assert!(part.is_empty() || part.ends_with('='), "{part}");
+            } else {
+                let entities = part.split('&').skip(1);
+                assert!(
+                    entities.into_iter().all(|e| ["amp;", "lt;", "quot;"].iter().any(|known| e.starts_with(known)))
+                );
+            }
+        }
+        if !tag.ends_with('/') {
+            open.push(name);
+        }
+        seen.push(name);
+    }
+    assert_eq!(open, [""; 0]);
+    seen
+}
+
+#[test]
+fn vector_graphics_are_valid_and_of_the_figures_size() {
+    for figure in [histories(), sweep(), patterns(64), spectrum(), mixed()] {
+        let svg = figure.drawing().unwrap().to_svg().unwrap();
+        let names = elements(&svg);
+        assert_eq!(names.iter().filter(|&&name| name == "svg").count(), 1);
+        let (width, height) = (figure.width, figure.height);
+        let size = format!("width=\"{width}pt\" height=\"{height}pt\" viewBox=\"0 0 {width} {height}\"");
+        assert!(svg.contains(&size));
+        assert!(!svg.contains("NaN") && !svg.contains("inf"));
+        // Every letter that is placed is defined, and defined once.
+        let after = |mark: &'static str| svg.split(mark).skip(1).map(|rest| rest.split('"').next().unwrap());
+        let defined: Vec<&str> = after("id=\"letter-").collect();
+        assert!(!defined.is_empty() && after("href=\"#letter-").all(|letter| defined.contains(&letter)));
+        assert!(defined.iter().enumerate().all(|(k, letter)| !defined[..k].contains(letter)));
+    }
+    let svg = mixed().drawing().unwrap().to_svg().unwrap();
+    assert!(svg.contains("aria-label=\"a &amp; b &lt; &quot;c&quot;\""));
+    assert_eq!(svg.matches("data:image/png;base64,iVBOR").count(), 2);
+}
+
+#[test]
+fn a_page_has_the_figures_size_and_everything_in_it() {
+    let find = |bytes: &[u8], mark: &[u8]| bytes.windows(mark.len()).filter(|&w| w == mark).count();
+    for (figure, images) in [(histories(), 0), (mixed(), 2)] {
+        let pdf = figure.drawing().unwrap().to_pdf();
+        assert!(pdf.starts_with(b"%PDF-1.7") && pdf.ends_with(b"%%EOF"));
+        assert_eq!((find(&pdf, b"/Type /Page\n"), find(&pdf, b"/Subtype /Image")), (1, images));
+        let size = format!("/MediaBox [0 0 {} {}]", figure.width, figure.height);
+        assert_eq!(find(&pdf, size.as_bytes()), 1);
+        // The table at the end says where each object begins.
+        let text = String::from_utf8_lossy(&pdf).into_owned();
+        let start: usize = text.rsplit("startxref\n").next().unwrap().lines().next().unwrap().parse().unwrap();
+        assert!(pdf[start..].starts_with(b"xref"));
+        let stream = pdf.windows(7).enumerate().filter(|(_, w)| *w == b"stream\n").map(|(at, _)| at + 7);
+        let unpacked = stream.filter_map(|at| miniz_oxide::inflate::decompress_to_vec_zlib(&pdf[at..]).ok());
+        let content = unpacked
+            .filter_map(|bytes| String::from_utf8(bytes).ok())
+            .find(|text| text.ends_with('f') || text.ends_with('S') || text.ends_with('Q'))
+            .unwrap();
+        assert!(!content.contains("NaN") && !content.contains("inf"));
+        assert_eq!(content.matches("\nq\n").count(), content.matches("\nQ").count());
+        assert_eq!(content.matches(" Do").count(), images);
+    }
+}
+
+#[test]
+fn figures_are_written_in_the_formats_that_are_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    sweep().write(folder.path(), "sweep", &["svg", "PDF"].map(|name| name.parse().unwrap())).unwrap();
+    let written = |name: &str| folder.path().join(name).exists();
+    assert!(written("sweep.svg") && written("sweep.pdf") && !written("sweep.png"));
+    assert!("jpg".parse::<Format>().unwrap_err().to_string().contains("use png, svg or pdf"));
+}
+
+#[test]
+fn curves_that_go_on_end_in_arrowheads() {
+    let arrows = |series: Series, y_range| {
+        let plot = LinePlot { series: vec![series.colour(Colour(255, 0, 0))], y_range, ..LinePlot::default() };
+        let drawing = Figure::new(plot).drawing().unwrap();
+        let is_red = |shape: &&Shape| matches!(shape, Shape::Polygon { colour: Colour(255, 0, 0), .. });
+        drawing.shapes.iter().filter(is_red).count()
+    };
+    let line = |ys: &[f64]| Series::line("", ys.iter().enumerate().map(|(k, &y)| (k as f64, y)));
+    assert_eq!(arrows(line(&[1.0, 2.0, 3.0]), None), 0);
+    assert_eq!(arrows(Series { goes_on: true, ..line(&[1.0, 2.0, 3.0]) }, None), 1);
+    // Out through the top: once, and not where it comes back.
+    assert_eq!(arrows(line(&[1.0, 2.0, 3.0]), Some((0.0, 2.5))), 1);
+    assert_eq!(arrows(line(&[1.0, 3.0, 1.0]), Some((0.0, 2.5))), 0);
+    // Two places without an end of the count.
+    assert_eq!(arrows(line(&[1.0, 2.0, f64::INFINITY, f64::INFINITY]), None), 2);
 }
 
 #[test]

@@ -1,8 +1,7 @@
 //! Frames of panels: colours and sizes that all panels share, room for titles and axes, and how these are drawn.
 
 use super::axis::{Axis, Tick};
-use super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Rect, text_width};
-use limitlab::Result;
+use super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Point, Rect, text_width};
 
 // What all panels share; lengths in points.
 pub(super) const TEXT_COLOUR: Colour = Colour(20, 20, 20);
@@ -48,15 +47,14 @@ pub(super) fn x_axis_room(label: &str, labelled: bool) -> f64 {
 }
 
 /// Room for tick labels and label of a y axis.
-pub(super) fn y_axis_room(label: &str, ticks: &[Tick]) -> Result<f64> {
+pub(super) fn y_axis_room(label: &str, ticks: &[Tick]) -> f64 {
     let room = if label.is_empty() { 0.0 } else { LABEL_SIZE + 7.0 };
-    Ok(room + widest_label(ticks)? + TICK_GAP + TICK_LENGTH)
+    room + widest_label(ticks) + TICK_GAP + TICK_LENGTH
 }
 
-fn widest_label(ticks: &[Tick]) -> Result<f64> {
+fn widest_label(ticks: &[Tick]) -> f64 {
     let labels = ticks.iter().filter_map(|t| t.label.as_deref());
-    let widths = labels.map(|label| text_width(label, TICK_SIZE));
-    Ok(widths.collect::<Result<Vec<_>>>()?.into_iter().fold(0.0, f64::max))
+    labels.map(|label| text_width(label, TICK_SIZE)).fold(0.0, f64::max)
 }
 
 /// Ticks of an x axis of this length.
@@ -70,49 +68,97 @@ pub(super) fn y_ticks(axis: Axis, length: f64) -> Vec<Tick> {
 }
 
 /// Ticks below the frame, and their labels and the axis's if `labelled`.
-pub(super) fn draw_x_axis(canvas: &Canvas<'_>, frame: Rect, ticks: &[Tick], label: &str, labelled: bool) -> Result<()> {
+pub(super) fn draw_x_axis(canvas: &mut Canvas, frame: Rect, ticks: &[Tick], label: &str, labelled: bool) {
     let baseline = frame.bottom + TICK_LENGTH + TICK_GAP + CAP_HEIGHT * TICK_SIZE;
     for tick in ticks {
         let at = frame.left + tick.at * frame.width();
         let reach = (frame.bottom, frame.bottom + tick_length(tick));
-        canvas.upright(at, reach, FRAME_WIDTH, FRAME_COLOUR)?;
+        canvas.upright(at, reach, FRAME_WIDTH, FRAME_COLOUR);
         if let Some(label) = tick.label.as_deref().filter(|_| labelled) {
             let place = (at, baseline);
-            canvas.text(label, place, TICK_SIZE, Anchor::Middle, false, TEXT_COLOUR)?;
+            canvas.text(label, place, TICK_SIZE, Anchor::Middle, false, TEXT_COLOUR);
         }
     }
     if labelled {
         let place = (frame.centre().0, baseline + 6.0 + LABEL_SIZE);
-        canvas.text(label, place, LABEL_SIZE, Anchor::Middle, false, TEXT_COLOUR)?;
+        canvas.text(label, place, LABEL_SIZE, Anchor::Middle, false, TEXT_COLOUR);
     }
-    Ok(())
 }
 
 /// Ticks to the left of the frame, their labels, and at the outer edge of the `room` there the axis's label, made
 /// smaller if it is longer than the axis.
-pub(super) fn draw_y_axis(canvas: &Canvas<'_>, frame: Rect, room: f64, ticks: &[Tick], label: &str) -> Result<()> {
+pub(super) fn draw_y_axis(canvas: &mut Canvas, frame: Rect, room: f64, ticks: &[Tick], label: &str) {
     for tick in ticks {
         let at = frame.bottom - tick.at * frame.height();
         let reach = (frame.left - tick_length(tick), frame.left);
-        canvas.level(at, reach, FRAME_WIDTH, FRAME_COLOUR)?;
+        canvas.level(at, reach, FRAME_WIDTH, FRAME_COLOUR);
         if let Some(label) = &tick.label {
             let right = frame.left - TICK_LENGTH - TICK_GAP;
             let place = (right, at + CAP_HEIGHT / 2.0 * TICK_SIZE);
-            canvas.text(label, place, TICK_SIZE, Anchor::End, false, TEXT_COLOUR)?;
+            canvas.text(label, place, TICK_SIZE, Anchor::End, false, TEXT_COLOUR);
         }
     }
-    let length = text_width(label, LABEL_SIZE)?.max(1.0);
+    let length = text_width(label, LABEL_SIZE).max(1.0);
     let size = LABEL_SIZE * (frame.height() / length).min(1.0);
     let place = (frame.left - room + LABEL_SIZE, frame.centre().1);
-    canvas.text(label, place, size, Anchor::Middle, true, TEXT_COLOUR)
+    canvas.text(label, place, size, Anchor::Middle, true, TEXT_COLOUR);
 }
 
 fn tick_length(tick: &Tick) -> f64 {
     if tick.label.is_some() { TICK_LENGTH } else { MINOR_TICK_LENGTH }
 }
 
+/// A title is made smaller down to this part of its size, then cut in its middle.
+const LEAST_TITLE: f64 = 0.8;
+
 /// The title at the top of the `room` above the frame.
-pub(super) fn draw_title(canvas: &Canvas<'_>, frame: Rect, title: &str, room: f64) -> Result<()> {
+pub(super) fn draw_title(canvas: &mut Canvas, frame: Rect, title: &str, room: f64) {
     let place = (frame.centre().0, frame.top - room + 2.0 + TITLE_SIZE);
-    canvas.text(title, place, TITLE_SIZE, Anchor::Middle, false, TEXT_COLOUR)
+    draw_fitted(canvas, title, place, TITLE_SIZE, frame.width());
+}
+
+/// Text about `place` that is no wider than `width`: smaller, or with an ellipsis in its middle, where it has to be.
+pub(super) fn draw_fitted(canvas: &mut Canvas, text: &str, place: Point, size: f64, width: f64) {
+    let (text, size) = fitted(text, size, width);
+    canvas.text(&text, place, size, Anchor::Middle, false, TEXT_COLOUR);
+}
+
+fn fitted(text: &str, size: f64, width: f64) -> (String, f64) {
+    let full = text_width(text, size).max(1.0);
+    let size = size * (width / full).clamp(LEAST_TITLE, 1.0);
+    let letters: Vec<char> = text.chars().collect();
+    // The start says less than the end, where the name of a file and what was done to it are.
+    let cut = |kept: usize| -> String {
+        let head = kept / 3;
+        letters[..head].iter().chain(&['…']).chain(&letters[letters.len() - (kept - head)..]).collect()
+    };
+    let fits = |text: &str| text_width(text, size) <= width * (1.0 + 1e-9);
+    if fits(text) {
+        return (text.to_owned(), size);
+    }
+    let kept = (0..letters.len()).rev().find(|&kept| fits(&cut(kept))).unwrap_or(0);
+    (cut(kept), size)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_titles_are_made_smaller_then_cut_in_their_middle() {
+        let text = "a title of some length, noise 0.1";
+        let full = text_width(text, 10.0);
+        assert_eq!(fitted(text, 10.0, full), (text.to_owned(), 10.0));
+        let (smaller, size) = fitted(text, 10.0, 0.9 * full);
+        assert_eq!(smaller, text);
+        assert!((size - 9.0).abs() < 1e-9, "{size}");
+        for part in [0.7, 0.4, 0.1] {
+            let (cut, size) = fitted(text, 10.0, part * full);
+            let (head, tail) = cut.split_once('…').unwrap();
+            assert!(text.starts_with(head) && text.ends_with(tail), "{cut}");
+            let width = text_width(&cut, size);
+            assert_eq!(size, 8.0);
+            assert!(width <= part * full && width > part * full - 10.0, "{cut}");
+        }
+    }
 }

@@ -1,10 +1,9 @@
 //! Line plots, scatter plots and histograms on linear or logarithmic axes: how they are drawn.
 
 use super::axis::{Axis, Scale, Tick};
-use super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Dash, Marker, Point, Rect, text_width};
+use super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Dash, Marker, Point, Rect, text_width, way_out};
 use super::frame::{self, FRAME_COLOUR, FRAME_WIDTH, Slot, TEXT_COLOUR};
 use super::series::{Band, Bars, Line, PALETTE, Rule, Series, palette};
-use limitlab::Result;
 
 /// Once the colours are used up, the next round of series is dashed, then dotted, then both.
 const DASHES: [Dash; 4] = [Dash::Solid, Dash::Dashed, Dash::Dotted, Dash::DashDotted];
@@ -17,8 +16,10 @@ const LINE_WIDTH: f64 = 1.3;
 const RULE_WIDTH: f64 = 0.9;
 const GRID_WIDTH: f64 = 0.5;
 const MARKER_RADIUS: f64 = 2.4;
-/// Markers on a line whose points are closer than this on average are thinned out to [`MARKER_GAP`].
+/// Markers on a line whose points are closer than this on average are thinned out to [`MARKER_GAP`]; where there are more
+/// than [`FEW`] lines, than so many times more.
 const MARKER_DENSE: f64 = 7.0;
+const FEW: f64 = 3.0;
 const MARKER_GAP: f64 = 36.0;
 const LEGEND_GAP: f64 = 10.0;
 const LEGEND_KEY: f64 = 24.0;
@@ -61,6 +62,8 @@ pub struct LinePlot {
     /// lower for it. For linear axes.
     pub equal_units: bool,
     pub series: Vec<Series>,
+    /// What the legend says of an arrowhead, if a series goes on or has a point at +∞.
+    pub arrows: String,
     pub vertical_lines: Vec<Rule>,
     pub horizontal_lines: Vec<Rule>,
     pub bands: Vec<Band>,
@@ -77,6 +80,7 @@ struct Look {
 /// The sample beside a name in the legend.
 enum Key {
     Line(Look),
+    Arrow,
     Rule(Dash, Colour),
     Patch(Colour),
 }
@@ -126,13 +130,15 @@ impl LinePlot {
     fn legend(&self) -> Vec<(&str, Key)> {
         let series = self.series.iter().enumerate();
         let series = series.map(|(i, s)| (s.name.as_str(), Key::Line(self.look(i))));
+        let has_arrows = self.series.iter().any(|s| s.goes_on || s.points.iter().any(|p| p.1 == f64::INFINITY));
+        let arrows = has_arrows.then_some((self.arrows.as_str(), Key::Arrow));
         let bars = self.bars.iter().enumerate();
         let bars = bars.map(|(i, b)| (b.name.as_str(), Key::Patch(self.bar_colour(i))));
         let rules = self.horizontal_lines.iter();
         let rules = rules.map(|r| (r.label.as_str(), Key::Rule(r.dash, r.colour)));
         let bands = self.bands.iter();
         let bands = bands.map(|b| (b.label.as_str(), Key::Patch(BAND_COLOUR)));
-        let all = series.chain(bars).chain(rules).chain(bands);
+        let all = series.chain(arrows).chain(bars).chain(rules).chain(bands);
         all.filter(|(name, _)| !name.is_empty()).collect()
     }
 
@@ -153,38 +159,36 @@ impl LinePlot {
     }
 
     /// The room to the left of a frame of this height.
-    pub(super) fn left(&self, height: f64) -> Result<f64> {
+    pub(super) fn left(&self, height: f64) -> f64 {
         frame::y_axis_room(&self.y_label, &frame::y_ticks(self.y_axis(), height))
     }
 
     /// The room to the right of the frame: the legend's.
-    pub(super) fn right(&self) -> Result<f64> {
+    pub(super) fn right(&self) -> f64 {
         let legend = self.legend();
-        let widths = legend.iter().map(|(name, _)| text_width(name, LEGEND_SIZE));
-        let widest = widths.collect::<Result<Vec<_>>>()?;
-        let widest = widest.into_iter().reduce(f64::max);
-        Ok(widest.map_or(frame::BARE_RIGHT, |w| LEGEND_GAP + LEGEND_KEY + 6.0 + w + 4.0))
+        let widest = legend.iter().map(|(name, _)| text_width(name, LEGEND_SIZE)).reduce(f64::max);
+        widest.map_or(frame::BARE_RIGHT, |w| LEGEND_GAP + LEGEND_KEY + 6.0 + w + 4.0)
     }
 
-    pub(super) fn draw(&self, canvas: &Canvas<'_>, slot: &Slot) -> Result<()> {
+    pub(super) fn draw(&self, canvas: &mut Canvas, slot: &Slot) {
         let (x, y) = (slot.x_axis, self.y_axis());
         let frame = if self.equal_units { with_aspect(slot.frame, (x.hi - x.lo) / (y.hi - y.lo)) } else { slot.frame };
         let x_ticks = frame::x_ticks(x, frame.width());
         let y_ticks = frame::y_ticks(y, frame.height());
-        self.draw_bands(canvas, frame, x)?;
-        draw_grid(canvas, frame, &x_ticks, &y_ticks)?;
-        self.draw_bars(canvas, frame, x, y)?;
-        self.draw_rules(canvas, frame, x, y)?;
-        self.draw_series(canvas, frame, x, y)?;
-        canvas.outline(frame, FRAME_WIDTH, FRAME_COLOUR)?;
-        frame::draw_x_axis(canvas, frame, &x_ticks, &self.x_label, slot.labelled)?;
-        frame::draw_y_axis(canvas, frame, slot.left, &y_ticks, &self.y_label)?;
-        self.draw_rule_labels(canvas, frame, x)?;
-        self.draw_legend(canvas, frame)?;
-        frame::draw_title(canvas, frame, &self.title, self.top())
+        self.draw_bands(canvas, frame, x);
+        draw_grid(canvas, frame, &x_ticks, &y_ticks);
+        self.draw_bars(canvas, frame, x, y);
+        self.draw_rules(canvas, frame, x, y);
+        self.draw_series(canvas, frame, x, y);
+        canvas.outline(frame, FRAME_WIDTH, FRAME_COLOUR);
+        frame::draw_x_axis(canvas, frame, &x_ticks, &self.x_label, slot.labelled);
+        frame::draw_y_axis(canvas, frame, slot.left, &y_ticks, &self.y_label);
+        self.draw_rule_labels(canvas, frame, x);
+        self.draw_legend(canvas, frame);
+        frame::draw_title(canvas, frame, &self.title, self.top());
     }
 
-    fn draw_bands(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis) -> Result<()> {
+    fn draw_bands(&self, canvas: &mut Canvas, frame: Rect, x: Axis) {
         for band in &self.bands {
             let (Some(a), Some(b)) = (x.position(band.from), x.position(band.to)) else {
                 continue;
@@ -193,13 +197,12 @@ impl LinePlot {
             let area =
                 Rect { left: frame.left + left * frame.width(), right: frame.left + right * frame.width(), ..frame };
             if left < right {
-                canvas.fill(area, BAND_COLOUR)?;
+                canvas.fill(area, BAND_COLOUR);
             }
         }
-        Ok(())
     }
 
-    fn draw_bars(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis, y: Axis) -> Result<()> {
+    fn draw_bars(&self, canvas: &mut Canvas, frame: Rect, x: Axis, y: Axis) {
         const PARTING: f64 = 0.3;
         for (index, bars) in self.bars.iter().enumerate() {
             assert_eq!(bars.edges.len(), bars.heights.len() + 1, "edges around bars");
@@ -217,32 +220,30 @@ impl LinePlot {
                     bottom: frame.bottom - h.min(foot) * frame.height(),
                 };
                 if bar.left < bar.right && bar.top < bar.bottom {
-                    canvas.fill(bar, self.bar_colour(index))?;
+                    canvas.fill(bar, self.bar_colour(index));
                 }
             }
         }
-        Ok(())
     }
 
-    fn draw_rules(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis, y: Axis) -> Result<()> {
+    fn draw_rules(&self, canvas: &mut Canvas, frame: Rect, x: Axis, y: Axis) {
         for rule in &self.vertical_lines {
             if let Some(at) = x.position(rule.at) {
                 let at = frame.left + at * frame.width();
                 let line = [(at, frame.bottom), (at, frame.top)];
-                canvas.stroke(&line, frame, RULE_WIDTH, rule.dash, rule.colour)?;
+                canvas.stroke(&line, frame, RULE_WIDTH, rule.dash, rule.colour);
             }
         }
         for rule in &self.horizontal_lines {
             if let Some(at) = y.position(rule.at) {
                 let at = frame.bottom - at * frame.height();
                 let line = [(frame.left, at), (frame.right, at)];
-                canvas.stroke(&line, frame, RULE_WIDTH, rule.dash, rule.colour)?;
+                canvas.stroke(&line, frame, RULE_WIDTH, rule.dash, rule.colour);
             }
         }
-        Ok(())
     }
 
-    fn draw_series(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis, y: Axis) -> Result<()> {
+    fn draw_series(&self, canvas: &mut Canvas, frame: Rect, x: Axis, y: Axis) {
         let place = |&(px, py): &(f64, f64)| -> Option<Point> {
             let (px, py) = (x.position(px)?, y.position(py)?);
             Some((frame.left + px * frame.width(), frame.bottom - py * frame.height()))
@@ -251,33 +252,49 @@ impl LinePlot {
             let look = self.look(index);
             let places: Vec<Option<Point>> = series.points.iter().map(place).collect();
             if let Some(dash) = look.dash {
+                let mut last = None;
                 for piece in places.split(Option::is_none) {
                     let piece: Vec<Point> = piece.iter().copied().flatten().collect();
-                    canvas.stroke(&piece, frame, LINE_WIDTH, dash, look.colour)?;
+                    canvas.stroke(&piece, frame, LINE_WIDTH, dash, look.colour);
+                    if let Some(out) = way_out(&piece, frame) {
+                        canvas.arrowhead(out, look.colour);
+                    }
+                    if let [.., from, to] = piece[..] {
+                        last = Some((from, to));
+                    }
+                }
+                if let Some(end) = last.filter(|end| series.goes_on && frame.contains(end.1)) {
+                    canvas.arrowhead(end, look.colour);
+                }
+            }
+            for at in series.points.iter().filter(|p| p.1 == f64::INFINITY).filter_map(|p| x.position(p.0)) {
+                let top = (frame.left + at * frame.width(), frame.top);
+                if frame.contains(top) {
+                    canvas.arrowhead(((top.0, frame.bottom), top), look.colour);
                 }
             }
             if let Some(marker) = look.marker {
                 let visible = places.into_iter().flatten().filter(|&p| frame.contains(p));
                 let mut visible: Vec<Point> = visible.collect();
                 if look.dash.is_some() {
-                    visible = thinned(visible, index);
+                    let crowd = (self.series.len() as f64 / FEW).max(1.0);
+                    visible = thinned(visible, index, crowd * MARKER_DENSE);
                 }
                 for at in visible {
-                    canvas.marker(at, marker, MARKER_RADIUS, look.colour)?;
+                    canvas.marker(at, marker, MARKER_RADIUS, look.colour);
                 }
             }
         }
-        Ok(())
     }
 
     /// Labels of vertical lines above the frame, moved apart where they would collide, each with a leader to
     /// its line.
-    fn draw_rule_labels(&self, canvas: &Canvas<'_>, frame: Rect, x: Axis) -> Result<()> {
+    fn draw_rule_labels(&self, canvas: &mut Canvas, frame: Rect, x: Axis) {
         let labelled = self.vertical_lines.iter().filter(|r| !r.label.is_empty());
         let mut labels: Vec<(f64, f64, &Rule)> = Vec::new();
         for rule in labelled {
             if let Some(at) = x.position(rule.at).filter(|at| (0.0..=1.0).contains(at)) {
-                let width = text_width(&rule.label, RULE_LABEL_SIZE)?;
+                let width = text_width(&rule.label, RULE_LABEL_SIZE);
                 labels.push((frame.left + at * frame.width(), width, rule));
             }
         }
@@ -287,15 +304,14 @@ impl LinePlot {
         for (&(at, _, rule), centre) in labels.iter().zip(centres) {
             let leader = [(at, frame.top), (centre, frame.top - RULE_LEADER)];
             let above = Rect { top: frame.top - RULE_LEADER, bottom: frame.top, ..frame };
-            canvas.stroke(&leader, above, RULE_WIDTH * 0.7, Dash::Solid, rule.colour)?;
+            canvas.stroke(&leader, above, RULE_WIDTH * 0.7, Dash::Solid, rule.colour);
             let place = (centre, frame.top - RULE_LEADER - 3.5);
             let text = &rule.label;
-            canvas.text(text, place, RULE_LABEL_SIZE, Anchor::Middle, false, rule.colour)?;
+            canvas.text(text, place, RULE_LABEL_SIZE, Anchor::Middle, false, rule.colour);
         }
-        Ok(())
     }
 
-    fn draw_legend(&self, canvas: &Canvas<'_>, frame: Rect) -> Result<()> {
+    fn draw_legend(&self, canvas: &mut Canvas, frame: Rect) {
         let legend = self.legend();
         let pitch = LEGEND_PITCH.min(frame.height() / legend.len().max(1) as f64);
         let size = LEGEND_SIZE.min(0.75 * pitch);
@@ -308,19 +324,22 @@ impl LinePlot {
             match key {
                 Key::Line(look) => {
                     if let Some(dash) = look.dash {
-                        canvas.stroke(&line, area, LINE_WIDTH, dash, look.colour)?;
+                        canvas.stroke(&line, area, LINE_WIDTH, dash, look.colour);
                     }
                     if let Some(marker) = look.marker {
-                        canvas.marker(area.centre(), marker, MARKER_RADIUS, look.colour)?;
+                        canvas.marker(area.centre(), marker, MARKER_RADIUS, look.colour);
                     }
                 }
-                Key::Rule(dash, colour) => canvas.stroke(&line, area, RULE_WIDTH, dash, colour)?,
-                Key::Patch(colour) => canvas.fill(area, colour)?,
+                Key::Arrow => {
+                    let centre = area.centre();
+                    canvas.arrowhead(((centre.0, area.bottom), (centre.0, area.top + 1.0)), FRAME_COLOUR);
+                }
+                Key::Rule(dash, colour) => canvas.stroke(&line, area, RULE_WIDTH, dash, colour),
+                Key::Patch(colour) => canvas.fill(area, colour),
             }
             let place = (area.right + 6.0, middle + CAP_HEIGHT / 2.0 * size);
-            canvas.text(name, place, size, Anchor::Start, false, TEXT_COLOUR)?;
+            canvas.text(name, place, size, Anchor::Start, false, TEXT_COLOUR);
         }
-        Ok(())
     }
 }
 
@@ -331,24 +350,23 @@ fn with_aspect(frame: Rect, aspect: f64) -> Rect {
     Rect { right: frame.left + width, bottom: frame.top + width / aspect, ..frame }
 }
 
-fn draw_grid(canvas: &Canvas<'_>, frame: Rect, x: &[Tick], y: &[Tick]) -> Result<()> {
+fn draw_grid(canvas: &mut Canvas, frame: Rect, x: &[Tick], y: &[Tick]) {
     for tick in x.iter().filter(|t| t.label.is_some()) {
         let at = frame.left + tick.at * frame.width();
-        canvas.upright(at, (frame.top, frame.bottom), GRID_WIDTH, GRID_COLOUR)?;
+        canvas.upright(at, (frame.top, frame.bottom), GRID_WIDTH, GRID_COLOUR);
     }
     for tick in y.iter().filter(|t| t.label.is_some()) {
         let at = frame.bottom - tick.at * frame.height();
-        canvas.level(at, (frame.left, frame.right), GRID_WIDTH, GRID_COLOUR)?;
+        canvas.level(at, (frame.left, frame.right), GRID_WIDTH, GRID_COLOUR);
     }
-    Ok(())
 }
 
-/// The places that carry a marker: all of them, or, where they are dense, some at equal distances along the
+/// The places that carry a marker: all of them, or, where they are closer than `dense`, some at equal distances along the
 /// line. The first one depends on the series, so that the markers of neighbouring curves do not coincide.
-fn thinned(places: Vec<Point>, series: usize) -> Vec<Point> {
+fn thinned(places: Vec<Point>, series: usize, dense: f64) -> Vec<Point> {
     let step = |w: &[Point]| (w[1].0 - w[0].0).hypot(w[1].1 - w[0].1);
     let length: f64 = places.windows(2).map(step).sum();
-    if length >= MARKER_DENSE * places.len() as f64 {
+    if length >= dense * places.len() as f64 {
         return places;
     }
     // Golden-section offsets keep any number of series apart.
@@ -422,12 +440,12 @@ mod tests {
     #[test]
     fn markers_are_thinned_only_where_dense() {
         let sparse: Vec<Point> = (0..10).map(|i| (20.0 * f64::from(i), 0.0)).collect();
-        assert_eq!(thinned(sparse.clone(), 3), sparse);
+        assert_eq!(thinned(sparse.clone(), 3, MARKER_DENSE), sparse);
         let dense: Vec<Point> = (0..=360).map(|i| (f64::from(i), 0.0)).collect();
-        let kept = thinned(dense.clone(), 0);
+        let kept = thinned(dense.clone(), 0, MARKER_DENSE);
         assert_eq!(kept.len(), 11);
         assert!(kept.windows(2).all(|w| w[1].0 - w[0].0 >= MARKER_GAP));
-        assert_ne!(thinned(dense, 1)[0], kept[0]);
+        assert_ne!(thinned(dense, 1, MARKER_DENSE)[0], kept[0]);
     }
 
     #[test]

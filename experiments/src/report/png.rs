@@ -1,9 +1,13 @@
 //! Images and their PNG form.
 
+use super::canvas::PIXELS_PER_POINT;
 use limitlab::Result;
 use limitlab::output::write_file;
 use std::io::{self, Write};
 use std::path::Path;
+
+/// The resolution of figures: a point is 1/72 inch.
+const PIXELS_PER_METRE: u32 = (PIXELS_PER_POINT as f64 * 72.0 / 0.0254 + 0.5) as u32;
 
 /// An image of 8-bit red, green, blue.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,7 +55,7 @@ impl Image {
         [self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]]
     }
 
-    /// Writes the image as PNG: RGB, 8 bits, no time stamp, so that the same image gives the same bytes.
+    /// Writes the image as PNG: RGB, 8 bits, 216 pixels an inch, no time stamp, so that the same image gives the same bytes.
     ///
     /// # Errors
     /// Those of `out`, and a width or height of 0.
@@ -68,6 +72,8 @@ impl Image {
         encoder.set_compression(png::Compression::High);
         // Drawings are runs of one colour, which deflate sees best unfiltered.
         encoder.set_filter(png::Filter::NoFilter);
+        let unit = png::Unit::Meter;
+        encoder.set_pixel_dims(Some(png::PixelDimensions { xppu: PIXELS_PER_METRE, yppu: PIXELS_PER_METRE, unit }));
         encoder
     }
 
@@ -152,6 +158,9 @@ mod tests {
         let info = reader.next_frame(&mut decoded).unwrap();
         assert_eq!((info.width, info.height), (7, 5));
         assert_eq!(decoded, image.rgb);
+        // 216 pixels an inch of 25.4 mm.
+        let resolution = reader.info().pixel_dims.unwrap();
+        assert_eq!((resolution.xppu, resolution.yppu, resolution.unit), (8504, 8504, png::Unit::Meter));
     }
 
     #[test]

@@ -35,14 +35,26 @@ pub enum Line {
     None,
 }
 
+/// How something looks that is the same thing in several plots.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Style {
+    pub colour: Colour,
+    pub dash: Dash,
+    pub marker: Marker,
+}
+
 /// Named points, joined by a line or not.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
     /// What the legend says; a series without a name is not in the legend. `_{…}` and `^{…}` set subscripts and
     /// superscripts, here and in every other text of a plot.
     pub name: String,
-    /// In data units. A point that is not finite, or not positive on a logarithmic axis, breaks the line.
+    /// In data units. A point that is not finite, or not positive on a logarithmic axis, breaks the line; one whose y is
+    /// +∞ has an arrowhead at the upper edge.
     pub points: Vec<(f64, f64)>,
+    /// The line goes on beyond its last point, as that of a method which diverged: it ends in an arrowhead. So does one that
+    /// leaves the frame.
+    pub goes_on: bool,
     pub line: Line,
     /// Where points are dense along a line, only some of them carry their marker.
     pub marker: Option<Marker>,
@@ -77,6 +89,11 @@ impl Series {
     pub fn dash(mut self, dash: Dash) -> Self {
         self.line = Line::Of(dash);
         self
+    }
+
+    /// The same series in this style.
+    pub fn style(self, style: Style) -> Self {
+        self.colour(style.colour).dash(style.dash).marker(style.marker)
     }
 
     /// The same series in this colour.

@@ -3,7 +3,6 @@
 use super::axis::{Axis, Scale};
 use super::canvas::{Canvas, Colour, Rect};
 use super::frame::{self, FRAME_COLOUR, FRAME_WIDTH};
-use limitlab::Result;
 
 /// A larger matrix is shown as at most so many blocks in each direction, about two pixels each: finer ones are
 /// lost in print.
@@ -66,11 +65,11 @@ impl SparsityPlot {
         frame::x_axis_room("column", true)
     }
 
-    pub(super) fn left(&self, height: f64) -> Result<f64> {
+    pub(super) fn left(&self, height: f64) -> f64 {
         frame::y_axis_room("row", &frame::y_ticks(self.axis(), height / 2.0))
     }
 
-    pub(super) fn draw(&self, canvas: &Canvas<'_>, room: Rect) -> Result<()> {
+    pub(super) fn draw(&self, canvas: &mut Canvas, room: Rect) {
         // The largest square at the top of the room, in its middle.
         let side = room.width().min(room.height());
         let left = room.centre().0 - side / 2.0;
@@ -92,17 +91,17 @@ impl SparsityPlot {
                 top: frame.top + edge(row),
                 bottom: frame.top + edge(row + 1),
             };
-            canvas.fill(dot, Colour(grey, grey, grey))?;
+            canvas.fill(dot, Colour(grey, grey, grey));
         }
-        canvas.outline(frame, FRAME_WIDTH, FRAME_COLOUR)?;
+        canvas.outline(frame, FRAME_WIDTH, FRAME_COLOUR);
         let x = frame::x_ticks(self.axis(), side);
-        frame::draw_x_axis(canvas, frame, &x, "column", true)?;
+        frame::draw_x_axis(canvas, frame, &x, "column", true);
         let mut y = frame::y_ticks(self.axis(), side / 2.0);
         for tick in &mut y {
             tick.at = 1.0 - tick.at; // rows count downward
         }
-        frame::draw_y_axis(canvas, frame, frame::y_axis_room("row", &y)?, &y, "row")?;
-        frame::draw_title(canvas, frame, &self.caption, frame::title_room(&self.caption))
+        frame::draw_y_axis(canvas, frame, frame::y_axis_room("row", &y), &y, "row");
+        frame::draw_title(canvas, frame, &self.caption, frame::title_room(&self.caption));
     }
 }
 

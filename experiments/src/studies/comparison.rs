@@ -4,10 +4,11 @@ use std::str::FromStr;
 
 use serde_json::{Value, json};
 
-use crate::report::{Column, Columns, Figure, LinePlot, Scale, Series, Table};
+use super::style;
+use crate::report::{Column, Columns, Figure, LinePlot, Scale, Series, Style, Table};
 use limitlab::analysis::comparison::{Entry, MethodRow};
 use limitlab::analysis::custom_methods::Named;
-use limitlab::solvers::{Method, Solution};
+use limitlab::solvers::{Method, Outcome, Recorded, Solution};
 use limitlab::{Error, Result, names};
 
 /// A method that may be asked for, or the chain that chooses.
@@ -91,21 +92,54 @@ fn with_parameter(method: &str, parameter: &str) -> String {
     if parameter.is_empty() { method.into() } else { format!("{method} ({parameter})") }
 }
 
-/// The maximum errors over the iterations, a line for each method that iterates; `unit` is what errors are measured in.
-pub fn figure(title: String, unit: &str, rows: &[MethodRow]) -> Figure {
-    let series = rows
-        .iter()
-        .filter(|row| is_over_iterations(row))
-        .map(|row| Series::history(label(row), row.solution.report.maxima()))
-        .collect();
-    Figure::new(LinePlot {
-        title,
-        x_label: "iterations".into(),
-        y_label: format!("max error ({unit})"),
+/// A run in a figure of convergence.
+pub struct Curve {
+    pub name: String,
+    pub style: Style,
+    /// Of the matrix, for an iteration; where they are not known the curve stands over the iterations alone.
+    pub passes: Option<usize>,
+    pub history: Vec<Recorded>,
+    pub outcome: Outcome,
+}
+
+/// Errors over iterations, and beside it over passes over the matrix, which tell what iterations of different methods cost.
+/// Where a run did not converge, its curve goes on.
+pub fn convergence(title: String, y_label: &str, curves: &[Curve]) -> Figure {
+    let panel = |x_label: &str, names: bool, passes: &dyn Fn(&Curve) -> Option<usize>| LinePlot {
+        x_label: x_label.into(),
+        arrows: if names { "not converged".into() } else { String::new() },
+        y_label: y_label.into(),
         y_scale: Scale::Log,
-        series,
+        series: curves
+            .iter()
+            .map(|curve| {
+                let passes = passes(curve);
+                let points = curve.history.iter().filter_map(|recorded| {
+                    passes.map(|passes| ((recorded.iteration * passes) as f64, recorded.errors.max))
+                });
+                let name = if names { curve.name.clone() } else { String::new() };
+                let goes_on = curve.outcome != Outcome::Converged;
+                Series { goes_on, ..Series::line(name, points).style(curve.style) }
+            })
+            .collect(),
         ..LinePlot::default()
-    })
+    };
+    let panels =
+        [panel("iterations", false, &|_| Some(1)), panel("passes over the matrix", true, &|curve| curve.passes)];
+    Figure { width: 860, height: 340, ..Figure::row(panels) }.title(title)
+}
+
+/// The maximum errors of every method that iterates; `unit` is what errors are measured in.
+pub fn figure(title: String, unit: &str, rows: &[MethodRow]) -> Figure {
+    let curve = |row: &MethodRow| Curve {
+        name: label(row),
+        style: style::of_row(row),
+        passes: row.method.passes(),
+        history: row.solution.report.history.clone(),
+        outcome: row.solution.report.outcome,
+    };
+    let curves: Vec<Curve> = rows.iter().filter(|row| !row.method.is_direct()).map(curve).collect();
+    convergence(title, &format!("max error ({unit})"), &curves)
 }
 
 /// The rows as `compare-solvers --json` has them: the columns of the table, the durations in an object of their own,

@@ -201,7 +201,7 @@ impl ComplexFindings {
             ..LinePlot::default()
         };
         let [a, jacobi] = self.relaxations.each_ref().map(panel);
-        let mut figure = Figure::stack([LinePlot { title: subject.title.clone(), ..a }, jacobi]);
+        let mut figure = Figure::stack([LinePlot { title: subject.caption(), ..a }, jacobi]);
         figure.share_x = false;
         figure
     }

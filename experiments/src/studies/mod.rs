@@ -5,4 +5,5 @@ pub mod complex_spectrum;
 pub mod histories;
 pub mod page;
 pub mod splitting;
+pub mod style;
 pub mod sweep;

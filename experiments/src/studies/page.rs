@@ -7,6 +7,7 @@ use glam::DVec3;
 use nalgebra::Complex;
 
 use super::comparison::{is_over_iterations, json, label};
+use super::style;
 use super::sweep::{default_grid, show};
 use crate::cli::{Problem, Progress};
 use crate::report::page::{Curve, Eigenvalues, Frames, Packed, Page, Place, Run, Solid, Sweep, Thinned, View};
@@ -215,6 +216,7 @@ fn curve(row: &MethodRow, frames: Option<Frames>) -> Curve {
     let at = spread(report.iterations, MOST_ENTRIES);
     Curve {
         name: label(row),
+        look: style::of_row(row).into(),
         outcome: report.outcome.name(),
         iterations: report.iterations,
         max: Packed::new(at.iter().map(|&k| report.history[k].errors.max.to_le_bytes())),
@@ -234,6 +236,7 @@ fn swept(sweep: &OmegaSweep, method: Method<'static>) -> Sweep {
     });
     Sweep {
         method: method.name(),
+        look: style::of(method, "").into(),
         optimal: thresholds.map(|t| t.optimal_omega),
         critical: thresholds.map(|t| t.critical_omega),
         runs: runs.collect(),

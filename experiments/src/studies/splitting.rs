@@ -9,8 +9,8 @@ use limitlab::analysis::splitting::{
     characteristic_map, condition_over_alpha, crossings, thall_tables,
 };
 
-/// Lin and Luo's Fig. 8; where none of them is asked for, the first few are drawn.
-const DRAWN: [usize; 5] = [3, 4, 5, 7, 8];
+/// Those of Lin and Luo's Fig. 8, and 6; where none of them is asked for, the first few are drawn.
+const DRAWN: [usize; 6] = [3, 4, 5, 6, 7, 8];
 const MOST_DRAWN: usize = 6;
 /// Isoparametric lines from the middle to the edge of a map.
 const LINES: usize = 8;
@@ -287,7 +287,8 @@ fn maps(scheme: LocalScheme, valences: &[usize]) -> Result<Option<Figure>> {
     }
     let columns = panels.len().min(3);
     let lines = panels.len().div_ceil(columns);
-    let mut figure = Figure::row(panels).title(format!("Characteristic maps of {scheme}"));
+    let mut figure =
+        Figure::row(panels).title(format!("Characteristic maps of {scheme}, sectors parted by orange lines"));
     figure.columns = columns;
     figure.width = 300 * columns as u32;
     figure.height = 310 * lines as u32 + 24;
@@ -405,7 +406,6 @@ fn condition_plot(valences: &[usize], crossings: &[Vec<Crossing>]) -> Result<Fig
         x_label: "valence n".into(),
         y_label: "α".into(),
         x_range: Some((valences[0] as f64 - 1.0, valences[valences.len() - 1] as f64 + 1.0)),
-        y_range: Some((0.0, 2.05)),
         series,
         ..LinePlot::default()
     };

@@ -1,7 +1,8 @@
 //! The table and the picture of an ω sweep.
 
+use super::style;
 use crate::cli::{Grid, Progress};
-use crate::report::{Column, Columns, Figure, LinePlot, Marker, Rule, Scale, Series, Table, palette, readable};
+use crate::report::{Column, Columns, Figure, LinePlot, Rule, Scale, Series, Table, readable};
 use limitlab::analysis::sweep::{OmegaSweep, SweepEvent, SweepRow};
 use limitlab::error::short;
 use limitlab::solvers::{Method, Outcome, Step};
@@ -88,12 +89,13 @@ fn columns() -> Columns<'static, SweepRow> {
         .col(Column::number("max_error", 1e-2, 3), |r| r.errors.max)
 }
 
-/// Iterations above, rates below, over ω.
+/// Iterations above, rates below, over ω. Where a run does not converge, an arrowhead at the upper edge says so.
 pub fn plot(title: String, methods: &[Method<'static>], sweep: &OmegaSweep) -> Figure {
     let mut iterations = LinePlot {
         title,
         x_label: "ω".into(),
         y_label: "iterations to converge".into(),
+        arrows: "not converged".into(),
         y_scale: Scale::Log,
         ..LinePlot::default()
     };
@@ -104,28 +106,26 @@ pub fn plot(title: String, methods: &[Method<'static>], sweep: &OmegaSweep) -> F
         horizontal_lines: vec![Rule::new(1.0, "")],
         ..LinePlot::default()
     };
-    for (k, &method) in methods.iter().enumerate() {
-        let colour = palette(k);
+    for &method in methods {
+        let style = style::of(method, "");
         let rows = || sweep.rows.iter().filter(move |r| r.method == method);
-        let converged = Outcome::Converged;
-        iterations.series.push(
-            Series::line(
-                method.name(),
-                rows().filter(|r| r.outcome == converged).map(|r| (r.omega, r.iterations as f64)),
-            )
-            .marker(Marker::Circle)
-            .colour(colour),
-        );
+        let count = |r: &SweepRow| match r.outcome {
+            Outcome::Converged => r.iterations as f64,
+            _ => f64::INFINITY,
+        };
+        iterations.series.push(Series::line(method.name(), rows().map(|r| (r.omega, count(r)))).style(style));
         rates.series.push(
             Series::line(format!("{method}: predicted ρ(ω)"), rows().map(|r| (r.omega, r.predicted_rho)))
-                .colour(colour),
+                .colour(style.colour)
+                .dash(style.dash),
         );
         rates.series.push(
             Series::scatter(
                 format!("{method}: measured"),
                 rows().filter_map(|r| r.observed_rate.map(|rate| (r.omega, rate))),
             )
-            .colour(colour),
+            .marker(style.marker)
+            .colour(style.colour),
         );
     }
     for t in &sweep.thresholds {

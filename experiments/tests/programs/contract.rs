@@ -123,6 +123,26 @@ fn compare_solvers_prints_the_fields_of_the_contract() {
 }
 
 #[test]
+fn figures_come_in_the_formats_that_are_asked_for() {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join(format!("{}/torus.obj", "a folder & <its> name ".repeat(6)));
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    let torus = limitlab::mesh::builtin::builtin("torus:8x6").unwrap();
+    limitlab::mesh::io::write(&path, &torus, None).unwrap();
+    let file = path.to_str().unwrap();
+    let sweep = |formats, out| run(SWEEP, folder.path(), [file, "--method", "pia", "--figure", formats, "--out", out]);
+    assert_done(&sweep("svg,pdf,png", "out"), "sweep-omega");
+    let out = folder.path().join("out");
+    let read = |end: &str| fs::read(out.join(format!("sweep-omega-torus-catmull-clark.{end}"))).unwrap();
+    assert!(read("pdf").starts_with(b"%PDF-") && read("png").starts_with(b"\x89PNG"));
+    // The title has the file, and not the way to it.
+    let svg = String::from_utf8(read("svg")).unwrap();
+    assert!(svg.starts_with("<?xml") && svg.trim_end().ends_with("</svg>"));
+    assert!(svg.contains("aria-label=\"torus.obj under catmull-clark\""), "{svg}");
+    assert_eq!(sweep("gif", "other").status.code(), Some(2));
+}
+
+#[test]
 fn sweep_omega_prints_the_fields_of_the_contract() {
     let folder = tempdir().unwrap();
     let arguments = ["torus:32x32", "--noise", "0.1", "--omega", "0.5:0.9:0.1", "--json", "--out", "out"];

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::{self, Printer, STAND_IN_NOISE};
 use crate::report::index::{self, Entry};
-use crate::report::{Animation, Figure, Table, compare};
+use crate::report::{Animation, Figure, Format, Table, compare};
 use crate::studies::histories;
 use glam::DVec3;
 use limitlab::Result;
@@ -42,6 +42,7 @@ pub struct Context {
     /// Whether tables of wall-clock times are made.
     times: bool,
     check: Option<PathBuf>,
+    formats: Vec<Format>,
     differences: Vec<String>,
     pub printer: Printer,
     /// The ledger of claims, once it is computed.
@@ -127,6 +128,7 @@ impl Context {
         quick: bool,
         times: bool,
         check: Option<&Path>,
+        formats: &[Format],
         printer: Printer,
     ) -> Result<Self> {
         if let Some(folder) = models
@@ -148,6 +150,7 @@ impl Context {
             quick,
             times,
             check: check.map(Path::to_path_buf),
+            formats: formats.to_vec(),
             differences: Vec::new(),
             printer,
             ledger: Vec::new(),
@@ -182,6 +185,15 @@ impl Context {
                 "Meshes: built-in stand-ins, not the paper's models, with noise {STAND_IN_NOISE} (amplitude × mean \
                  edge length : seed); run with --meshes DIR for the models."
             )
+        }
+    }
+
+    /// What a picture calls a mesh of [`subject`](Self::subject), [`list`](Self::list) or [`subjects`](Self::subjects).
+    pub fn caption(&self, subject: &Subject) -> String {
+        if self.real() {
+            subject.name.clone()
+        } else {
+            format!("{} with noise {}", subject.name, STAND_IN_NOISE.amplitude)
         }
     }
 
@@ -322,13 +334,13 @@ impl Context {
         Ok(())
     }
 
-    /// Writes a figure as `STEM.png`.
+    /// Writes a figure as `STEM.png`, or in the formats that are asked for.
     ///
     /// # Errors
     /// If it cannot be drawn or written.
     pub fn figure(&mut self, stem: &str, figure: &Figure) -> Result<()> {
         self.made.figures += 1;
-        figure.render()?.save(&self.folder().join(format!("{stem}.png")))
+        figure.write(&self.folder(), stem, &self.formats)
     }
 
     /// Writes the histories that a figure of this stem shows as `STEM.csv`.

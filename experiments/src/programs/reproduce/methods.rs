@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::report::{Cell, Column, Columns, Figure, LinePlot, Scale, Series, Table};
+use crate::report::{Cell, Column, Columns, Table};
 use crate::studies::comparison as study;
+use crate::studies::comparison::{Curve, convergence};
+use crate::studies::style;
 use limitlab::Result;
 use limitlab::analysis::comparison::{Entry, entries};
 use limitlab::analysis::spectrum::spectrum;
@@ -161,17 +163,17 @@ fn one<'a>(context: &mut Context, subject: &'a Subject, scheme: Scheme) -> Resul
     let keys = |line: &Entry| [line.method.to_string(), line.parameter.clone()];
     let runs = histories.iter().map(|(line, report)| (keys(line), &report.history[..]));
     context.histories(&stem, ["method", "parameter"], runs)?;
-    let curve = |(line, report): &(&Entry, Report)| Series::history(study::name(line), report.maxima());
+    let curve = |(line, report): &'_ (&Entry, Report)| Curve {
+        name: study::name(line),
+        style: style::of(line.method, line.variant),
+        passes: line.method.passes(),
+        history: report.history.clone(),
+        outcome: report.outcome,
+    };
+    let curves: Vec<Curve> = histories.iter().map(curve).collect();
     context.figure(
         &stem,
-        &Figure::new(LinePlot {
-            title: format!("{} under {scheme}", subject.name),
-            x_label: "iterations".into(),
-            y_label: "max error / L".into(),
-            y_scale: Scale::Log,
-            series: histories.iter().map(curve).collect(),
-            ..LinePlot::default()
-        }),
+        &convergence(format!("{} under {scheme}", context.caption(subject)), "max error / L", &curves),
     )?;
     Ok(rows)
 }

@@ -30,7 +30,7 @@ use std::time::Instant;
 use clap::Parser;
 use serde_json::json;
 
-use crate::cli::{self, CommonFlags, Printer, Progress};
+use crate::cli::{self, CommonFlags, FigureFlags, Printer, Progress};
 use claims::Claim;
 use context::{Context, Item, Made};
 use limitlab::error::Error;
@@ -70,6 +70,8 @@ pub struct Arguments {
     /// Compare every table with the one of the same name in this report folder, and fail if they differ
     #[arg(long, value_name = "DIR")]
     check: Option<PathBuf>,
+    #[command(flatten)]
+    figures: FigureFlags,
     #[command(flatten)]
     common: CommonFlags,
 }
@@ -140,6 +142,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         arguments.quick,
         arguments.times,
         arguments.check.as_deref(),
+        arguments.figures.formats(),
         // A run of everything has a screen of its own.
         if arguments.only.is_empty() && !arguments.json { Printer::Silent } else { Printer::new(arguments.json) },
     )?;

@@ -97,6 +97,7 @@ fn one(context: &mut Context, subject: &Subject, scheme: Scheme) -> Result<Omega
     );
     let table = study::table(stem.clone(), format!("ω sweep on {title}"), about, &found);
     context.table(table)?;
+    let title = format!("{} under {scheme}, to 10⁻¹⁰ of the diagonal", context.caption(subject));
     context.figure(&stem, &study::plot(title, &METHODS, &found))?;
     Ok(found)
 }

@@ -1,5 +1,6 @@
 //! Popping effect (Lin-Luo §5): shrinking and bulging of the unified √3 surface over α.
 
+use crate::report::series::marker;
 use crate::report::{Column, Columns, Figure, LinePlot, Rule, Series};
 use limitlab::Result;
 use limitlab::interpolate::lin_luo::surface::{Popping, popping};
@@ -48,13 +49,17 @@ fn run(context: &mut Context) -> Result<()> {
     }
     let curves = runs.chunk_by(|(a, ..), (b, ..)| a.name == b.name);
     let series = curves
-        .map(|runs| Series::line(&*runs[0].0.name, runs.iter().map(|(_, alpha, found)| (*alpha, found.volume_ratio))))
+        .enumerate()
+        .map(|(k, runs)| {
+            let ratios = runs.iter().map(|(_, alpha, found)| (*alpha, found.volume_ratio));
+            Series::line(context.caption(runs[0].0), ratios).marker(marker(k))
+        })
         .collect();
     context.figure(
         POPPING.id,
         &Figure::new(LinePlot {
             title: "Volume of the surface over that of the mesh".into(),
-            x_label: "α".into(),
+            x_label: "α (0 approximates, 1 interpolates)".into(),
             y_label: "volume ratio".into(),
             horizontal_lines: vec![Rule::new(1.0, "the mesh's own")],
             series,

@@ -1,6 +1,7 @@
 //! Ripples of interpolating surfaces: fairness energy by iteration, against the fairest surface (Halstead, Kass & DeRose).
 
 use crate::report::{Column, Columns, Figure, LinePlot, Scale, Series};
+use crate::studies::style;
 use limitlab::Result;
 use limitlab::interpolate::halstead::{Fairness, FairnessRow, Weights, fit, follow};
 use limitlab::interpolate::zheng_cai::Constraints;
@@ -27,6 +28,8 @@ const METHODS: [(&str, Method); 4] = [
 const SHOWN: [usize; 8] = [0, 1, 2, 3, 5, 10, 20, 50];
 /// Relative to the diagonal of the bounding box.
 const TOLERANCE: f64 = 1e-8;
+/// The least error in the picture, relative to the diagonal: below it nothing changes.
+const SMALLEST_SHOWN: f64 = 1e-4;
 
 fn run(context: &mut Context) -> Result<()> {
     let subject = context.subject(&corpus::BOB)?;
@@ -43,9 +46,9 @@ fn run(context: &mut Context) -> Result<()> {
     let stop = Stop { tolerance: TOLERANCE * size, max_iterations: 1000 };
     let mut runs = Vec::new();
     for (name, method) in METHODS {
-        runs.push((name, follow(&subject.surface, &system, &fairness, &normals, method, &stop)?.0));
+        runs.push((name, method, follow(&subject.surface, &system, &fairness, &normals, method, &stop)?.0));
     }
-    let shown = runs.iter().flat_map(|(name, rows)| {
+    let shown = runs.iter().flat_map(|(name, _, rows)| {
         let last = rows.len().saturating_sub(1);
         let rows = rows.iter().filter(move |row| SHOWN.contains(&row.iteration) || row.iteration == last);
         rows.map(move |row| (*name, row))
@@ -71,19 +74,28 @@ fn run(context: &mut Context) -> Result<()> {
          surface at the price of the error shown.",
     );
     context.table(table)?;
-    let panel = |y_label: &str, value: &dyn Fn(&FairnessRow) -> f64| LinePlot {
+    let starts = runs.iter().filter_map(|(_, _, rows)| rows.first()).map(error);
+    let largest = starts.fold(SMALLEST_SHOWN, f64::max);
+    let panel = |y_label: &str, names: bool, value: &dyn Fn(&FairnessRow) -> f64| LinePlot {
         x_label: "max error / L (iterations go to the left)".into(),
         y_label: y_label.into(),
         x_scale: Scale::Log,
+        x_range: Some((SMALLEST_SHOWN, 1.5 * largest)),
         series: runs
             .iter()
-            .map(|(name, rows)| Series::line(*name, rows.iter().map(|row| (error(row), value(row)))))
+            .map(|(name, method, rows)| {
+                let name = if names { *name } else { "" };
+                Series::line(name, rows.iter().map(|row| (error(row), value(row)))).style(style::of(*method, ""))
+            })
             .collect(),
         ..LinePlot::default()
     };
     context.figure(
         RIPPLES.id,
-        &Figure::stack([panel("thin plate / fairest", &thin_plate), panel("mean deviation (°)", &deviation)])
-            .title(format!("{}: ripples against accuracy", subject.name)),
+        &Figure::stack([
+            panel("bending energy / least", true, &thin_plate),
+            panel("normals: mean angle (°)", false, &deviation),
+        ])
+        .title(format!("{}: ripples against accuracy, beside the fairest surface", context.caption(&subject))),
     )
 }

@@ -40,8 +40,10 @@ fn run(context: &mut Context) -> Result<()> {
         .table(PATTERNS.id, PATTERNS.title, &bandwidths);
     table.note("Bandwidth: the largest |i − j| of an entry, vertices numbered in the order.");
     context.table(table)?;
+    let (n, entries) = (system.len(), pattern.columns().len());
+    let title = format!("{} under catmull-clark: {n} rows, {entries} entries", context.caption(&subject));
     let mut figure = Figure::row(panels);
     figure.columns = 2;
     (figure.width, figure.height) = (560, 600);
-    context.figure(PATTERNS.id, &figure.title(format!("{} under catmull-clark", subject.name)))
+    context.figure(PATTERNS.id, &figure.title(title))
 }

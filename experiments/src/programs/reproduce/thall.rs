@@ -1,5 +1,6 @@
 //! Thall: the error after 1, 2, 3, … iterations at his ω = ½ and at the best ω, under Catmull-Clark.
 
+use crate::report::series::marker;
 use crate::report::{Column, Columns, Figure, LinePlot, Scale, Series};
 use limitlab::Result;
 use limitlab::analysis::spectrum::{Extremes, spectrum};
@@ -23,8 +24,19 @@ const TOLERANCES: [f64; 2] = [1e-3, 1e-6];
 /// Largest mesh of a quick run.
 const QUICK: usize = 1200;
 const LIMIT: usize = 10_000;
-/// Meshes in the plot.
-const PLOTTED: usize = 8;
+/// The real models in the plot: the papers', and the one that is slowest.
+const PLOTTED: [&str; 8] = [
+    "psb_m104_horse_233v",
+    "psb_m32_bird_1129v",
+    "psb_m329_hand_6191v",
+    "psb_m1630_hat_562v",
+    "geomview_mushroom_226v",
+    "bob_334v_quad",
+    "spot_2930v_quad",
+    "abstr_36v_poly",
+];
+/// Iterations in the plot.
+const LONGEST: f64 = 120.0;
 
 /// A run at one ω.
 struct Row<'a> {
@@ -79,15 +91,21 @@ fn run(context: &mut Context) -> Result<()> {
     if context.quick {
         return Ok(());
     }
-    let plotted = rows.iter().filter(|r| r.omega == THALL_OMEGA).take(PLOTTED);
-    let series = plotted.map(|r| Series::history(r.subject.name.as_str(), r.errors.iter().copied())).collect();
+    let is_plotted = |name: &str| !context.real() || PLOTTED.contains(&name);
+    let plotted = rows.iter().filter(|r| r.omega == THALL_OMEGA && is_plotted(&r.subject.name));
+    let series: Vec<Series> = plotted
+        .enumerate()
+        .map(|(k, r)| Series::history(r.subject.name.as_str(), r.errors.iter().copied()).marker(marker(k)))
+        .collect();
+    let noise = if context.real() { "" } else { ", noise 0.1" };
+    let title = format!("Thall's iteration (ω = ½) on {} of {} meshes{noise}", series.len(), subjects.len());
     context.figure(
         ITERATIONS.id,
         &Figure::new(LinePlot {
-            title: "Thall's iteration, ω = ½".into(),
+            title,
             x_label: "iterations".into(),
             y_label: "max error / L".into(),
-            x_range: Some((0.0, 120.0)),
+            x_range: Some((0.0, LONGEST)),
             y_scale: Scale::Log,
             series,
             ..LinePlot::default()

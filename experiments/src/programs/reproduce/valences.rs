@@ -54,12 +54,12 @@ fn run(context: &mut Context) -> Result<()> {
 fn histograms(scheme: Scheme, rows: &[ValenceRow]) -> Figure {
     let band = regular_band(scheme);
     let panels = rows.iter().filter(|r| DRAWN.contains(&r.valence)).map(|row| LinePlot {
-        title: format!("valence {}", row.valence),
+        title: format!("valence {}, {} vertices", row.valence, row.vertices),
         x_label: "eigenvalue of A".into(),
         y_label: "eigenvalues".into(),
         x_range: Some((0.0, 1.0)),
         bars: vec![Bars::histogram("", &row.a, BINS)],
-        vertical_lines: vec![Rule::new(band.a.0, "regular band")],
+        vertical_lines: vec![Rule::new(band.a.0, "least of a regular mesh")],
         ..LinePlot::default()
     });
     let mut figure = Figure::stack(panels);

@@ -17,8 +17,9 @@ use clap::Parser;
 use glam::DVec3;
 use serde_json::json;
 
-use crate::cli::{self, CommonFlags, List, Printer, Progress, number};
-use crate::report::{Colour, Column, Columns, Dash, Figure, LinePlot, Marker, Scale, Series, Table, palette};
+use crate::cli::{self, CommonFlags, FigureFlags, List, Printer, Progress, number};
+use crate::report::{Colour, Column, Columns, Dash, Figure, LinePlot, Marker, Scale, Series, Style, Table};
+use crate::studies::style;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::{LimitSystem, Operator};
 use limitlab::error::{Error, Result};
@@ -75,12 +76,14 @@ pub struct Arguments {
     /// Vertices of the meshes for the steps around the solve; 0 for none
     #[arg(long, value_name = "N", default_value_t = 300_000)]
     steps: usize,
-    /// Folder for the CSV, Markdown and PNG files
+    /// Folder for the tables (CSV, Markdown) and the figure
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     /// Print one JSON object on standard output, and nothing else there: all tables
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    figures: FigureFlags,
     #[command(flatten)]
     common: CommonFlags,
 }
@@ -124,9 +127,11 @@ fn measure(arguments: &Arguments) -> Result<()> {
     if !panels.is_empty() {
         let rows = panels.len() as u32 / 2;
         let mut figure = Figure::row(panels);
+        figure.title =
+            format!("Time from faces to control points, {threads} threads, triad {:.1} GB/s", bandwidth / 1e9);
         figure.columns = 2;
         (figure.width, figure.height) = (900, 40 + 230 * rows);
-        figure.render()?.save(&arguments.out.join("scaling.png"))?;
+        figure.write(&arguments.out, "scaling", arguments.figures.formats())?;
     }
     local_edits(arguments, &progress, &mut printer)?;
     if arguments.steps >= LEAST {
@@ -375,32 +380,35 @@ fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut 
 
 /// Time per vertex over the number of vertices, in one of the two orders. The legend stands beside the second.
 fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) -> LinePlot {
+    // The method has the colour, the way the dashes and the marker.
+    let of = |method, dash, marker| Style { dash, marker, ..style::of(method, "") };
     let look = |way: Way| match way {
-        Way::Auto => (palette(0), Marker::Circle),
-        Way::Files => (Colour(0, 0, 110), Marker::Triangle),
-        Way::Plain => (palette(1), Marker::Square),
-        Way::Free(Method::Chebyshev { .. }) => (palette(2), Marker::Circle),
-        Way::Free(_) => (palette(3), Marker::Diamond),
-        Way::Waves => (palette(5), Marker::Circle),
-        Way::Colours => (Colour(140, 86, 75), Marker::Circle),
-        Way::Stored(Method::Chebyshev { .. }) => (palette(4), Marker::Square),
-        Way::Stored(Method::GaussSeidel { .. }) => (Colour(160, 160, 0), Marker::Square),
-        Way::Stored(Method::PcgIc0) => (palette(6), Marker::Diamond),
-        Way::Stored(Method::Cholesky) => (Colour(100, 100, 100), Marker::Triangle),
-        Way::Stored(_) => (Colour(170, 170, 170), Marker::InvertedTriangle),
+        Way::Auto => style::of_auto(),
+        Way::Files => Style { dash: Dash::Dashed, marker: Marker::Triangle, ..style::of_auto() },
+        Way::Plain => of(CHEBYSHEV, Dash::Dotted, Marker::Square),
+        Way::Free(method) => of(method, Dash::Solid, Marker::Circle),
+        Way::Waves => of(GAUSS_SEIDEL, Dash::Solid, Marker::Circle),
+        Way::Colours => of(GAUSS_SEIDEL, Dash::Dotted, Marker::Diamond),
+        Way::Stored(method) => of(method, Dash::Dashed, style::of(method, "").marker),
     };
+    let largest = curves.iter().flat_map(|c| &c.points).map(|p| p.0).fold(0.0, f64::max);
     let mut series: Vec<Series> = curves
         .iter()
         .filter(|c| c.random == random)
         .map(|c| {
-            let (colour, marker) = look(c.way);
-            let name = if random { c.way.name() } else { String::new() };
-            Series::line(name, c.points.iter().copied()).colour(colour).marker(marker).dash(Dash::Solid)
+            let last = c.points.last().map_or(0.0, |p| p.0);
+            let name = match random {
+                false => String::new(),
+                // Where it was not run further.
+                true if last < largest => format!("{} (to {last} vertices)", c.way.name()),
+                true => c.way.name(),
+            };
+            Series::line(name, c.points.iter().copied()).style(look(c.way))
         })
         .collect();
     if bound.len() > 1 {
-        let name = if random { "bandwidth bound" } else { "" };
-        series.push(Series::line(name, bound.iter().copied()).colour(Colour(0, 0, 0)).dash(Dash::Dotted));
+        let name = if random { "least that Chebyshev must move, at the triad's speed" } else { "" };
+        series.push(Series::line(name, bound.iter().copied()).colour(Colour(110, 110, 110)).dash(Dash::DashDotted));
     }
     LinePlot {
         title: format!("{scheme}, {} order", order(random)),

@@ -16,7 +16,8 @@ use limitlab::mesh::Faces;
 use limitlab::output::write_file;
 use limitlab::{Error, Result};
 
-use super::series::PALETTE;
+use super::canvas::Dash;
+use super::series::Style;
 use super::{Colour, ColourMap};
 pub use thinned::Thinned;
 
@@ -50,10 +51,24 @@ pub struct Page {
     pub view: Option<View>,
 }
 
+/// The line of a method: six digits of its colour, its dashes.
+#[derive(Debug, Serialize)]
+pub struct Look {
+    colour: String,
+    dash: Dash,
+}
+
+impl From<Style> for Look {
+    fn from(style: Style) -> Self {
+        Look { colour: hex(style.colour), dash: style.dash }
+    }
+}
+
 /// A method's errors over its iterations.
 #[derive(Debug, Serialize)]
 pub struct Curve {
     pub name: String,
+    pub look: Look,
     pub outcome: &'static str,
     pub iterations: usize,
     /// The iterations whose errors follow, ascending: u32.
@@ -77,6 +92,7 @@ pub struct Frames {
 #[derive(Debug, Serialize)]
 pub struct Sweep {
     pub method: &'static str,
+    pub look: Look,
     /// Where its rate is best, and beyond which it diverges, if theory tells.
     pub optimal: Option<f64>,
     pub critical: Option<f64>,
@@ -156,7 +172,7 @@ impl Packed {
 }
 
 /// RFC 4648, with padding.
-fn base64(bytes: &[u8]) -> String {
+pub(super) fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for three in bytes.chunks(3) {
@@ -170,7 +186,7 @@ fn base64(bytes: &[u8]) -> String {
 }
 
 /// Six digits.
-fn hex(Colour(red, green, blue): Colour) -> String {
+pub(super) fn hex(Colour(red, green, blue): Colour) -> String {
     format!("{red:02x}{green:02x}{blue:02x}")
 }
 
@@ -215,10 +231,8 @@ impl Page {
         let island = json.replace('<', "\\u003c");
         let colours: Vec<String> =
             (0..COLOURS).map(|k| hex(ColourMap::Sequential.colour(k as f64 / (COLOURS - 1) as f64))).collect();
-        let palette: String =
-            PALETTE.iter().enumerate().map(|(k, &colour)| format!("--curve-{k}: #{};", hex(colour))).collect();
         Ok(FRAME
-            .replace("/*STYLE*/", &STYLE.replace("/*PALETTE*/", &palette))
+            .replace("/*STYLE*/", STYLE)
             .replace("/*SCRIPT*/", &SCRIPTS.concat().replace("/*COLOURS*/", &colours.concat()))
             .replace("/*DATA*/", &island))
     }

@@ -10,8 +10,8 @@ const redrawOnScheme = redraw => matchMedia('(prefers-color-scheme: dark)').addE
 document.title = data.title;
 element('title').textContent = data.title;
 for (const text of data.about) add(element('about'), 'p', text);
-const curves = data.curves.map((curve, k) => ({
-  ...curve, k, shown: true, at: numbers(Uint32Array, curve.at), max: numbers(Float64Array, curve.max),
+const curves = data.curves.map(curve => ({
+  ...curve, shown: true, at: numbers(Uint32Array, curve.at), max: numbers(Float64Array, curve.max),
 }));
 
 /** What became of a run, in words. */
@@ -47,11 +47,11 @@ function entryAt(curve, iteration) {
     draw(plot.svg, 'text', { x: left + 6, y: tolerance - 4 }, 'tolerance');
     for (const curve of visible) {
       const points = [...curve.max].map((e, i) => e > 0 && Number.isFinite(e) ? [X(curve.at[i]), clamp(Y(e), -1e4, 1e4)] : null);
-      draw(inside, 'path', { d: line(points), fill: 'none', 'stroke-width': 2, 'stroke-linejoin': 'round', class: 'curve', ...strokeOf(curve.k) });
+      draw(inside, 'path', { d: line(points), fill: 'none', 'stroke-width': 2, 'stroke-linejoin': 'round', class: 'curve', ...strokeOf(curve.look) });
       const last = points.findLast(p => p !== null);
       if (last && curve.outcome !== 'converged') {
         const [x, y] = [last[0], clamp(last[1], top + 4, height - bottom)];
-        draw(plot.svg, 'path', { d: `M${x - 4} ${y - 4}l8 8m0 -8l-8 8`, 'stroke-width': 2, stroke: strokeOf(curve.k).stroke, class: 'failed' });
+        draw(plot.svg, 'path', { d: `M${x - 4} ${y - 4}l8 8m0 -8l-8 8`, 'stroke-width': 2, stroke: strokeOf(curve.look).stroke, class: 'failed' });
       }
     }
     cursor = draw(plot.svg, 'line', { y1: top, y2: height - bottom, class: 'rule', visibility: 'hidden' });
@@ -71,7 +71,7 @@ function entryAt(curve, iteration) {
     const running = entries.filter(([, i]) => i >= 0).sort(([a, i], [b, j]) => b.max[j] - a.max[i]);
     for (const [curve, i] of running) {
       const row = add(tip, 'div');
-      swatch(row, curve.k);
+      swatch(row, curve.look);
       const earlier = curve.at[i] === iteration ? '' : ` (at ${curve.at[i]})`;
       add(row, 'span', `${curve.name}: ${curve.max[i].toExponential(2)}${earlier}`);
     }
@@ -98,7 +98,7 @@ function entryAt(curve, iteration) {
   });
   for (const curve of curves) {
     const button = add(element('legend'), 'button', undefined, { type: 'button' });
-    swatch(button, curve.k);
+    swatch(button, curve.look);
     add(button, 'span', curve.name);
     add(button, 'small', verdict(curve));
     button.setAttribute('aria-pressed', 'true');
@@ -129,8 +129,8 @@ function entryAt(curve, iteration) {
     const above = axes(element('sweep-iterations'), { x, y: counts, log: true, height: 190, yTicks: countTicks, label: 'iterations over ω' });
     const below = axes(element('sweep-rates'), { x, y: [0, 1.5], height: 200, xLabel: 'ω', label: 'rates over ω' });
     draw(below.inside, 'line', { x1: below.left, x2: below.width, y1: below.Y(1), y2: below.Y(1), class: 'rule' });
-    data.sweep.forEach(({ runs }, k) => {
-      const plain = { fill: 'none', 'stroke-width': 2, class: 'curve', ...strokeOf(k) };
+    data.sweep.forEach(({ look, runs }) => {
+      const plain = { fill: 'none', 'stroke-width': 2, class: 'curve', ...strokeOf(look) };
       draw(above.inside, 'path', { d: line(runs.map(run => run.outcome === 'converged' ? [above.X(run.omega), above.Y(Math.max(run.iterations, 1))] : null)), ...plain });
       draw(below.inside, 'path', { d: line(runs.map(run => run.predicted === null ? null : [below.X(run.omega), below.Y(Math.min(run.predicted, 9))])), ...plain });
       for (const run of runs.filter(run => run.measured !== null)) {
@@ -145,9 +145,9 @@ function entryAt(curve, iteration) {
     table.replaceChildren();
     const head = add(table, 'tr');
     for (const text of ['method', 'iterations', 'measured rate', 'predicted', 'best ω', 'diverges from']) add(head, 'th', text);
-    data.sweep.forEach(({ method, optimal, critical, runs }, k) => {
+    data.sweep.forEach(({ method, look, optimal, critical, runs }) => {
       const run = runs.find(run => run.omega === omega), row = add(table, 'tr'), name = add(row, 'td');
-      swatch(name, k);
+      swatch(name, look);
       name.append(` ${method}`);
       add(row, 'td', run ? verdict(run) : '–', { className: run && run.outcome !== 'converged' ? 'failed' : '' });
       for (const x of [run?.measured, run?.predicted, optimal, critical]) add(row, 'td', short(x, 4));

@@ -21,16 +21,16 @@ function add(parent, name, text, properties) {
   return element;
 }
 
-/** The colour and the dashes of the k-th curve: as in the plots of the programs, seven colours by four kinds of line. */
-function strokeOf(k) {
-  const dashes = ['none', '7 4', '2 3', '8 3 2 3'];
-  return { stroke: `var(--curve-${k % 7})`, 'stroke-dasharray': dashes[Math.floor(k / 7) % 4] };
+/** The colour and the dashes of a method: as in the plots of the programs. Black is the colour of the text, light on dark. */
+function strokeOf({ colour, dash }) {
+  const dashes = { Solid: 'none', Dashed: '7 4', Dotted: '2 3', DashDotted: '8 3 2 3' };
+  return { stroke: colour === '000000' ? 'var(--ink)' : `#${colour}`, 'stroke-dasharray': dashes[dash] };
 }
 
-/** A piece of the k-th curve, for legends. */
-function swatch(parent, k) {
+/** A piece of a curve of this look, for legends. */
+function swatch(parent, look) {
   const svg = draw(parent, 'svg', { class: 'swatch', viewBox: '0 0 24 10', 'aria-hidden': 'true' });
-  draw(svg, 'line', { x1: 0, x2: 24, y1: 5, y2: 5, 'stroke-width': 2.5, ...strokeOf(k) });
+  draw(svg, 'line', { x1: 0, x2: 24, y1: 5, y2: 5, 'stroke-width': 2.5, ...strokeOf(look) });
 }
 
 /** A power of ten in words. */

@@ -1,7 +1,7 @@
 //! Panel of a rendered picture: caption, image, colour bar.
 
 use super::super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Rect, text_width};
-use super::super::frame::{self, FRAME_COLOUR, FRAME_WIDTH, LABEL_SIZE, Slot, TEXT_COLOUR, TICK_SIZE, TITLE_SIZE};
+use super::super::frame::{self, FRAME_COLOUR, FRAME_WIDTH, LABEL_SIZE, Slot, TEXT_COLOUR, TICK_SIZE};
 use super::super::png::Image;
 use super::scene::Scene;
 use super::{ColourScale, Picture, raster};
@@ -39,12 +39,12 @@ impl Picture {
         let mut widest = 0.0_f64;
         for tick in scale.axis()?.ticks((LONGEST_BAR / TICK_PITCH) as usize) {
             let label = tick.label.unwrap_or_default();
-            widest = widest.max(text_width(&label, TICK_SIZE)?);
+            widest = widest.max(text_width(&label, TICK_SIZE));
         }
         Ok(BAR_GAP + BAR_WIDTH + TICK_LENGTH + TICK_GAP + widest + 6.0 + LABEL_SIZE + GAP)
     }
 
-    pub(in super::super) fn draw(&self, canvas: &Canvas<'_>, slot: &Slot) -> Result<()> {
+    pub(in super::super) fn draw(&self, canvas: &mut Canvas, slot: &Slot) -> Result<()> {
         let frame = slot.frame;
         canvas.image(frame, |width, height, pixels_per_point| {
             let scene = Scene::new(self, (width, height), pixels_per_point)?;
@@ -53,15 +53,13 @@ impl Picture {
         if let Some(scale) = &self.colour_bar {
             draw_bar(canvas, frame, scale)?;
         }
-        // A caption that is longer than its picture is wide is made smaller.
-        let size = TITLE_SIZE * (frame.width() / text_width(&self.caption, TITLE_SIZE)?.max(1.0)).min(1.0);
-        let place = (frame.centre().0, frame.top - frame::title_room(&self.caption) + 2.0 + TITLE_SIZE);
-        canvas.text(&self.caption, place, size, Anchor::Middle, false, TEXT_COLOUR)
+        frame::draw_title(canvas, frame, &self.caption, frame::title_room(&self.caption));
+        Ok(())
     }
 }
 
 /// The bar to the right of `frame`: the colours from the least number, at the bottom, to the greatest.
-fn draw_bar(canvas: &Canvas<'_>, frame: Rect, scale: &ColourScale) -> Result<()> {
+fn draw_bar(canvas: &mut Canvas, frame: Rect, scale: &ColourScale) -> Result<()> {
     let axis = scale.axis()?;
     let length = (0.8 * frame.height()).min(LONGEST_BAR);
     let left = frame.right + BAR_GAP;
@@ -79,18 +77,19 @@ fn draw_bar(canvas: &Canvas<'_>, frame: Rect, scale: &ColourScale) -> Result<()>
         };
         Ok(Image { width, height, rgb: (0..height).flat_map(row).collect() })
     })?;
-    canvas.outline(bar, FRAME_WIDTH, FRAME_COLOUR)?;
+    canvas.outline(bar, FRAME_WIDTH, FRAME_COLOUR);
     let mut right = bar.right + TICK_LENGTH;
     for tick in axis.ticks((length / TICK_PITCH) as usize) {
         let Some(label) = &tick.label else { continue };
         let y = bar.bottom - tick.at * bar.height();
         let reach = (bar.right, bar.right + TICK_LENGTH);
-        canvas.level(y, reach, FRAME_WIDTH, FRAME_COLOUR)?;
+        canvas.level(y, reach, FRAME_WIDTH, FRAME_COLOUR);
         let place = (bar.right + TICK_LENGTH + TICK_GAP, y + CAP_HEIGHT / 2.0 * TICK_SIZE);
-        canvas.text(label, place, TICK_SIZE, Anchor::Start, false, TEXT_COLOUR)?;
-        right = right.max(place.0 + text_width(label, TICK_SIZE)?);
+        canvas.text(label, place, TICK_SIZE, Anchor::Start, false, TEXT_COLOUR);
+        right = right.max(place.0 + text_width(label, TICK_SIZE));
     }
-    let size = LABEL_SIZE * (frame.height() / text_width(&scale.label, LABEL_SIZE)?.max(1.0)).min(1.0);
+    let size = LABEL_SIZE * (frame.height() / text_width(&scale.label, LABEL_SIZE).max(1.0)).min(1.0);
     let place = (right + 6.0 + CAP_HEIGHT * LABEL_SIZE, bar.centre().1);
-    canvas.text(&scale.label, place, size, Anchor::Middle, true, TEXT_COLOUR)
+    canvas.text(&scale.label, place, size, Anchor::Middle, true, TEXT_COLOUR);
+    Ok(())
 }

@@ -42,7 +42,7 @@ pub fn frozen(album: &mut Album) -> Result<()> {
         iterations: None,
         error: Some(gap),
     };
-    album.add(&line, &sheet(3, (200, 165), panels))
+    album.add(&line, sheet(3, (200, 165), panels))
 }
 
 /// The same points on a smooth surface, with creases, with semi-sharp ones, and with creases that end.
@@ -78,5 +78,5 @@ pub fn same_points(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet(panels.len(), (180, 190), panels))
+    album.add(&line, sheet(panels.len(), (180, 190), panels))
 }

@@ -66,7 +66,7 @@ pub fn relation(album: &mut Album) -> Result<()> {
     let shows =
         "Lin-Luo Fig. 2: new points of the four-point scheme from the displacements of the cubic B-spline's step";
     let figure = Figure { width: 480, height: 165, ..Figure::new(plot) };
-    album.add(&line("lin-luo-2", shows, ("polygon of 5 points", p)), &figure)
+    album.add(&line("lin-luo-2", shows, ("polygon of 5 points", p)), figure)
 }
 
 /// Fig. 3: curves for several α; ends and α a point of its own beside.
@@ -125,7 +125,7 @@ pub fn samples(album: &mut Album) -> Result<()> {
     let figure = Figure { width: 690, height: 180, ..Figure::row(panels) };
     let shows = "Lin-Luo Fig. 3: the unified curve scheme for α from 0 (four-point) to 1 (B-spline), closed and open, and \
                  with α = 0 at some points";
-    album.add(&line("lin-luo-3", shows, ("polygon of 6 points", p)), &figure)
+    album.add(&line("lin-luo-3", shows, ("polygon of 6 points", p)), figure)
 }
 
 /// A vertex of valence n with three rings about it in the plane, closed by a vertex far away.
@@ -205,5 +205,5 @@ pub fn stencils(album: &mut Album) -> Result<()> {
     let figure = Figure { width: 640, height: 240, ..Figure::row(panels) };
     let shows = "Lin-Luo Fig. 4: the weights of a new vertex of the interpolatory √3 scheme, with how many vertices have \
                  each";
-    album.add(&line("lin-luo-4", shows, subject.points()), &figure)
+    album.add(&line("lin-luo-4", shows, subject.points()), figure)
 }

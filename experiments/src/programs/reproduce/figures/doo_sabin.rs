@@ -11,6 +11,7 @@ use limitlab::mesh::{Surface, builtin};
 use limitlab::schemes::Refinement;
 use limitlab::solvers::{Method, Stop};
 
+use super::stand_ins::StandIn;
 use super::{Album, CONTROL, FACES, GIVEN, Line, POINT, cage, plain, sheet, view};
 use crate::programs::reproduce::context::Subject;
 use crate::programs::reproduce::corpus;
@@ -48,7 +49,7 @@ fn panels(view: View, framed: &[DVec3], shown: Vec<(&str, ShadedMesh)>) -> Vec<P
 
 /// Fig. 3: the Doo-Sabin surface of a mesh, and the one through its vertices.
 pub fn approximation(album: &mut Album) -> Result<()> {
-    let subject = album.subject(&corpus::LETTER)?;
+    let subject = album.subject(&corpus::LETTER, StandIn::Plain("truncated-octahedron"))?;
     let approximating = Refinement::DooSabin.refined(&subject.surface)?;
     let found = two_phase(&subject, &Constraints::default())?;
     let auxiliary = found.auxiliary.surface.mesh();
@@ -72,12 +73,12 @@ pub fn approximation(album: &mut Album) -> Result<()> {
         iterations: Some(found.auxiliary.updates.len()),
         error: Some(largest_error(&subject, &found, |_| true)),
     };
-    album.add(&line, &sheet(3, (135, 140), panels))
+    album.add(&line, sheet(3, (135, 140), panels))
 }
 
 /// Fig. 4: Zheng and Cai's method and Nasri's on one mesh.
 pub fn against_nasri(album: &mut Album) -> Result<()> {
-    let subject = album.subject(&corpus::HAT)?;
+    let subject = album.subject(&corpus::HAT, StandIn::Knot("tri-torus:70x8"))?;
     let found = two_phase(&subject, &Constraints::default())?;
     let stop = Stop { tolerance: 1e-10 * subject.surface.diagonal(), max_iterations: 10 };
     let solution = nasri::control_points(&subject.surface, None, Method::Lu, &stop)?;
@@ -99,12 +100,12 @@ pub fn against_nasri(album: &mut Album) -> Result<()> {
         error: Some(largest_error(&subject, &found, |_| true)),
     };
     let panels = panels(view, subject.surface.positions(), shown);
-    album.add(&line, &sheet(3, (135, 120), panels))
+    album.add(&line, sheet(3, (135, 120), panels))
 }
 
 /// Fig. 5: a large mesh.
 pub fn large(album: &mut Album) -> Result<()> {
-    let subject = album.subject(&corpus::SPOT)?;
+    let subject = album.subject(&corpus::SPOT, StandIn::Knot("torus:360x32"))?;
     let found = two_phase(&subject, &Constraints::default())?;
     let shown = vec![
         ("(a) input", cage(subject.surface.mesh(), GIVEN)),
@@ -120,7 +121,7 @@ pub fn large(album: &mut Album) -> Result<()> {
     };
     let view = view(DVec3::Y, 60.0, 12.0);
     let panels = panels(view, subject.surface.positions(), shown);
-    album.add(&line, &sheet(3, (135, 150), panels))
+    album.add(&line, sheet(3, (135, 150), panels))
 }
 
 /// Colour of given normals, as in the paper.
@@ -240,7 +241,7 @@ pub fn with_normals(album: &mut Album) -> Result<()> {
     let shows = "Zheng-Cai Fig. 6: the leftmost and the rightmost vertex are interpolated, below with given normals \
                  (green); their faces red";
     let line = tagged.line("zheng-cai-6", shows, &held);
-    album.add(&line, &sheet(3, (150, 115), panels))
+    album.add(&line, sheet(3, (150, 115), panels))
 }
 
 /// Fig. 7: what a shape handle does to a type-V face.
@@ -273,7 +274,7 @@ pub fn scaled_faces(album: &mut Album) -> Result<()> {
     let shows = "Zheng-Cai Fig. 7: the type-V face of an interpolated vertex (red) scaled by s about its centroid, which \
                  is the given point; lines to its corners green";
     let line = tagged.line("zheng-cai-7", shows, &last);
-    album.add(&line, &sheet(3, (130, 125), pictures))
+    album.add(&line, sheet(3, (130, 125), pictures))
 }
 
 /// Fig. 8: the same with shape handles.
@@ -302,5 +303,5 @@ pub fn with_handles(album: &mut Album) -> Result<()> {
     let shows = "Zheng-Cai Fig. 8: the surfaces of Fig. 6 with shape handles 0.4 (slim) and 2.5 (round) at the \
                  interpolated vertices";
     let line = tagged.line("zheng-cai-8", shows, &last);
-    album.add(&line, &sheet(2, (170, 115), pictures))
+    album.add(&line, sheet(2, (170, 115), pictures))
 }

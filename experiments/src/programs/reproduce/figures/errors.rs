@@ -11,15 +11,16 @@ use limitlab::mesh::builtin;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, System};
 
-use super::{Album, FINE_EDGE, Line, control, plain, power, sheet, view};
-use crate::programs::reproduce::corpus::{self, Model};
+use super::stand_ins::StandIn;
+use super::{Album, FINE_EDGE, FINEST_EDGE, Line, control, plain, power, sheet, view};
+use crate::programs::reproduce::corpus;
 
 /// Iterates of the maps.
 const SHOWN: [usize; 6] = [0, 1, 2, 5, 10, 20];
 
 /// ‖p_i − (A v)_i‖ on the mesh while PIA goes on.
 pub fn maps(album: &mut Album) -> Result<()> {
-    let subject = album.subject(&corpus::HORSE)?;
+    let subject = album.subject(&corpus::HORSE, StandIn::Knot("tri-torus:39x6"))?;
     let system = subject.system(Scheme::Loop)?;
     let size = subject.surface.diagonal();
     let scale = ColourScale::logarithmic("error / L", (1e-6, 1e-1));
@@ -33,8 +34,8 @@ pub fn maps(album: &mut Album) -> Result<()> {
             .map(|v| (subject.surface.positions()[v] - system.row(v, iterate.positions())).length() / size)
             .collect();
         let surface =
-            ShadedMesh::smooth(subject.surface.mesh().clone()).scalars(errors, scale.clone()).edges(FINE_EDGE);
-        let mut picture = Picture::new(format!("k = {k}: {}", power(error / size)), view).surface(surface);
+            ShadedMesh::smooth(subject.surface.mesh().clone()).scalars(errors, scale.clone()).edges(FINEST_EDGE);
+        let mut picture = Picture::new(format!("k = {k}: at most {}", power(error / size)), view).surface(surface);
         if i % 3 == 2 {
             picture = picture.colour_bar(scale.clone());
         }
@@ -48,14 +49,14 @@ pub fn maps(album: &mut Album) -> Result<()> {
         iterations: SHOWN.last().copied(),
         error: Some(last),
     };
-    album.add(&line, &sheet(3, (110, 108), panels))
+    album.add(&line, sheet(3, (150, 140), panels))
 }
 
 /// The eigenvectors of Catmull-Clark's matrix that PIA is slowest to remove.
 pub fn slow_modes(album: &mut Album) -> Result<()> {
     let plain = |name: &str| plain(name, builtin::builtin(name)?);
     let mut subjects = vec![plain("truncated-octahedron")?, plain("prism:17")?, plain("torus:24x12")?];
-    subjects.push(album.subject(&Model { stand_in: "irregular-quad:226", ..corpus::SPOT_COARSE })?);
+    subjects.push(album.subject(&corpus::SPOT_COARSE, StandIn::Plain("quad-sphere:2"))?);
     let scale = ColourScale::signed("eigenvector / largest", 1.0);
     let mut panels = Vec::new();
     for (i, subject) in subjects.iter().enumerate() {
@@ -65,7 +66,7 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
         // Where the mode is; elsewhere there is nothing to see.
         let framed: Vec<DVec3> =
             (subject.surface.positions().iter().zip(&mode)).filter(|(_, x)| x.abs() > 0.01).map(|(&p, _)| p).collect();
-        let caption = format!("λ = {}", significant(lambda));
+        let caption = format!("{}: λ = {}", subject.name, significant(lambda));
         let mut picture = Picture::new(caption, view)
             .surface(ShadedMesh::flat(subject.surface.mesh().clone()).scalars(mode, scale.clone()).edges(FINE_EDGE));
         picture.framed = Some(framed);
@@ -82,7 +83,7 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet(2, (126, 112), panels))
+    album.add(&line, sheet(2, (180, 150), panels))
 }
 
 /// Steps of the power iteration; it ends before where it has converged.

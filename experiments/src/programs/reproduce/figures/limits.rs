@@ -7,6 +7,7 @@ use limitlab::Result;
 use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::Method;
 
+use super::stand_ins::StandIn;
 use super::{Album, GIVEN, Line, POINT, cage, control, limit_surface, sheet, view};
 use crate::programs::reproduce::context::Subject;
 use crate::programs::reproduce::corpus::{self, Model};
@@ -16,6 +17,7 @@ struct Printed {
     name: &'static str,
     caption: &'static str,
     model: Model,
+    stand_in: StandIn,
     scheme: Scheme,
     /// Updates: the paper's iterations less one.
     updates: usize,
@@ -34,6 +36,7 @@ const PRINTED: [Printed; 5] = [
         name: "pia-3-horse",
         caption: "PIA Fig. 3 (horse): mesh and Loop surface, 12 iterations",
         model: corpus::HORSE,
+        stand_in: StandIn::Knot("tri-torus:39x6"),
         scheme: Scheme::Loop,
         updates: 11,
         up: DVec3::Y,
@@ -46,6 +49,7 @@ const PRINTED: [Printed; 5] = [
         name: "pia-4-bird",
         caption: "PIA Fig. 4 (bird): mesh and Loop surface, 9 iterations",
         model: corpus::BIRD,
+        stand_in: StandIn::Bumps("icosphere:3"),
         scheme: Scheme::Loop,
         updates: 8,
         up: DVec3::Y,
@@ -58,6 +62,7 @@ const PRINTED: [Printed; 5] = [
         name: "pia-5-hand",
         caption: "PIA Fig. 5 (hand): mesh and Loop surface, 3 iterations",
         model: corpus::HAND,
+        stand_in: StandIn::Knot("tri-torus:206x30"),
         scheme: Scheme::Loop,
         updates: 2,
         up: DVec3::NEG_Y,
@@ -70,6 +75,7 @@ const PRINTED: [Printed; 5] = [
         name: "pia-6-boy",
         caption: "PIA Fig. 6 (boy, holes filled): mesh and Loop surface, 6 iterations; the head alone",
         model: corpus::BOY_FILLED,
+        stand_in: StandIn::Bumps("icosphere:5"),
         scheme: Scheme::Loop,
         updates: 5,
         up: DVec3::Y,
@@ -82,6 +88,7 @@ const PRINTED: [Printed; 5] = [
         name: "pia-7-mushroom",
         caption: "PIA Fig. 7 (mushroom): mesh and Catmull-Clark surface, 8 iterations",
         model: corpus::MUSHROOM,
+        stand_in: StandIn::Bumps("quad-sphere:3"),
         scheme: Scheme::CatmullClark,
         updates: 7,
         up: DVec3::Y,
@@ -95,7 +102,7 @@ const PRINTED: [Printed; 5] = [
 /// The mesh beside its interpolating surface.
 pub fn pia(album: &mut Album) -> Result<()> {
     for printed in &PRINTED {
-        let subject = album.subject(&printed.model)?;
+        let subject = album.subject(&printed.model, printed.stand_in)?;
         let system = subject.system(printed.scheme)?;
         let (cage_mesh, error) = control(&subject, &system, Method::Pia, printed.updates);
         let surface = limit_surface(printed.scheme.refinement(), &cage_mesh)?;
@@ -103,16 +110,18 @@ pub fn pia(album: &mut Album) -> Result<()> {
         let height = |p: &DVec3| p.dot(printed.up);
         let heights = || subject.surface.positions().iter().map(height);
         let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
+        let shown = if album.context.real() { printed.shown } else { 1.0 };
+        let what = if shown < 1.0 { "top of the " } else { "" };
         let framed: Vec<DVec3> = (surface.mesh.positions.iter())
             .chain(subject.surface.positions())
-            .filter(|p| height(p) >= high - printed.shown * (high - low))
+            .filter(|p| height(p) >= high - shown * (high - low))
             .copied()
             .collect();
         let panels = vec![
-            Picture::new(format!("(a) the mesh, {} vertices", subject.surface.len()), view)
+            Picture::new(format!("(a) {what}mesh, {} vertices", subject.surface.len()), view)
                 .surface(cage(subject.surface.mesh(), GIVEN))
                 .frame(&framed),
-            Picture::new(format!("(b) the surface after {} updates", printed.updates), view)
+            Picture::new(format!("(b) {what}surface, {} updates", printed.updates), view)
                 .surface(surface)
                 .frame(&framed),
         ];
@@ -123,7 +132,7 @@ pub fn pia(album: &mut Album) -> Result<()> {
             iterations: Some(printed.updates),
             error: Some(error),
         };
-        album.add(&line, &sheet(2, printed.size, panels))?;
+        album.add(&line, sheet(2, printed.size, panels))?;
     }
     Ok(())
 }
@@ -153,7 +162,7 @@ fn thall_pictures(subject: &Subject, iterates: &[usize]) -> Result<(Vec<Picture>
 
 /// Thall's iteration: the limit surface of every iterate, with the points that it has to reach.
 pub fn thall_series(album: &mut Album) -> Result<()> {
-    let subject = album.subject(&corpus::SPOT_COARSE)?;
+    let subject = album.subject(&corpus::SPOT_COARSE, StandIn::Bumps("quad-sphere:2"))?;
     let (panels, last) = thall_pictures(&subject, &SERIES)?;
     let line = Line {
         name: "thall-iterations",
@@ -162,12 +171,12 @@ pub fn thall_series(album: &mut Album) -> Result<()> {
         iterations: SERIES.last().copied(),
         error: Some(last),
     };
-    album.add(&line, &sheet(3, (106, 116), panels))
+    album.add(&line, sheet(3, (130, 136), panels))
 }
 
 /// The same, moving.
 pub fn thall_animation(album: &mut Album) -> Result<()> {
-    let subject = album.subject(&corpus::SPOT_COARSE)?;
+    let subject = album.subject(&corpus::SPOT_COARSE, StandIn::Bumps("quad-sphere:2"))?;
     let iterates: Vec<usize> = (0..=6).collect();
     let (panels, last) = thall_pictures(&subject, &iterates)?;
     let frames: Vec<Figure> = (panels.into_iter()).map(|panel| sheet(1, (94, 104), vec![panel])).collect();
@@ -178,5 +187,5 @@ pub fn thall_animation(album: &mut Album) -> Result<()> {
         iterations: iterates.last().copied(),
         error: Some(last),
     };
-    album.animate(&line, &frames)
+    album.animate(&line, frames)
 }

@@ -10,6 +10,7 @@ mod errors;
 mod limits;
 mod normals;
 mod sqrt3;
+mod stand_ins;
 
 use crate::report::{Colour, Column, Columns, Figure, Picture, ShadedMesh, Table, View};
 use glam::DVec3;
@@ -21,6 +22,7 @@ use limitlab::solvers::{Method, Stop, run as solve};
 
 use crate::programs::reproduce::context::{Context, Item, Subject};
 use crate::programs::reproduce::corpus::Model;
+use stand_ins::StandIn;
 
 pub const ALL: Item =
     Item { id: "figures", title: "Pictures of the papers' surfaces, of errors and of slow modes", run };
@@ -71,6 +73,8 @@ fn run(context: &mut Context) -> Result<()> {
 struct Album<'a> {
     context: &'a mut Context,
     table: Table,
+    /// The names of the shapes that took the places of models.
+    stand_ins: Vec<String>,
 }
 
 /// What the table says of a picture.
@@ -93,7 +97,8 @@ impl<'a> Album<'a> {
              then put on the limit surface, with its normals (Loop, Catmull-Clark), or refined until facets are no \
              longer seen (Doo-Sabin, √3). `iterations` and `error_percent`, the largest distance of a given point \
              from its limit point in percent of the bounding box's diagonal, are those of the last surface in the \
-             picture.",
+             picture. A model that is not at hand has a shape in its place that says so in the picture; thall-7, thall-8, \
+             zheng-cai-6 to 8 and lin-luo-2 to 4 are of meshes of their own and the same everywhere.",
         );
         if context.real() {
             table.note(
@@ -103,23 +108,39 @@ impl<'a> Album<'a> {
                  tripod are CGAL's.",
             );
         }
-        Album { context, table }
+        Album { context, table, stand_ins: Vec::new() }
     }
 
-    /// As [`Context::subject`].
-    fn subject(&self, model: &Model) -> Result<Subject> {
-        self.context.subject(model)
+    /// The model where it is at hand, else a shape in its place.
+    fn subject(&mut self, model: &Model, stand_in: StandIn) -> Result<Subject> {
+        if self.context.real() {
+            return self.context.model(model);
+        }
+        let subject = stand_in.subject()?;
+        self.stand_ins.push(subject.name.clone());
+        Ok(subject)
     }
 
-    fn add(&mut self, line: &Line, figure: &Figure) -> Result<()> {
+    fn add(&mut self, line: &Line, figure: Figure) -> Result<()> {
         self.list(line);
-        self.context.figure(&format!("{}--{}", ALL.id, line.name), figure)
+        let figure = self.named(line, figure);
+        self.context.figure(&format!("{}--{}", ALL.id, line.name), &figure)
+    }
+
+    /// A shape that stands in for a model says so.
+    fn named(&self, line: &Line, figure: Figure) -> Figure {
+        let (name, _) = line.subject;
+        if !self.stand_ins.iter().any(|stand_in| stand_in == name) {
+            return figure;
+        }
+        Figure { height: figure.height + Figure::TITLE_ROOM, ..figure.title(format!("stand-in: {name}")) }
     }
 
     /// As [`add`](Self::add), figures one after the other.
-    fn animate(&mut self, line: &Line, figures: &[Figure]) -> Result<()> {
+    fn animate(&mut self, line: &Line, figures: Vec<Figure>) -> Result<()> {
         self.list(line);
-        self.context.animation(&format!("{}--{}", ALL.id, line.name), figures)
+        let figures: Vec<Figure> = figures.into_iter().map(|figure| self.named(line, figure)).collect();
+        self.context.animation(&format!("{}--{}", ALL.id, line.name), &figures)
     }
 
     fn list(&mut self, line: &Line) {

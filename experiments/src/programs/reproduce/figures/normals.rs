@@ -61,15 +61,19 @@ pub fn bones(album: &mut Album) -> Result<()> {
         width: 0.7,
         colour: NORMAL,
     };
+    // The arrows whole.
+    let tips = arrows.tails.iter().zip(&arrows.vectors).map(|(&tail, &arrow)| tail + arrow);
+    let framed: Vec<DVec3> = framed.iter().copied().chain(tips).collect();
     let mut panels = Vec::new();
     for (surface, (caption, deviation)) in
-        surfaces.iter().zip([("(a) points", deviations[0]), ("(b) points and normals", deviations[1])])
+        surfaces.iter().zip([("(a) points", deviations[0]), ("(b) and normals", deviations[1])])
     {
-        let caption = format!("{caption}: off by {deviation:.1}°");
-        panels.push(Picture::new(caption, view).surface(surface.clone()).vectors(arrows.clone()).frame(framed));
+        let deviation = if deviation < 0.05 { "< 0.1".into() } else { format!("{deviation:.1}") };
+        let caption = format!("{caption}: off by {deviation}°");
+        panels.push(Picture::new(caption, view).surface(surface.clone()).vectors(arrows.clone()).frame(&framed));
     }
     for (surface, caption) in surfaces.into_iter().zip(["(c) reflections of (a)", "(d) of (b)"]) {
-        panels.push(Picture::new(caption, view).surface(surface.finish(Finish::ReflectionLines)).frame(framed));
+        panels.push(Picture::new(caption, view).surface(surface.finish(Finish::ReflectionLines)).frame(&framed));
     }
     let line = Line {
         name: "thall-7-normals",
@@ -79,7 +83,7 @@ pub fn bones(album: &mut Album) -> Result<()> {
         iterations: None,
         error: Some(error),
     };
-    album.add(&line, &sheet(2, (200, 125), panels))
+    album.add(&line, sheet(2, (200, 125), panels))
 }
 
 /// The medial radius of the slab, but for its border.
@@ -184,5 +188,5 @@ pub fn end_cap(album: &mut Album) -> Result<()> {
         iterations: None,
         error: Some(error),
     };
-    album.add(&line, &sheet(3, (170, 110), panels))
+    album.add(&line, sheet(3, (170, 110), panels))
 }

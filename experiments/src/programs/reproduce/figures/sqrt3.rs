@@ -8,6 +8,7 @@ use limitlab::interpolate::lin_luo::surface::refine_n;
 use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::Refinement;
 
+use super::stand_ins::StandIn;
 use super::{Album, FACES, GIVEN, Line, POINT, cage, sheet, view};
 use crate::programs::reproduce::corpus;
 
@@ -31,7 +32,7 @@ fn steps(mesh: &Mesh) -> usize {
 
 /// Fig. 5: modified Butterfly and the interpolatory √3 scheme, and beside them Labsik and Greiner's.
 pub fn against_butterfly(album: &mut Album) -> Result<()> {
-    let subject = album.subject(&corpus::BOB_TRIANGLES)?;
+    let subject = album.subject(&corpus::BOB_TRIANGLES, StandIn::Plain("tri-torus:12x7"))?;
     let mesh = subject.surface.mesh();
     let view = view(DVec3::Y, 35.0, 20.0);
     let butterfly = ShadedMesh::smooth(Refinement::Butterfly.refine_n(&subject.surface, 4)?);
@@ -41,7 +42,7 @@ pub fn against_butterfly(album: &mut Album) -> Result<()> {
         ("(a) the mesh", cage(mesh, GIVEN)),
         ("(b) modified Butterfly", butterfly),
         ("(c) interpolatory √3", ours),
-        ("Labsik-Greiner √3", earlier),
+        ("(d) Labsik-Greiner √3", earlier),
     ];
     let panels =
         panels.map(|(caption, surface)| Picture::new(caption, view).surface(surface).frame(&mesh.positions)).to_vec();
@@ -53,19 +54,20 @@ pub fn against_butterfly(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet(4, (135, 131), panels))
+    album.add(&line, sheet(4, (135, 131), panels))
 }
 
 /// Fig. 6: a bunny under the interpolatory √3 scheme, step by step.
 pub fn bunny(album: &mut Album) -> Result<()> {
-    let subject = album.subject(&corpus::BUNNY)?;
+    let subject = album.subject(&corpus::BUNNY, StandIn::Bumps("icosphere:3"))?;
     let mesh = subject.surface.mesh();
     let alpha = vec![1.0; mesh.len()];
     let view = view(DVec3::Y, 0.0, 10.0);
     let panels = vec![
         Picture::new("(a) the mesh", view).surface(cage(mesh, GIVEN)),
-        Picture::new("(b) after one step", view).surface(cage(&refined(&subject.surface, &alpha, 1)?, super::CONTROL)),
-        Picture::new("(c) after four steps", view).surface(shown(&subject.surface, &alpha)?),
+        Picture::new("(b) one step, √3, α = 1", view)
+            .surface(cage(&refined(&subject.surface, &alpha, 1)?, super::CONTROL)),
+        Picture::new("(c) four steps or more", view).surface(shown(&subject.surface, &alpha)?),
     ];
     let line = Line {
         name: "lin-luo-6",
@@ -74,21 +76,21 @@ pub fn bunny(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet(3, (135, 138), panels))
+    album.add(&line, sheet(3, (135, 138), panels))
 }
 
 /// Fig. 7: the surfaces for several α, and two through some vertices only.
 pub fn parameters(album: &mut Album) -> Result<()> {
-    let subject = album.subject(&corpus::TRIPOD)?;
+    let subject = album.subject(&corpus::TRIPOD, StandIn::Plain("star:5"))?;
     let mesh = subject.surface.mesh();
     let view = view(DVec3::Y, 35.0, 25.0);
     let all = |alpha: f64| vec![alpha; mesh.len()];
     let every = |step: usize| -> Vec<usize> { (0..mesh.len()).step_by(step).collect() };
     let mut panels = vec![Picture::new("control mesh", view).surface(cage(mesh, GIVEN))];
-    for alpha in [1.0, 0.8, 0.5] {
+    for alpha in [1.0, 0.8, 0.5, 0.2, 0.0] {
         panels.push(Picture::new(format!("α = {alpha}"), view).surface(shown(&subject.surface, &all(alpha))?));
     }
-    for (caption, chosen) in [("every 4th vertex", every(4)), ("every 2nd vertex", every(2))] {
+    for (caption, chosen) in [("α = 1 at every 2nd", every(2)), ("α = 1 at every 4th", every(4))] {
         let mut alpha = all(0.0);
         for &v in &chosen {
             alpha[v] = 1.0;
@@ -96,9 +98,6 @@ pub fn parameters(album: &mut Album) -> Result<()> {
         let points =
             Points { positions: chosen.iter().map(|&v| mesh.positions[v]).collect(), radius: 1.1, colour: POINT };
         panels.push(Picture::new(caption, view).surface(shown(&subject.surface, &alpha)?).points(points));
-    }
-    for alpha in [0.0, 0.2] {
-        panels.push(Picture::new(format!("α = {alpha}"), view).surface(shown(&subject.surface, &all(alpha))?));
     }
     let framed: Vec<DVec3> =
         (panels.iter()).flat_map(|p| p.surfaces.iter().flat_map(|s| &s.mesh.positions)).copied().collect();
@@ -113,12 +112,12 @@ pub fn parameters(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet(4, (115, 115), panels))
+    album.add(&line, sheet(4, (115, 115), panels))
 }
 
 /// How smooth the surfaces are: reflection lines for α = 0, ½, 1.
 pub fn reflections(album: &mut Album) -> Result<()> {
-    let subject = album.subject(&corpus::TRIPOD)?;
+    let subject = album.subject(&corpus::TRIPOD, StandIn::Plain("star:5"))?;
     let mesh = subject.surface.mesh();
     let view = view(DVec3::Y, 35.0, 25.0);
     let mut panels = Vec::new();
@@ -133,5 +132,5 @@ pub fn reflections(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, &sheet(3, (170, 165), panels))
+    album.add(&line, sheet(3, (170, 165), panels))
 }
