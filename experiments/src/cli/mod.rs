@@ -23,7 +23,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::report::{Figure, Format, Table};
+use crate::report::{Figure, Format, Table, fitted};
 use limitlab::error::{Error, Result};
 use limitlab::solvers::Stop;
 
@@ -225,6 +225,17 @@ pub fn write_standard(fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) 
     }
 }
 
+/// Prints a table to standard output: in the width of a terminal, else as Markdown.
+///
+/// # Errors
+/// As [`print`].
+pub fn print_table(table: &Table) -> Result<()> {
+    match console::Term::stdout().size_checked() {
+        Some((_, columns)) => print(&fitted(table, columns.into())),
+        None => print(&table.to_markdown()),
+    }
+}
+
 /// Ends a program that took meshes: with `--json` prints the object of one mesh, or `{"results": […]}` of several;
 /// else says where the files are.
 ///
@@ -246,7 +257,7 @@ fn print_results<T: Serialize>(results: &[T]) -> Result<()> {
     }
 }
 
-/// What a program of several tables prints on standard output: each in Markdown as soon as it is there, with `--json`
+/// What a program of several tables prints on standard output: each as soon as it is there, with `--json`
 /// one object with all of them at the end, or nothing.
 pub enum Printer {
     /// Tables and pages as they come.
@@ -268,7 +279,7 @@ impl Printer {
     /// If standard output cannot be written.
     pub fn table(&mut self, table: &Table) -> Result<()> {
         match self {
-            Printer::Pages => return print(&table.to_markdown()),
+            Printer::Pages => return print_table(table),
             Printer::Json(tables) => {
                 tables.push(json!({ "id": table.id, "title": table.title, "rows": table.to_json() }));
             }

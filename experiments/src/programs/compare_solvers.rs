@@ -109,7 +109,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             arguments.common.remark(format_args!("interactive page: {}", path.display()));
         }
         if !arguments.output.json {
-            cli::print(&table.to_markdown())?;
+            cli::print_table(&table)?;
         }
         let mut objects = study::json(&rows);
         for (object, history) in objects.as_array_mut().into_iter().flatten().zip(histories) {

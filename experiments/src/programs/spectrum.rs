@@ -201,7 +201,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         for table in &tables {
             table.write(out)?;
             if !arguments.output.json {
-                cli::print(&table.to_markdown())?;
+                cli::print_table(table)?;
             }
         }
         if let Some(full) = &findings.full {
@@ -234,7 +234,7 @@ fn complex(input: &Input, arguments: &Arguments) -> Result<Value> {
     for table in found.tables(&subject) {
         table.write(out)?;
         if !arguments.output.json {
-            cli::print(&table.to_markdown())?;
+            cli::print_table(&table)?;
         }
     }
     if arguments.full {

@@ -98,7 +98,7 @@ fn run_sharp(arguments: &Arguments, (scheme, vertex): (LocalScheme, SharpVertex)
         table.write(&arguments.output.out)?;
     }
     if !arguments.output.json {
-        cli::print(&tables[0].to_markdown())?;
+        cli::print_table(&tables[0])?;
     }
     let object = json!({
         "scheme": scheme.name(),
@@ -166,7 +166,7 @@ fn run(arguments: &Arguments, scheme: LocalScheme, valences: &[usize]) -> Result
         table.write(out)?;
     }
     if !arguments.output.json {
-        cli::print(&tables[0].to_markdown())?;
+        cli::print_table(&tables[0])?;
     }
     cli::finish(&[object], &arguments.output, &arguments.common)
 }

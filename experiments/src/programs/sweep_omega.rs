@@ -114,7 +114,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             histories::write(&path, ["method", "omega"], runs)?;
         }
         if !arguments.output.json {
-            cli::print(&table.to_markdown())?;
+            cli::print_table(&table)?;
             cli::print(&study::best(&arguments.method.0, &sweep))?;
         }
         results.push(json(&problem, arguments, (&sweep, &histories), &table));

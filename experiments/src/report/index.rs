@@ -1,48 +1,63 @@
-//! Index page of a folder of reports.
+//! Index page of a folder of reports: a section a question, with its answer, its tables and small pictures.
 
-use limitlab::Result;
-use limitlab::output::write_file;
 use std::fmt::Write as _;
-use std::path::Path;
 
-/// Width of a picture on the page, in pixels of the screen.
-const THUMBNAIL_WIDTH: u32 = 420;
+/// Width of a picture among others, in pixels of the screen.
+const THUMBNAIL_WIDTH: u32 = 240;
 
-/// One table, figure or claim on the page.
+/// A file with the words that stand for it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
-    /// As in `--only ID`.
-    pub id: String,
-    pub title: String,
-    /// Names of its files, relative to the page; the PNG ones are shown.
-    pub files: Vec<String>,
-    /// Which meshes it ran on, in a few words.
-    pub meshes: String,
+pub struct Link {
+    pub text: String,
+    /// Its name, relative to the page.
+    pub file: String,
 }
 
-/// Writes the page `README.md` into the folder `dir`: a heading, an introduction, one list item an entry.
-///
-/// # Errors
-/// [`Error::Io`](limitlab::Error::Io) if it cannot be written.
-pub fn write_index(dir: &Path, title: &str, introduction: &str, entries: &[Entry]) -> Result<()> {
-    let page = index(title, introduction, entries);
-    write_file(&dir.join("README.md"), |out| out.write_all(page.as_bytes()))
+/// What was asked, and what came out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Section {
+    pub question: String,
+    /// Markdown, a line.
+    pub answer: String,
+    /// Pages of tables.
+    pub tables: Vec<Link>,
+    pub pictures: Vec<Link>,
 }
 
-fn index(title: &str, introduction: &str, entries: &[Entry]) -> String {
-    let mut page = format!("# {title}\n\n{introduction}\n\n");
-    for entry in entries {
-        let links: Vec<String> = entry.files.iter().map(|file| format!("[{file}]({})", address(file))).collect();
-        let _ = writeln!(page, "- **{}** (`{}`), {}: {}", entry.title, entry.id, entry.meshes, links.join(", "));
-        for picture in entry.files.iter().filter(|file| file.ends_with(".png")) {
-            let source = address(picture);
-            let _ = writeln!(
-                page,
-                "\n  <a href=\"{source}\"><img src=\"{source}\" width=\"{THUMBNAIL_WIDTH}\" alt=\"{source}\"></a>\n"
-            );
+/// The page: a heading, an introduction in Markdown, the sections.
+pub fn index(title: &str, introduction: &str, sections: &[Section]) -> String {
+    let mut page = format!("# {title}\n\n{introduction}\n");
+    for section in sections {
+        let _ = write!(page, "\n## {}\n\n{}\n", section.question, section.answer);
+        let tables: Vec<String> = section.tables.iter().map(link).collect();
+        for part in [tables.join(" · "), gallery(&section.pictures)] {
+            if !part.is_empty() {
+                let _ = write!(page, "\n{part}\n");
+            }
         }
     }
     page
+}
+
+/// A file as a link in Markdown.
+pub fn link(to: &Link) -> String {
+    format!("[{}]({})", to.text, address(&to.file))
+}
+
+/// Small pictures side by side, as many as fit in a row, each a link to itself: one paragraph of Markdown, empty without any.
+pub fn gallery(pictures: &[Link]) -> String {
+    let picture = |Link { text, file }: &Link| {
+        let source = address(file);
+        let words = text.replace('&', "&amp;").replace('"', "&quot;").replace('<', "&lt;");
+        format!("<a href=\"{source}\"><img src=\"{source}\" width=\"{THUMBNAIL_WIDTH}\" alt=\"{words}\"></a>")
+    };
+    pictures.iter().map(picture).collect::<Vec<_>>().join("\n")
+}
+
+/// The place of a heading within its page, as renderers of Markdown name it.
+pub fn anchor(heading: &str) -> String {
+    let lower = heading.to_lowercase().replace(' ', "-");
+    lower.chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '_')).collect()
 }
 
 /// A file name as an address: what would end a link is encoded.
@@ -64,34 +79,47 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_file_is_linked_and_pictures_are_shown() {
-        let dir = tempfile::tempdir().unwrap();
-        let entries = [
-            Entry {
-                id: "sweep".into(),
-                title: "Sweep over ω".into(),
-                files: vec!["sweep.md".into(), "sweep (a).png".into()],
-                meshes: "torus:16x16".into(),
+    fn questions_have_answers_tables_and_pictures_in_a_row() {
+        let to = |text: &str, file: &str| Link { text: text.into(), file: file.into() };
+        let sections = [
+            Section {
+                question: "Which ω?".into(),
+                answer: "The predicted one.".into(),
+                tables: vec![to("Sweep", "sweep.md"), to("Summary", "sweep--all.md")],
+                pictures: vec![to("a \"b\" < c", "sweep (a).png"), to("d", "d.png")],
             },
-            Entry {
-                id: "claims".into(),
-                title: "Claims".into(),
-                files: vec!["claims.csv".into()],
-                meshes: "all".into(),
+            Section {
+                question: "Why?".into(),
+                answer: "By theorem.".into(),
+                tables: vec![to("Proof", "proof.md")],
+                pictures: vec![],
             },
         ];
-        write_index(dir.path(), "Reports", "On built-in meshes.", &entries).unwrap();
-        let page = std::fs::read_to_string(dir.path().join("README.md")).unwrap();
         let expected = "# Reports
 
 On built-in meshes.
 
-- **Sweep over ω** (`sweep`), torus:16x16: [sweep.md](sweep.md), [sweep (a).png](sweep%20%28a%29.png)
+## Which ω?
 
-  <a href=\"sweep%20%28a%29.png\"><img src=\"sweep%20%28a%29.png\" width=\"420\" alt=\"sweep%20%28a%29.png\"></a>
+The predicted one.
 
-- **Claims** (`claims`), all: [claims.csv](claims.csv)
+[Sweep](sweep.md) · [Summary](sweep--all.md)
+
+<a href=\"sweep%20%28a%29.png\"><img src=\"sweep%20%28a%29.png\" width=\"240\" alt=\"a &quot;b&quot; &lt; c\"></a>
+<a href=\"d.png\"><img src=\"d.png\" width=\"240\" alt=\"d\"></a>
+
+## Why?
+
+By theorem.
+
+[Proof](proof.md)
 ";
-        assert_eq!(page, expected);
+        assert_eq!(index("Reports", "On built-in meshes.", &sections), expected);
+    }
+
+    #[test]
+    fn anchors_are_those_of_renderers() {
+        assert_eq!(anchor("4. \"e^{k+1} < e^k\" depends on the norm"), "4-ek1--ek-depends-on-the-norm");
+        assert_eq!(anchor("2. Thall's ω = ½ always converges"), "2-thalls-ω--½-always-converges");
     }
 }

@@ -4,6 +4,7 @@
 //! about. What it writes is the same, byte for byte, for the same input on the same machine.
 //!
 //! - [`table`]: a [`Table`] of typed columns and its three forms;
+//! - [`mod@fitted`]: a table in the width of a terminal;
 //! - [`columns`]: the columns of a table with what each holds of a record;
 //! - [`mod@compare`]: a fresh table held against a committed CSV file, within each column's tolerance;
 //! - [`figure`]: a grid of panels, drawn as a list of shapes in points and written as an [`Image`] (drawn three times
@@ -14,7 +15,7 @@
 //! - [`render`]: pictures of meshes, points and vectors;
 //! - [`png`]: images and their files;
 //! - [`page`]: one HTML file with interactive plots and a view of surfaces;
-//! - [`index`]: the page that lists what a folder of reports holds.
+//! - [`index`]: the page that leads into a folder of reports, by questions.
 
 mod axis;
 mod bitmap;
@@ -22,6 +23,7 @@ mod canvas;
 pub mod columns;
 pub mod compare;
 pub mod figure;
+pub mod fitted;
 mod frame;
 mod glyphs;
 pub mod index;
@@ -41,6 +43,7 @@ pub use canvas::{Colour, Dash, Marker};
 pub use columns::Columns;
 pub use compare::compare;
 pub use figure::{Figure, Format, Panel};
+pub use fitted::fitted;
 pub use number::readable;
 pub use plot::LinePlot;
 pub use png::{Animation, Image};

@@ -43,11 +43,13 @@ pub enum Kind {
 pub struct Column {
     pub name: String,
     pub kind: Kind,
+    /// Whether a terminal that is too narrow for all columns does without this one.
+    pub(super) is_detail: bool,
 }
 
 impl Column {
     fn new(name: impl Into<String>, kind: Kind) -> Self {
-        Column { name: name.into(), kind }
+        Column { name: name.into(), kind, is_detail: false }
     }
 
     /// A column of [`Kind::Key`].
@@ -79,6 +81,17 @@ impl Column {
     /// A column of [`Kind::Remark`].
     pub fn remark(name: impl Into<String>) -> Self {
         Column::new(name, Kind::Remark)
+    }
+
+    /// The same column as a detail, which a narrow terminal does without.
+    pub fn detail(mut self) -> Self {
+        self.is_detail = true;
+        self
+    }
+
+    /// Whether it identifies rows.
+    pub(super) fn is_key(&self) -> bool {
+        self.kind == Kind::Key
     }
 
     /// The same column with another absolute floor; columns of other kinds have none and stay as they are.
@@ -153,12 +166,15 @@ impl Cell {
         }
     }
 
-    fn markdown(&self, kind: Kind) -> String {
+    /// The cell for people. A number that has fewer digits than its column, a whole one as a rule, has no zeros after them.
+    fn shown(&self, kind: Kind) -> String {
         match (self, kind) {
-            (Cell::Float(value), Kind::Number { digits, .. }) => readable(*value, digits),
+            (Cell::Float(value), Kind::Number { digits, .. }) => {
+                let (all, rounded) = (self.csv(), readable(*value, digits));
+                if value.is_finite() && all.len() < rounded.len() { all } else { rounded }
+            }
             (Cell::Float(value), Kind::Time) => readable(*value, TIME_DIGITS),
-            (Cell::Text(text), _) => escaped(text),
-            _ => self.csv(),
+            _ => self.csv().replace(['\n', '\r'], " "),
         }
     }
 
@@ -196,6 +212,8 @@ pub struct Table {
     pub title: String,
     /// Paragraphs between the title and the table: which meshes, which norm, what deviates.
     pub notes: Vec<String>,
+    /// What stands above the rows where they are many: a table made of them, in Markdown and on terminals only.
+    pub summary: Option<Box<Table>>,
     pub columns: Vec<Column>,
     pub rows: Vec<Vec<Cell>>,
 }
@@ -203,7 +221,7 @@ pub struct Table {
 impl Table {
     /// A table without notes or rows.
     pub fn new(id: impl Into<String>, title: impl Into<String>, columns: Vec<Column>) -> Self {
-        Table { id: id.into(), title: title.into(), notes: Vec::new(), columns, rows: Vec::new() }
+        Table { id: id.into(), title: title.into(), notes: Vec::new(), summary: None, columns, rows: Vec::new() }
     }
 
     /// Adds a paragraph under the title.
@@ -249,16 +267,30 @@ impl Table {
         String::from_utf8(bytes).expect("all cells are UTF-8")
     }
 
-    /// A heading, the notes, and a pipe table with columns of one width, numbers to the right.
+    /// The cells of each row for people.
+    pub(super) fn cells(&self) -> Vec<Vec<String>> {
+        let row = |row: &Vec<Cell>| row.iter().zip(&self.columns).map(|(cell, c)| cell.shown(c.kind)).collect();
+        self.rows.iter().map(row).collect()
+    }
+
+    /// A heading, the notes, the summary if there is one, and a pipe table with columns of one width, numbers to the right.
     pub fn to_markdown(&self) -> String {
-        let body: Vec<Vec<String>> = self
-            .rows
-            .iter()
-            .map(|row| {
-                let cells = row.iter().zip(&self.columns);
-                cells.map(|(cell, c)| cell.markdown(c.kind)).collect()
-            })
-            .collect();
+        let mut text = format!("# {}\n\n", self.title);
+        self.write_body(&mut text);
+        text
+    }
+
+    /// All but the heading.
+    fn write_body(&self, text: &mut String) {
+        for note in &self.notes {
+            let _ = write!(text, "{note}\n\n");
+        }
+        if let Some(summary) = &self.summary {
+            summary.write_body(text);
+            text.push('\n');
+        }
+        let body: Vec<Vec<String>> =
+            self.cells().iter().map(|row| row.iter().map(|cell| escaped(cell)).collect()).collect();
         let header: Vec<String> = self.columns.iter().map(|c| escaped(&c.name)).collect();
         // Three characters hold the shortest rule, `--:`.
         let width = |column: usize| {
@@ -269,30 +301,25 @@ impl Table {
         let widths: Vec<usize> = (0..header.len()).map(width).collect();
         let right: Vec<bool> = (0..header.len()).map(|c| self.is_numeric(c)).collect();
 
-        let mut text = format!("# {}\n\n", self.title);
-        for note in &self.notes {
-            let _ = write!(text, "{note}\n\n");
-        }
         let line = |text: &mut String, cells: &[String]| {
             for ((cell, &width), &right) in cells.iter().zip(&widths).zip(&right) {
                 let _ = if right { write!(text, "| {cell:>width$} ") } else { write!(text, "| {cell:<width$} ") };
             }
             text.push_str("|\n");
         };
-        line(&mut text, &header);
+        line(text, &header);
         for (&width, &right) in widths.iter().zip(&right) {
             let end = if right { ":" } else { "-" };
             let _ = write!(text, "| {}{end} ", "-".repeat(width - 1));
         }
         text.push_str("|\n");
         for row in &body {
-            line(&mut text, row);
+            line(text, row);
         }
-        text
     }
 
     /// Whether a column reads as numbers, to be aligned on the right.
-    fn is_numeric(&self, column: usize) -> bool {
+    pub(super) fn is_numeric(&self, column: usize) -> bool {
         match self.columns[column].kind {
             Kind::Count | Kind::Number { .. } | Kind::Time => true,
             Kind::Key | Kind::Text | Kind::Remark => {
@@ -318,9 +345,17 @@ impl Table {
     /// # Errors
     /// [`Error::Io`] if one of them cannot be written.
     pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>> {
+        self.write_with_page(dir, &self.to_markdown())
+    }
+
+    /// As [`write`](Table::write), with `page` for the Markdown file.
+    ///
+    /// # Errors
+    /// As [`write`](Table::write).
+    pub fn write_with_page(&self, dir: &Path, page: &str) -> Result<Vec<PathBuf>> {
         let (csv, markdown) = (format!("{}.csv", self.id), format!("{}.md", self.id));
         write_file(&dir.join(&csv), |out| self.write_csv(out))?;
-        write_file(&dir.join(&markdown), |out| out.write_all(self.to_markdown().as_bytes()))?;
+        write_file(&dir.join(&markdown), |out| out.write_all(page.as_bytes()))?;
         Ok(vec![csv.into(), markdown.into()])
     }
 }
@@ -375,7 +410,6 @@ fn escaped(text: &str) -> String {
     for c in text.chars() {
         match c {
             '|' | '\\' => out.extend(['\\', c]),
-            '\n' | '\r' => out.push(' '),
             _ => out.push(c),
         }
     }
@@ -451,6 +485,29 @@ On built-in meshes.
 | x\\|y\\\\z |           |            |       NaN |         |
 ";
         assert_eq!(awkward().to_markdown(), expected);
+    }
+
+    #[test]
+    fn numbers_have_no_digits_that_say_nothing() {
+        let mut table = Table::new("t", "T", vec![Column::number("x", 1e-6, 4)]);
+        for x in [10.0, 0.8, 1.0 / 3.0, 1e6, -2.0, 123456.7, 1e-5] {
+            table.push(vec![x.into()]);
+        }
+        let shown: Vec<String> = table.cells().into_iter().flatten().collect();
+        assert_eq!(shown, ["10", "0.8", "0.3333", "1.000e6", "-2", "123457", "1e-5"]);
+    }
+
+    #[test]
+    fn a_summary_stands_between_notes_and_rows() {
+        let mut table = awkward();
+        let mut summary = Table::new("s", "S", vec![Column::text("median")]);
+        summary.note("Medians.");
+        summary.push(vec![12.5.into()]);
+        table.summary = Some(Box::new(summary));
+        let page = table.to_markdown();
+        let between = "On built-in meshes.\n\nMedians.\n\n| median |\n| -----: |\n|   12.5 |\n\n| mesh ";
+        assert!(page.contains(between), "{page}");
+        assert_eq!((table.to_csv(), table.to_json()), (awkward().to_csv(), awkward().to_json()));
     }
 
     #[test]

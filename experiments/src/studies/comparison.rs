@@ -65,11 +65,11 @@ fn columns<'r>() -> Columns<'static, MethodRow<'r>> {
         .col(Column::text("status"), |r| r.solution.report.outcome.name())
         .col(Column::count("iterations"), |r| r.solution.report.iterations)
         .col(Column::number("max_error", 1e-6, 3), |r| r.solution.report.last().max)
-        .col(Column::number("mean_error", 1e-6, 3), |r| r.solution.report.last().mean)
-        .col(Column::number("observed_rate", 1e-3, 4), |r| r.observed_rate)
-        .col(Column::number("predicted_rate", 1e-6, 4), |r| r.predicted_rate)
-        .col(Column::count("fill"), |r| r.solution.fill)
-        .col(Column::time("seconds_setup"), |r| r.solution.setup_seconds)
+        .col(Column::number("mean_error", 1e-6, 3).detail(), |r| r.solution.report.last().mean)
+        .col(Column::number("observed_rate", 1e-3, 4).detail(), |r| r.observed_rate)
+        .col(Column::number("predicted_rate", 1e-6, 4).detail(), |r| r.predicted_rate)
+        .col(Column::count("fill").detail(), |r| r.solution.fill)
+        .col(Column::time("seconds_setup").detail(), |r| r.solution.setup_seconds)
         .col(Column::time("seconds_solve"), |r| r.solution.solve_seconds)
 }
 

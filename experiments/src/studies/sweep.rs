@@ -84,9 +84,9 @@ fn columns() -> Columns<'static, SweepRow> {
         .col(Column::text("status"), |r| r.outcome.name())
         .col(Column::count("iterations"), |r| r.iterations)
         .col(Column::number("predicted_rho", 1e-4, 4), |r| r.predicted_rho)
-        .col(Column::number("predicted_rho_data", 1e-3, 4), |r| r.predicted_rho_data)
-        .col(Column::number("observed_rate", 1e-2, 4), |r| r.observed_rate)
-        .col(Column::number("max_error", 1e-2, 3), |r| r.errors.max)
+        .col(Column::number("predicted_rho_data", 1e-3, 4).detail(), |r| r.predicted_rho_data)
+        .col(Column::number("observed_rate", 1e-2, 4).detail(), |r| r.observed_rate)
+        .col(Column::number("max_error", 1e-2, 3).detail(), |r| r.errors.max)
 }
 
 /// Iterations above, rates below, over ω. Where a run does not converge, an arrowhead at the upper edge says so.

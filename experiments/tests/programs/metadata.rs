@@ -1,9 +1,11 @@
 //! The manifest: what it promises holds for what is locked, and what is packaged.
 
+use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
 
+use super::below;
 use crate::common::root;
 
 /// Standard output of cargo at the root of the project.
@@ -57,18 +59,52 @@ fn the_citation_has_the_version_of_the_manifest() {
     assert_eq!(version, Some(env!("CARGO_PKG_VERSION")));
 }
 
-/// Files that a page links to, without addresses and anchors.
-fn links(page: &str) -> impl Iterator<Item = &str> {
-    let targets = page.split("](").skip(1).filter_map(|rest| rest.split(')').next());
-    targets.filter(|to| !to.contains("://")).filter_map(|to| to.split('#').next()).filter(|to| !to.is_empty())
+/// Where the links and pictures of a page lead to, Markdown's and HTML's, but for other sites.
+fn links(page: &str) -> Vec<&str> {
+    let between =
+        |start: &'static str, end: char| page.split(start).skip(1).filter_map(move |rest| rest.split(end).next());
+    let all = between("](", ')').chain(between("href=\"", '"')).chain(between("src=\"", '"'));
+    all.filter(|to| !to.contains("://")).collect()
+}
+
+/// Places in a page: its headings as renderers name them, and those that are named in HTML.
+fn places(page: &str) -> Vec<String> {
+    let named = page.split("<a id=\"").skip(1).filter_map(|rest| rest.split('"').next()).map(str::to_owned);
+    let of_heading = |line: &str| {
+        let mut place = String::new();
+        for c in line.trim_start_matches('#').trim().chars() {
+            match c {
+                ' ' => place.push('-'),
+                '-' | '_' => place.push(c),
+                _ if c.is_alphanumeric() => place.extend(c.to_lowercase()),
+                _ => {}
+            }
+        }
+        place
+    };
+    page.lines().filter(|line| line.starts_with('#')).map(of_heading).chain(named).collect()
+}
+
+/// Links of a page that lead nowhere.
+fn lost_links(path: &Path) -> Vec<String> {
+    let page = std::fs::read_to_string(path).unwrap();
+    let leads_nowhere = |to: &&str| {
+        let (file, place) = to.split_once('#').unwrap_or((to, ""));
+        let target = if file.is_empty() { path.to_owned() } else { path.parent().unwrap().join(file) };
+        let has_place = || places(&std::fs::read_to_string(&target).unwrap()).iter().any(|p| p == place);
+        !target.exists() || !place.is_empty() && !has_place()
+    };
+    links(&page).into_iter().filter(leads_nowhere).map(|to| format!("{}: {to}", path.display())).collect()
 }
 
 #[test]
-fn links_of_the_pages_lead_to_files() {
+fn links_of_the_pages_lead_to_files_and_places() {
     for page in ["README.md", "CONTRIBUTING.md", "docs/guide.md", "docs/methods.md"] {
         let path = root().join(page);
-        let text = std::fs::read_to_string(&path).unwrap();
-        let lost: Vec<&str> = links(&text).filter(|to| !path.parent().unwrap().join(to).exists()).collect();
-        assert!(links(&text).count() > 0 && lost.is_empty(), "{page}: {lost:?}");
+        assert!(!links(&std::fs::read_to_string(&path).unwrap()).is_empty(), "{page}");
+        assert_eq!(lost_links(&path), [""; 0]);
+    }
+    for file in below(&root().join("reports")).iter().filter(|file| file.ends_with(".md")) {
+        assert_eq!(lost_links(&root().join("reports").join(file)), [""; 0]);
     }
 }

@@ -4,7 +4,6 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crate::cli::{self, Printer, STAND_IN_NOISE};
-use crate::report::index::{self, Entry};
 use crate::report::{Animation, Figure, Format, Table, compare};
 use crate::studies::histories;
 use glam::DVec3;
@@ -23,16 +22,26 @@ use serde_json::{Value as Json, json};
 use crate::programs::reproduce::claims::Record;
 use crate::programs::reproduce::corpus::{List, Model};
 
+use crate::programs::reproduce::pages;
+
 /// One table or figure.
 pub struct Item {
     /// As in `--only ID`, and the stem of its files.
     pub id: &'static str,
     pub title: &'static str,
+    /// What heads its section of the index; none of what the index begins with.
+    pub question: Option<Question>,
     pub run: fn(&mut Context) -> Result<()>,
 }
 
+/// What an item asks, and its answer in a line, which holds on all meshes and names the claims that decide it.
+pub struct Question {
+    pub asks: &'static str,
+    pub answer: &'static str,
+}
+
 /// The folder of the results on stand-ins, within the report folder.
-const BUILT_IN: &str = "built-in";
+pub const BUILT_IN: &str = "built-in";
 
 /// A run of the program.
 pub struct Context {
@@ -49,6 +58,9 @@ pub struct Context {
     pub ledger: Vec<Record>,
     /// What was made since it was last taken.
     pub made: Made,
+    /// Tables that the item at work has made, and the stems of its pictures.
+    tables: Vec<Table>,
+    pictures: Vec<String>,
 }
 
 /// How much an item made.
@@ -155,6 +167,8 @@ impl Context {
             printer,
             ledger: Vec::new(),
             made: Made::default(),
+            tables: Vec::new(),
+            pictures: Vec::new(),
         };
         create_dir(&context.folder())?;
         Ok(context)
@@ -289,16 +303,27 @@ impl Context {
         Ok(subjects)
     }
 
-    /// Writes a table as CSV and Markdown, prints it, and holds it against the one in `--check`.
+    /// Runs an item, and writes its tables, whose pages show its pictures.
     ///
     /// # Errors
-    /// If a file cannot be read or written.
+    /// Those of the item; a file that cannot be written.
+    pub fn run(&mut self, item: &Item) -> Result<()> {
+        (item.run)(self)?;
+        let (tables, pictures) = (std::mem::take(&mut self.tables), std::mem::take(&mut self.pictures));
+        pages::write_tables(&self.folder(), item, &tables, &pictures)
+    }
+
+    /// Takes a table to be written as CSV and as a page, prints it, and holds it against the one in `--check`.
+    ///
+    /// # Errors
+    /// If that file cannot be read.
     pub fn table(&mut self, mut table: Table) -> Result<()> {
         table.notes.insert(0, self.note_on_meshes());
-        table.write(&self.folder())?;
         self.printer.table(&table)?;
         self.note_table(&table);
-        self.compare(&table)
+        self.compare(&table)?;
+        self.tables.push(table);
+        Ok(())
     }
 
     /// Makes a table of wall-clock times where they are wanted: no run repeats them, so that a plain one leaves what is
@@ -339,7 +364,7 @@ impl Context {
     /// # Errors
     /// If it cannot be drawn or written.
     pub fn figure(&mut self, stem: &str, figure: &Figure) -> Result<()> {
-        self.made.figures += 1;
+        self.picture(stem);
         figure.write(&self.folder(), stem, &self.formats)
     }
 
@@ -361,51 +386,29 @@ impl Context {
     /// # Errors
     /// If one cannot be drawn, or the file not written.
     pub fn animation(&mut self, stem: &str, figures: &[Figure]) -> Result<()> {
-        self.made.figures += 1;
+        self.picture(stem);
         let animation =
             Animation { frames: figures.iter().map(Figure::render).collect::<Result<_>>()?, milliseconds: 700 };
         animation.save(&self.folder().join(format!("{stem}.png")))
     }
 
-    /// The page that lists all results.
-    pub fn index(&self) -> PathBuf {
-        self.root.join("README.md")
+    /// Counts a picture, and remembers it for the page of its table.
+    fn picture(&mut self, stem: &str) {
+        self.made.figures += 1;
+        self.pictures.push(stem.to_owned());
     }
 
-    /// Writes the index of all results in the report folder, those of earlier runs too.
+    /// The page that leads to all results.
+    pub fn index(&self) -> PathBuf {
+        self.folder().join(pages::INDEX)
+    }
+
+    /// Writes the index of all results in the folder, those of earlier runs too.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If a file cannot be read or written.
     pub fn write_index(&self, items: &[Item]) -> Result<()> {
-        let mut entries = Vec::new();
-        for (folder, meshes) in [("", "the real models"), (BUILT_IN, "built-in stand-ins")] {
-            let files = listing(&self.root.join(folder))?;
-            for item in items {
-                let own: Vec<String> = files
-                    .iter()
-                    .filter(|f| belongs(f, item.id))
-                    .map(|f| Path::new(folder).join(f).to_string_lossy().into_owned())
-                    .collect();
-                if !own.is_empty() {
-                    entries.push(Entry {
-                        id: item.id.into(),
-                        title: item.title.into(),
-                        files: own,
-                        meshes: meshes.into(),
-                    });
-                }
-            }
-        }
-        index::write_index(
-            &self.root,
-            "Reports",
-            "What `reproduce` wrote: results on the papers' own models here, results on built-in stand-ins in \
-             `built-in/`. Each table is a Markdown file for people and a CSV file for programs; `cargo run --release \
-             -- --only ID` makes one again. [scaling.md](scaling.md), with its profile, threads, steps, edits and decay, \
-             is by the program `scaling`: time and memory over growing meshes, on one machine; ten million vertices \
-             in `ten-million/`.",
-            &entries,
-        )
+        pages::write_index(&self.root, &self.folder(), items)
     }
 
     /// The end of a run: with `--json` its object, in which `claims` are those that were computed; then success, or what differs from
@@ -434,27 +437,4 @@ impl Context {
             ))),
         }
     }
-}
-
-/// Whether `file` is of the item `id`: its stem is the ID, or starts with it and two dashes.
-fn belongs(file: &str, id: &str) -> bool {
-    let stem = file.split('.').next().unwrap_or_default();
-    stem == id || stem.strip_prefix(id).is_some_and(|r| r.starts_with("--"))
-}
-
-/// The names of the files in a folder, sorted; none if it does not exist.
-fn listing(folder: &Path) -> Result<Vec<String>> {
-    if !folder.is_dir() {
-        return Ok(Vec::new());
-    }
-    let refused = |e| Error::io(folder, "read", e);
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(refused)? {
-        let entry = entry.map_err(refused)?;
-        if entry.path().is_file() {
-            names.push(entry.file_name().to_string_lossy().into_owned());
-        }
-    }
-    names.sort();
-    Ok(names)
 }

@@ -12,6 +12,7 @@ mod omega;
 mod open_decay;
 mod open_meshes;
 mod orders;
+mod pages;
 mod pia;
 mod popping;
 mod ripples;
@@ -77,7 +78,7 @@ pub struct Arguments {
 }
 
 /// All items, in the order in which they run.
-const ITEMS: [Item; 17] = [
+const ITEMS: [Item; 18] = [
     pia::TABLE1,
     thall::ITERATIONS,
     zheng_cai::SECTION_3_5,
@@ -91,6 +92,7 @@ const ITEMS: [Item; 17] = [
     popping::POPPING,
     ripples::RIPPLES,
     open_meshes::OPEN_MESHES,
+    open_decay::DECAY,
     darts::DARTS,
     figures::ALL,
     claims::LEDGER,
@@ -153,7 +155,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     for item in &chosen {
         progress.message(item.id);
         let start = Instant::now();
-        (item.run)(&mut context)?;
+        context.run(item)?;
         let new = std::mem::take(&mut context.made);
         progress.line(format_args!("{:width$} {:6.1} s  {new}", item.id, start.elapsed().as_secs_f64()));
         made += &new;

@@ -9,11 +9,19 @@ use limitlab::schemes::Scheme;
 use limitlab::solvers::method::SOR_OMEGA;
 use limitlab::solvers::{Method, Outcome, Stop};
 
-use crate::programs::reproduce::context::{Context, Item, Subject};
+use crate::programs::reproduce::context::{Context, Item, Question, Subject};
 use crate::programs::reproduce::corpus;
 
-pub const SWEEPS: Item =
-    Item { id: "omega-sweeps", title: "Iterations over ω for Jacobi, PIA and SOR, predicted and measured", run };
+pub const SWEEPS: Item = Item {
+    id: "omega-sweeps",
+    title: "Iterations over ω for Jacobi, PIA and SOR, predicted and measured",
+    question: Some(Question {
+        asks: "At which ω is an iteration fastest, and at which does it diverge?",
+        answer: "Where the spectrum says: runs diverge from 2/λ_max on, and are fastest near 2/(λ_min + λ_max), with \
+                 λ_min and λ_max those of the eigenvectors that the data excite.",
+    }),
+    run,
+};
 
 const METHODS: [Method<'static>; 3] =
     [Method::Jacobi { omega: None }, Method::Pia, Method::Sor { omega: SOR_OMEGA, order: None }];

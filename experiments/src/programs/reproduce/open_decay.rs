@@ -1,6 +1,6 @@
 //! Decay of the inverse of A along closed creases, away from them, and across them.
 
-use crate::report::{Column, Columns, Table};
+use crate::report::{Column, Columns};
 use glam::DVec3;
 use limitlab::Result;
 use limitlab::assemble::Stages;
@@ -9,6 +9,19 @@ use limitlab::mesh::features::{SHARP, Tags};
 use limitlab::mesh::{Surface, builtin};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, Stop};
+
+use crate::programs::reproduce::context::{Context, Item, Question};
+
+pub const DECAY: Item = Item {
+    id: "open-decay",
+    title: "Decay of the inverse along, away from and across closed creases",
+    question: Some(Question {
+        asks: "How far does it reach where a point moves beside a crease?",
+        answer: "Along the crease its effect falls by a fixed factor a vertex, and away from it from column to column; \
+                 a smooth point moves no crease and nothing beyond one.",
+    }),
+    run,
+};
 
 /// Rows and columns of the torus; the creases are its columns 0 and SIZE/2.
 const SIZE: usize = 24;
@@ -68,9 +81,13 @@ fn rows_of(scheme: Scheme) -> Result<Vec<Row>> {
     Ok(rows.collect())
 }
 
-/// The table, of all schemes, or of a quick run's.
-pub fn table(quick: bool) -> Result<Table> {
-    let schemes = if quick { &Scheme::ALL[..2] } else { &Scheme::ALL[..] };
+/// All schemes, or two in a quick run.
+fn run(context: &mut Context) -> Result<()> {
+    // The same on any meshes.
+    if context.real() {
+        return Ok(());
+    }
+    let schemes = if context.quick { &Scheme::ALL[..2] } else { &Scheme::ALL[..] };
     let mut rows = Vec::new();
     for &scheme in schemes {
         rows.extend(rows_of(scheme)?);
@@ -84,8 +101,7 @@ pub fn table(quick: bool) -> Result<Table> {
         .col(Column::number("away_ratio", 1e-3, 4), |r| r.away_ratio)
         .col(Column::number("on_creases", 1e-12, 1), |r| r.on_creases)
         .col(Column::number("beyond", 1e-12, 1), |r| r.beyond);
-    let mut table =
-        columns.table("open-decay", "Decay of the inverse along, away from and across closed creases", &rows);
+    let mut table = columns.table(DECAY.id, DECAY.title, &rows);
     table.note(format!(
         "How far control points move where one point moves by 1, on a torus of {SIZE} × {SIZE} quads (triangles for Loop and √3) \
          with two closed creases, which divide it in two. `along`: the point lies on a crease; its vertices at this distance, \
@@ -95,5 +111,5 @@ pub fn table(quick: bool) -> Result<Table> {
          the most at vertices of creases, and on the other side of them: 0, exactly, as curves do not see smooth points, and the \
          two sides see each other through curves only.",
     ));
-    Ok(table)
+    context.table(table)
 }

@@ -6,11 +6,19 @@ use limitlab::analysis::order_study::{OrderRow, order_study, random_spread};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::Stop;
 
-use crate::programs::reproduce::context::{Context, Item, Subject};
+use crate::programs::reproduce::context::{Context, Item, Question, Subject};
 use crate::programs::reproduce::corpus;
 
-pub const ORDERS: Item =
-    Item { id: "orders", title: "Gauss-Seidel and SOR in many vertex orders (open in Zheng-Cai §5)", run };
+pub const ORDERS: Item = Item {
+    id: "orders",
+    title: "Gauss-Seidel and SOR in many vertex orders (open in Zheng-Cai §5)",
+    question: Some(Question {
+        asks: "Does the order of Gauss-Seidel matter?",
+        answer: "For the number of sweeps, never for whether they converge. Colour by colour is the fastest or not \
+                 much behind, and may run in parallel; fronts are the slowest on regular meshes (Z6).",
+    }),
+    run,
+};
 
 const OMEGAS: [f64; 2] = [1.0, 1.1];
 const RANDOM: u64 = 20;

@@ -5,11 +5,18 @@ use crate::report::{Column, Columns, Figure, LinePlot, Rule, Series};
 use limitlab::Result;
 use limitlab::interpolate::lin_luo::surface::{Popping, popping};
 
-use crate::programs::reproduce::context::{Context, Item, Subject};
+use crate::programs::reproduce::context::{Context, Item, Question, Subject};
 use crate::programs::reproduce::corpus;
 
-pub const POPPING: Item =
-    Item { id: "popping", title: "Lin-Luo §5: how far the unified √3 surface shrinks or bulges over α", run };
+pub const POPPING: Item = Item {
+    id: "popping",
+    title: "Lin-Luo §5: how far the unified √3 surface shrinks or bulges over α",
+    question: Some(Question {
+        asks: "How far does Lin and Luo's surface shrink or bulge over α?",
+        answer: "It shrinks at α = 0, bulges at α = 1 and beyond, and keeps the volume at an α in between (L6).",
+    }),
+    run,
+};
 
 /// α in eighths, up to 2.
 const EIGHTHS: std::ops::RangeInclusive<usize> = 0..=16;

@@ -9,12 +9,17 @@ use limitlab::schemes::Scheme;
 use limitlab::schemes::catmull_clark::limit_normals;
 use limitlab::solvers::{Method, Stop};
 
-use crate::programs::reproduce::context::{Context, Item};
+use crate::programs::reproduce::context::{Context, Item, Question};
 use crate::programs::reproduce::corpus;
 
 pub const RIPPLES: Item = Item {
     id: "ripples",
     title: "Interpolation error, fairness energy and normals per iteration, against the fairest surface",
+    question: Some(Question {
+        asks: "Do more iterations make a fairer surface?",
+        answer: "No. The error falls, but the normals of PIA are nearest to those of the fairest surface after few \
+                 iterations; stopping there has the price of the error shown.",
+    }),
     run,
 };
 

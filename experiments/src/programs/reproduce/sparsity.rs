@@ -5,10 +5,19 @@ use limitlab::Result;
 use limitlab::mesh::order::{Order, inverse};
 use limitlab::schemes::Scheme;
 
-use crate::programs::reproduce::context::{Context, Item};
+use crate::programs::reproduce::context::{Context, Item, Question};
 use crate::programs::reproduce::corpus;
 
-pub const PATTERNS: Item = Item { id: "sparsity", title: "The pattern of A before and after reordering", run };
+pub const PATTERNS: Item = Item {
+    id: "sparsity",
+    title: "The pattern of A before and after reordering",
+    question: Some(Question {
+        asks: "What does the order of the vertices do to the pattern of A?",
+        answer: "Reverse Cuthill-McKee gathers its entries in a narrow band; a Morton order gathers most of them, \
+                 with far outliers.",
+    }),
+    run,
+};
 
 const ORDERS: [Order; 4] = [Order::File, Order::Rcm, Order::Morton, Order::Random(1)];
 
@@ -34,9 +43,9 @@ fn run(context: &mut Context) -> Result<()> {
     let mut table = Columns::<(Order, u32)>::new()
         .col(Column::key("mesh"), |_| subject.name.clone())
         .col(Column::key("order"), |(order, _)| order.to_string())
-        .col(Column::text("vertices"), |_| system.len().to_string())
-        .col(Column::text("entries"), |_| pattern.columns().len().to_string())
-        .col(Column::text("bandwidth"), |(_, bandwidth)| bandwidth.to_string())
+        .col(Column::text("vertices"), |_| system.len())
+        .col(Column::text("entries"), |_| pattern.columns().len())
+        .col(Column::text("bandwidth"), |(_, bandwidth)| *bandwidth)
         .table(PATTERNS.id, PATTERNS.title, &bandwidths);
     table.note("Bandwidth: the largest |i − j| of an entry, vertices numbered in the order.");
     context.table(table)?;

@@ -3,12 +3,17 @@
 use limitlab::Result;
 use limitlab::analysis::splitting::{LocalScheme, rows};
 
-use crate::programs::reproduce::context::{Context, Item};
+use crate::programs::reproduce::context::{Context, Item, Question};
 use crate::studies::splitting::{figures, sampled, tables};
 
 pub const LOCAL: Item = Item {
     id: "splitting",
     title: "Splitting matrices, masks and characteristic maps; Lin-Luo's condition over α",
+    question: Some(Question {
+        asks: "Are the papers' splitting matrices, masks and eigenvalue conditions right?",
+        answer: "Most are as printed (T19, T20, T22, T23, L9), some have slips (T9, T21, T24, T31), and Lin and Luo's \
+                 condition fails within the range that they give (L8).",
+    }),
     run,
 };
 

@@ -6,10 +6,18 @@ use limitlab::Result;
 use limitlab::analysis::valence_study::{ValenceRow, regular_band, valence_study};
 use limitlab::schemes::Scheme;
 
-use crate::programs::reproduce::context::{Context, Item};
+use crate::programs::reproduce::context::{Context, Item, Question};
 
-pub const VALENCES: Item =
-    Item { id: "valences", title: "The spectrum against valence: which vertices slow which method", run };
+pub const VALENCES: Item = Item {
+    id: "valences",
+    title: "The spectrum against valence: which vertices slow which method",
+    question: Some(Question {
+        asks: "Which valences slow which method?",
+        answer: "Small ones. The slowest modes of PIA, and those that limit the ω of Jacobi, have their peaks at \
+                 valences 3 and 4 even beside vertices of valence 50.",
+    }),
+    run,
+};
 
 const STUDIED: [usize; 10] = [3, 4, 5, 6, 7, 8, 12, 20, 30, 50];
 const SCHEMES: [Scheme; 2] = [Scheme::CatmullClark, Scheme::Loop];
@@ -31,16 +39,16 @@ fn run(context: &mut Context) -> Result<()> {
     let mut table = Columns::<(Scheme, ValenceRow)>::new()
         .col(Column::key("scheme"), |(scheme, _)| scheme.name())
         .col(Column::key("valence"), |(_, row)| row.valence.to_string())
-        .col(Column::text("vertices"), |(_, row)| row.vertices.to_string())
+        .col(Column::text("vertices"), |(_, row)| row.vertices)
         .col(Column::number("lambda_min", 1e-8, 6), |(_, row)| row.a.first().copied())
         .col(Column::number("jacobi_lambda_min", 1e-8, 6), |(_, row)| row.jacobi.first().copied())
         .col(Column::number("jacobi_lambda_max", 1e-8, 6), |(_, row)| row.jacobi.last().copied())
         .col(Column::count("outside_band_a"), |(_, row)| row.separated_a)
         .col(Column::count("outside_band_jacobi"), |(_, row)| row.separated_jacobi)
         .col(Column::number("slow_mode_near_star", 1e-3, 3).floor(1e-6), |(_, row)| row.slow_pia.near_star)
-        .col(Column::text("slow_mode_peak_valence"), |(_, row)| row.slow_pia.peak_valence.to_string())
+        .col(Column::text("slow_mode_peak_valence"), |(_, row)| row.slow_pia.peak_valence)
         .col(Column::number("limiting_mode_near_star", 1e-3, 3).floor(1e-6), |(_, row)| row.limiting_jacobi.near_star)
-        .col(Column::text("limiting_mode_peak_valence"), |(_, row)| row.limiting_jacobi.peak_valence.to_string())
+        .col(Column::text("limiting_mode_peak_valence"), |(_, row)| row.limiting_jacobi.peak_valence)
         .table(VALENCES.id, VALENCES.title, &records);
     table.note(
         "Two vertices of the valence in a regular surrounding (on quads with the vertices of valence 3 that Euler's \

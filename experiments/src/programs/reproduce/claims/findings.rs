@@ -4,7 +4,7 @@
 use limitlab::Result;
 use limitlab::error::Error;
 
-use super::{Record, shown};
+use super::{Record, in_prose};
 
 /// The page. `{{ID}}` stands for the verdict of a claim, `{{ID|start of a quantity}}` for a number of it.
 const PAGE: &str = include_str!("findings.md");
@@ -46,7 +46,7 @@ fn look_up(name: &str, records: &[Record]) -> Result<String> {
             // The whole name first: "runs" is not "runs that failed".
             let exact = evidence.iter().find(|e| e.quantity == quantity);
             let start = || evidence.iter().find(|e| e.quantity.starts_with(quantity));
-            exact.or_else(start).map(|e| shown(e.value))
+            exact.or_else(start).map(|e| in_prose(e.value))
         }
     };
     found.ok_or_else(|| Error::Computation(format!("the page of findings quotes {name}, which is not in the ledger")))

@@ -5,12 +5,14 @@
 //! - [`lab`]: the meshes and small tools that claims share;
 //! - one file a paper, and beside it one each for subjects of their own: [`thall`], [`zheng_cai`], [`pia`], [`lin_luo`];
 //! - [`open`]: what two of them leave to open meshes;
+//! - [`links`]: claims in pages lead to the ledger;
 //! - [`findings`]: the page on what is settled and what is wrong, filled with the ledger's numbers.
 
 mod finding;
 pub mod findings;
 mod lab;
 mod lin_luo;
+pub mod links;
 mod open;
 mod pia;
 mod pia_catmull_clark;
@@ -21,7 +23,6 @@ mod zheng_cai;
 mod zheng_cai_faces;
 mod zheng_cai_speed;
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde_json::{Value as Json, json};
@@ -33,13 +34,21 @@ use limitlab::output::write_file;
 use limitlab::{Result, names};
 
 use crate::programs::reproduce::context::{Context, Item};
+use crate::report::table::CsvFile;
+
+use crate::programs::reproduce::pages;
 use finding::{Evidence, Finding, Value, Verdict};
 use lab::Lab;
 
-pub const LEDGER: Item = Item { id: "claims", title: "The papers' claims one by one, with verdicts", run: run_ledger };
+pub const LEDGER: Item =
+    Item { id: "claims", title: "The papers' claims one by one, with verdicts", question: None, run: run_ledger };
 
-pub const FINDINGS: Item =
-    Item { id: "findings", title: "Findings: what the papers left open or state wrongly", run: run_findings };
+pub const FINDINGS: Item = Item {
+    id: "findings",
+    title: "Findings: what the papers left open or state wrongly",
+    question: None,
+    run: run_findings,
+};
 
 /// A statement of a paper.
 pub struct Claim {
@@ -100,7 +109,8 @@ fn run_ledger(context: &mut Context) -> Result<()> {
     let folder = context.folder();
     let write = |name: &str, text: &str| write_file(&folder.join(name), |out| out.write_all(text.as_bytes()));
     let page = page(context, &records);
-    write("claims.md", &page)?;
+    let other = [("as CSV", "claims.csv".into()), ("as JSON", "claims.json".into())];
+    write("claims.md", &pages::of_words(&page, &other))?;
     write("claims.csv", &table.to_csv())?;
     write("claims.json", &format!("{:#}\n", json(&records)))?;
     context.printer.page(&page)?;
@@ -121,7 +131,8 @@ fn run_findings(context: &mut Context) -> Result<()> {
         context.ledger = compute(context, all())?;
     }
     let page = findings::page(&context.note_on_meshes(), &context.ledger)?;
-    write_file(&context.folder().join("findings.md"), |out| out.write_all(page.as_bytes()))?;
+    let written = pages::of_words(&page, &[]);
+    write_file(&context.folder().join("findings.md"), |out| out.write_all(written.as_bytes()))?;
     context.made.pages += 1;
     context.printer.page(&page)
 }
@@ -230,27 +241,51 @@ fn source(claim: &Claim) -> String {
     format!("{}, {}", paper(claim), claim.place)
 }
 
+/// How many claims have a verdict, and which, unless they are as printed.
+pub struct Tally {
+    pub verdict: &'static str,
+    pub claims: usize,
+    pub named: Vec<&'static str>,
+}
+
+/// The verdicts that occur, from pairs of a claim and the name of its verdict.
+fn tallies(claims: &[(&'static str, &str)]) -> Vec<Tally> {
+    let tally = |verdict: &Verdict| {
+        let ids: Vec<_> = claims.iter().filter(|claim| claim.1 == verdict.name()).map(|claim| claim.0).collect();
+        let named = if *verdict == Verdict::Reproduced { Vec::new() } else { ids.clone() };
+        Tally { verdict: verdict.name(), claims: ids.len(), named }
+    };
+    Verdict::ALL.iter().map(tally).filter(|tally| tally.claims > 0).collect()
+}
+
+fn tallies_of(records: &[Record]) -> Vec<Tally> {
+    tallies(&records.iter().map(|r| (r.claim.id, r.finding.verdict().name())).collect::<Vec<_>>())
+}
+
+/// The verdicts in the table of a ledger.
+pub fn tallies_in(ledger: &CsvFile) -> Vec<Tally> {
+    let place = |name: &str| ledger.header.iter().position(|column| column == name);
+    let (Some(claim), Some(verdict)) = (place("claim"), place("verdict")) else {
+        return Vec::new();
+    };
+    let rows = ledger.rows.iter().filter_map(|row| Some((find(&row[claim])?.id, row[verdict].as_str())));
+    let mut claims: Vec<_> = rows.collect();
+    // A row a number: those of a claim stand together.
+    claims.dedup();
+    tallies(&claims)
+}
+
 /// How many claims have each verdict, those that occur, as `12 reproduced, 3 corrected`.
 fn counts(records: &[Record]) -> String {
-    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-    for record in records {
-        *counts.entry(record.finding.verdict().name()).or_default() += 1;
-    }
-    let parts = Verdict::ALL.iter().filter_map(|v| counts.get(v.name()).map(|n| format!("{n} {}", v.name())));
+    let parts = tallies_of(records).into_iter().map(|tally| format!("{} {}", tally.claims, tally.verdict));
     parts.collect::<Vec<_>>().join(", ")
 }
 
-/// A line for each verdict that occurs: how many claims have it, and which, unless they are as printed.
+/// A line for each verdict that occurs.
 pub fn verdicts(records: &[Record]) -> String {
     let mut text = String::new();
-    for verdict in Verdict::ALL {
-        let with = records.iter().filter(|r| r.finding.verdict() == verdict);
-        let ids: Vec<&str> = with.map(|r| r.claim.id).collect();
-        if ids.is_empty() {
-            continue;
-        }
-        let named = if verdict == Verdict::Reproduced { String::new() } else { ids.join(" ") };
-        let line = format!("{:5} {:17} {named}", ids.len(), verdict.name());
+    for Tally { verdict, claims, named } in tallies_of(records) {
+        let line = format!("{claims:5} {verdict:17} {}", named.join(" "));
         let _ = writeln!(text, "{}", line.trim_end());
     }
     text
@@ -322,6 +357,16 @@ fn section(Record { claim, finding }: &Record, show: fn(Value) -> String) -> Str
 
 /// A number for people: six digits at most, whole numbers as such.
 fn shown(value: Value) -> String {
+    shown_with(value, 6)
+}
+
+/// A number in a sentence: three digits, and more only where three would make it a whole one, which it is not.
+fn in_prose(value: Value) -> String {
+    let rounded = (3..6).map(|digits| shown_with(value, digits));
+    rounded.into_iter().find(|text| text.contains('.')).unwrap_or_else(|| shown(value))
+}
+
+fn shown_with(value: Value, digits: usize) -> String {
     let x = value.number();
     match value {
         Value::Count(n) => n.to_string(),
@@ -329,7 +374,7 @@ fn shown(value: Value) -> String {
         Value::Number(_) if x.fract() == 0.0 && x.abs() < 1e6 => x.to_string(),
         Value::Number(_) if x.abs() < 1e-3 => readable(x, 2),
         Value::Number(_) => {
-            let text = readable(x, 6);
+            let text = readable(x, digits);
             match text.contains('.') && !text.contains('e') {
                 true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
                 false => text,

@@ -68,3 +68,20 @@ fn numbers_are_shown_with_six_digits_or_two_where_they_are_small() {
     assert_eq!(shown(Value::Count(12)), "12");
     assert_eq!(shown(Value::Time(0.12345)), "0.12");
 }
+
+#[test]
+fn numbers_in_sentences_have_three_digits_unless_that_makes_them_whole() {
+    for (value, text) in [
+        (1.61538, "1.62"),
+        (0.0128811, "0.0129"),
+        (8.1e-15, "8.1e-15"),
+        (0.99961, "0.9996"),
+        (0.999996, "0.999996"),
+        (1703.09, "1703.1"),
+        (12.0, "12"),
+        (0.25, "0.25"),
+    ] {
+        assert_eq!(in_prose(value.into()), text);
+    }
+    assert_eq!(in_prose(Value::Count(1234)), "1234");
+}

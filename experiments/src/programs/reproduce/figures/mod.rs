@@ -20,12 +20,20 @@ use limitlab::mesh::{Mesh, Surface, diagonal};
 use limitlab::schemes::Refinement;
 use limitlab::solvers::{Method, Stop, run as solve};
 
-use crate::programs::reproduce::context::{Context, Item, Subject};
+use crate::programs::reproduce::context::{Context, Item, Question, Subject};
 use crate::programs::reproduce::corpus::Model;
 use stand_ins::StandIn;
 
-pub const ALL: Item =
-    Item { id: "figures", title: "Pictures of the papers' surfaces, of errors and of slow modes", run };
+pub const ALL: Item = Item {
+    id: "figures",
+    title: "Pictures of the papers' surfaces, of errors and of slow modes",
+    question: Some(Question {
+        asks: "What do the papers' surfaces look like?",
+        answer: "Their figures from these computations, then the errors at the vertices and the modes that make a \
+                 method slow. The table says what each picture shows.",
+    }),
+    run,
+};
 
 /// Colours of meshes as they were given, of control meshes, of surfaces.
 const GIVEN: Colour = Colour(236, 224, 200);
