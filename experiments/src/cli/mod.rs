@@ -67,14 +67,20 @@ impl CommonFlags {
 #[derive(Args, Clone, Debug)]
 pub struct StopFlags {
     /// Stop at max_i ‖p_i − (A v)_i‖ ≤ T·L, L the diagonal of the bounding box
-    #[arg(long, value_name = "T", default_value_t = 1e-10, value_parser = positive)]
+    #[arg(long, value_name = "T", default_value_t = StopFlags::default().tol, value_parser = positive)]
     pub tol: f64,
     /// Stop at max_i ‖p_i − (A v)_i‖ ≤ T, in the units of the mesh
     #[arg(long, value_name = "T", value_parser = positive, conflicts_with = "tol")]
     pub tol_absolute: Option<f64>,
     /// Iterations at most
-    #[arg(long, value_name = "K", default_value_t = 10_000)]
+    #[arg(long, value_name = "K", default_value_t = StopFlags::default().max_iter)]
     pub max_iter: usize,
+}
+
+impl Default for StopFlags {
+    fn default() -> Self {
+        StopFlags { tol: 1e-10, tol_absolute: None, max_iter: 10_000 }
+    }
 }
 
 impl StopFlags {

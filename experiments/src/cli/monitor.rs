@@ -8,7 +8,7 @@ use super::CommonFlags;
 use limitlab::solvers::Errors;
 
 /// The flag of programs that iterate.
-#[derive(Args, Clone, Copy, Debug)]
+#[derive(Args, Clone, Copy, Debug, Default)]
 pub struct MonitorFlags {
     /// Say the errors of every iterate on standard error as it comes, a line each and no bar; with --quiet too
     #[arg(long)]

@@ -1,7 +1,7 @@
 //! Every method on the same system, start, norm and tolerance: `compare-solvers [MESH|SYSTEM_DIR…]`.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
@@ -85,7 +85,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let mut results = Vec::new();
     for name in &arguments.meshes {
         let problem = arguments.mesh.problem(name, &arguments.stop, arguments.order, &arguments.common)?;
-        let Compared { rows, refused, measured } = compare(&problem, arguments)?;
+        let Compared { rows, refused, measured } = compare(&problem, &arguments.wanted())?;
         let about = format!(
             "{}; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:e} ({}).",
             problem.subject.size,
@@ -105,8 +105,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             runs.zip(histories.clone().map(Vec::as_slice)),
         )?;
         if let (Some(path), Some(measured)) = (&arguments.html, measured) {
-            page::page(&problem, measured, &rows, refused)?.write(path)?;
-            arguments.common.remark(format_args!("interactive page: {}", path.display()));
+            write(path, &problem, measured, &rows, refused, &arguments.common)?;
         }
         if !arguments.output.json {
             cli::print_table(&table)?;
@@ -120,6 +119,52 @@ fn run(arguments: &Arguments) -> Result<()> {
     cli::finish(&results, &arguments.output, &arguments.common)
 }
 
+/// Writes the interactive page of all methods on one mesh, as `--html` does.
+///
+/// # Errors
+/// As the program has them.
+pub fn write_page(path: &Path, name: &str, mesh: &MeshFlags, common: &CommonFlags) -> Result<()> {
+    let problem = mesh.problem(name, &StopFlags::default(), Order::File, common)?;
+    let wanted = Wanted { methods: None, order: Order::File, page: true, monitor: &MonitorFlags::default(), common };
+    let Compared { rows, refused, measured } = compare(&problem, &wanted)?;
+    measured.map_or(Ok(()), |measured| write(path, &problem, measured, &rows, refused, common))
+}
+
+fn write(
+    path: &Path,
+    problem: &Problem,
+    measured: Measured,
+    rows: &[MethodRow],
+    refused: Option<String>,
+    common: &CommonFlags,
+) -> Result<()> {
+    page::page(problem, measured, rows, refused)?.write(path)?;
+    common.remark(format_args!("interactive page: {}", path.display()));
+    Ok(())
+}
+
+/// What is compared, and what of it is shown.
+struct Wanted<'a> {
+    /// All unless told.
+    methods: Option<&'a [Asked]>,
+    order: Order,
+    page: bool,
+    monitor: &'a MonitorFlags,
+    common: &'a CommonFlags,
+}
+
+impl Arguments {
+    fn wanted(&self) -> Wanted<'_> {
+        Wanted {
+            methods: self.method.as_ref().map(|list| &list.0[..]),
+            order: self.order,
+            page: self.html.is_some(),
+            monitor: &self.monitor,
+            common: &self.common,
+        }
+    }
+}
+
 /// What comes of one mesh or folder.
 struct Compared<'a> {
     /// Their errors in the units of the files.
@@ -130,9 +175,9 @@ struct Compared<'a> {
     measured: Option<Measured>,
 }
 
-fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Compared<'a>> {
-    let asked = match &arguments.method {
-        Some(list) => list.0.clone(),
+fn compare<'a>(problem: &'a Problem, wanted: &Wanted) -> Result<Compared<'a>> {
+    let asked = match wanted.methods {
+        Some(list) => list.to_vec(),
         None => Method::ALL.into_iter().map(Asked::Method).chain([Asked::Auto]).collect(),
     };
     let method = |asked: &Asked| if let Asked::Method(method) = *asked { Some(method) } else { None };
@@ -146,7 +191,7 @@ fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Compared<'
                 let complex = |all: Vec<f64>| all.into_iter().map(Complex::from).collect();
                 Ok(all.map(|all| [complex(all.a), complex(all.jacobi)]))
             };
-            by_methods(problem, system, &spectrum(system)?, eigenvalues, (&methods, auto), arguments)?
+            by_methods(problem, system, &spectrum(system)?, eigenvalues, (&methods, auto), wanted)?
         }
         Matrix::General(system, vertex) => {
             let (left_out, methods): (Vec<_>, Vec<_>) = methods.into_iter().partition(|method| method.needs_symmetry());
@@ -159,14 +204,14 @@ fn compare<'a>(problem: &'a Problem, arguments: &Arguments) -> Result<Compared<'
                     "vertex {vertex} is a dart or semi-sharp, and no diagonal makes the matrix symmetric: left out {}",
                     names.join(", ")
                 );
-                arguments.common.remark(format_args!("{}: {what}", problem.subject.name));
+                wanted.common.remark(format_args!("{}: {what}", problem.subject.name));
                 refused = Some(what);
             }
             let eigenvalues = |spectrum: &ComplexSpectrum| {
                 let of = |form| spectrum.eigenvalues(form).map(<[_]>::to_vec);
                 Ok(of(SymmetricForm::A).zip(of(SymmetricForm::Jacobi)).map(<[_; 2]>::from))
             };
-            by_methods(problem, system, &ComplexSpectrum::new(system)?, eigenvalues, (&methods, auto), arguments)?
+            by_methods(problem, system, &ComplexSpectrum::new(system)?, eigenvalues, (&methods, auto), wanted)?
         }
     };
     for recorded in rows.iter_mut().flat_map(|row| &mut row.solution.report.history) {
@@ -183,14 +228,14 @@ fn by_methods<'a, S: System, K: Spectra + Clone + Sync>(
     spectra: &K,
     eigenvalues: impl FnOnce(&K) -> Result<Option<[Vec<Complex<f64>>; 2]>>,
     (methods, auto): (&[Method<'a>], bool),
-    arguments: &Arguments,
+    wanted: &Wanted,
 ) -> Result<(Vec<MethodRow<'a>>, Option<Measured>)> {
-    let order_name = arguments.order.to_string();
+    let order_name = wanted.order.to_string();
     let lines = entries(system, spectra, methods, Some(&problem.order), &order_name)?;
     let subject = &problem.subject.name;
-    let of_rows = Progress::new(subject, lines.len() + usize::from(auto), arguments.monitor.no_bar(&arguments.common));
+    let of_rows = Progress::new(subject, lines.len() + usize::from(auto), wanted.monitor.no_bar(wanted.common));
     let see = |name: &str, iteration, errors: Errors| {
-        arguments.monitor.see(format_args!("{subject}: {name}"), iteration, errors * problem.scale);
+        wanted.monitor.see(format_args!("{subject}: {name}"), iteration, errors * problem.scale);
         ControlFlow::Continue(())
     };
     let mut rows = Vec::new();
@@ -209,10 +254,10 @@ fn by_methods<'a, S: System, K: Spectra + Clone + Sync>(
         of_rows.step();
     }
     drop(of_rows);
-    if arguments.html.is_none() {
+    if !wanted.page {
         return Ok((rows, None));
     }
-    let of_page = Progress::new(subject, page::steps(&rows), arguments.common.quiet);
+    let of_page = Progress::new(subject, page::steps(&rows), wanted.common.quiet);
     let measured = page::measure(problem, system, spectra, eigenvalues(spectra)?, &rows, &of_page)?;
     Ok((rows, Some(measured)))
 }

@@ -5,9 +5,13 @@ use tempfile::tempdir;
 
 use super::*;
 
-/// Runs the program with a page, and gives its data and its JSON object.
+/// Runs `compare-solvers` with a page, and gives its data and its JSON object.
 fn page(folder: &Path, arguments: &[&str]) -> (Value, Value) {
-    let output = run(COMPARE, folder, [arguments, &["--html", "page.html", "--json", "--quiet"]].concat());
+    page_of(COMPARE, folder, arguments)
+}
+
+fn page_of(program: &str, folder: &Path, arguments: &[&str]) -> (Value, Value) {
+    let output = run(program, folder, [arguments, &["--html", "page.html", "--json", "--quiet"]].concat());
     assert_done(&output, &arguments.join(" "));
     let html = fs::read_to_string(folder.join("page.html")).unwrap();
     assert!(html.len() < limitlab_experiments::report::page::LIMIT, "{} bytes", html.len());
@@ -218,4 +222,17 @@ fn a_hostile_name_stays_a_name() {
     assert_eq!(data["title"], format!("{name} under loop"));
     let html = fs::read_to_string(folder.path().join("page.html")).unwrap();
     assert_eq!((html.matches("<script").count(), html.contains("alert(1)<")), (2, false));
+}
+
+#[test]
+fn reproduce_writes_the_page_of_the_horse() {
+    let folder = tempdir().unwrap();
+    let (mut by_reproduce, _) = page_of(REPRODUCE, folder.path(), &["--only", "T8"]);
+    let (mut compared, _) = page(folder.path(), &["irregular-tri:233", "--noise", "0.1"]);
+    for data in [&mut by_reproduce, &mut compared] {
+        for row in data["rows"].as_array_mut().unwrap() {
+            assert!(row.as_object_mut().unwrap().remove("seconds").is_some());
+        }
+    }
+    assert!(by_reproduce == compared);
 }

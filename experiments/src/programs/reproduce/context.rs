@@ -10,7 +10,7 @@ use glam::DVec3;
 use limitlab::Result;
 use limitlab::assemble::LimitSystem;
 use limitlab::error::Error;
-use limitlab::mesh::noise::add_noise;
+use limitlab::mesh::noise::{Noise, add_noise};
 use limitlab::mesh::validate::{Boundary, Validation};
 use limitlab::mesh::{Surface, builtin, io};
 use limitlab::output::create_dir;
@@ -217,6 +217,14 @@ impl Context {
     /// If it is missing, or invalid under its treatment of the boundary.
     pub fn model(&self, model: &Model) -> Result<Subject> {
         self.read(model.file, model.boundary)
+    }
+
+    /// A model as a MESH of the other programs: its file, or its stand-in and the noise of stand-ins.
+    pub fn argument(&self, model: &Model) -> (String, Option<Noise>) {
+        match &self.models {
+            Some(folder) => (folder.join(model.file).display().to_string(), None),
+            None => (model.stand_in.to_owned(), Some(STAND_IN_NOISE)),
+        }
     }
 
     /// The files of a folder of models, by name.

@@ -31,10 +31,12 @@ use std::time::Instant;
 use clap::Parser;
 use serde_json::json;
 
-use crate::cli::{self, CommonFlags, FigureFlags, Printer, Progress};
+use crate::cli::{self, CommonFlags, FigureFlags, MeshFlags, Printer, Progress};
+use crate::programs::compare_solvers;
 use claims::Claim;
 use context::{Context, Item, Made};
 use limitlab::error::Error;
+use limitlab::output::check_target;
 use limitlab::{Result, names};
 
 /// Regenerates the papers' tables and figures with what this workbench measures beside what they print.
@@ -62,6 +64,10 @@ pub struct Arguments {
     /// A subset of the rows, within a minute
     #[arg(long)]
     quick: bool,
+    /// Write an interactive page too, of every method on the horse or on what stands in for it; it needs a browser and no
+    /// network
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
     /// Write the tables of wall-clock times too (ID--times), which differ from run to run
     #[arg(long)]
     times: bool,
@@ -138,6 +144,9 @@ fn run(arguments: &Arguments) -> Result<()> {
             return Err(Error::Unknown(format!("no item or claim is called \"{id}\"{perhaps}; see reproduce --list")));
         }
     }
+    if let Some(path) = &arguments.html {
+        check_target(path)?;
+    }
     let mut context = Context::new(
         &arguments.out,
         arguments.meshes.as_deref(),
@@ -167,6 +176,11 @@ fn run(arguments: &Arguments) -> Result<()> {
         progress.step();
     }
     drop(progress);
+    if let Some(path) = &arguments.html {
+        let (name, noise) = context.argument(&corpus::HORSE);
+        let mesh = MeshFlags { noise, ..MeshFlags::default() };
+        compare_solvers::write_page(path, &name, &mesh, &arguments.common)?;
+    }
     if !chosen.is_empty() {
         context.write_index(&ITEMS)?;
     }
