@@ -100,15 +100,23 @@ pub fn abandon() -> Vec<PathBuf> {
     complete
 }
 
+/// The files with other content that those of this process took the place of, in order.
+pub fn replaced() -> Vec<PathBuf> {
+    ledger().replaced.clone()
+}
+
 /// What this process has put on the disk.
 struct Ledger {
     temporary: Vec<PathBuf>,
     complete: Vec<PathBuf>,
+    /// Of `complete`, those that took the place of a file with other content.
+    replaced: Vec<PathBuf>,
 }
 
 /// The one ledger. It is locked while a temporary file comes and while it goes, so that it always tells the truth.
 fn ledger() -> MutexGuard<'static, Ledger> {
-    static LEDGER: Mutex<Ledger> = Mutex::new(Ledger { temporary: Vec::new(), complete: Vec::new() });
+    static LEDGER: Mutex<Ledger> =
+        Mutex::new(Ledger { temporary: Vec::new(), complete: Vec::new(), replaced: Vec::new() });
     LEDGER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -249,13 +257,23 @@ impl Temporary {
 
     fn rename(self, target: &Path) -> io::Result<()> {
         let mut ledger = ledger();
+        let is_first = !ledger.complete.iter().any(|known| known == target);
+        let replaces = is_first && target.exists() && !is_same(&self.path, target).unwrap_or(false);
         fs::rename(&self.path, target)?;
         ledger.forget(&self.path);
-        if !ledger.complete.iter().any(|known| known == target) {
+        if is_first {
             ledger.complete.push(target.to_path_buf());
+        }
+        if replaces {
+            ledger.replaced.push(target.to_path_buf());
         }
         Ok(())
     }
+}
+
+/// Whether two files hold the same bytes.
+fn is_same(a: &Path, b: &Path) -> io::Result<bool> {
+    Ok(fs::metadata(a)?.len() == fs::metadata(b)?.len() && fs::read(a)? == fs::read(b)?)
 }
 
 impl Ledger {

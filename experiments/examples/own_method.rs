@@ -10,6 +10,7 @@ use limitlab::assemble::LimitSystem;
 use limitlab::mesh::{Surface, builtin, noise::move_vertices};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Errors, Failure, Iterate, Method, Stop, system::Rows};
+use limitlab_experiments::report::Provenance;
 use limitlab_experiments::studies::comparison::{figure, table};
 use nalgebra_sparse::CsrMatrix;
 
@@ -52,7 +53,8 @@ pub fn run(out: &Path) -> limitlab::Result<Vec<MethodRow<'static>>> {
     let rows = compare(&system, &spectrum, (points, points), &lines, &[mine], &stop, &mut || ())?;
     println!("{}", table("own".into(), "My method".into(), "A torus.".into(), &rows).to_markdown());
     limitlab::output::create_dir(out)?;
-    figure("My method".into(), "mesh units", &rows).render()?.save(&out.join("own_method.png"))?;
+    let made = Provenance { program: "own_method".into(), ..Provenance::default() };
+    figure("My method".into(), "mesh units", &rows).render()?.save(&out.join("own_method.png"), &made)?;
     let grid = vec![(Method::Pia, (1..=20).map(|k| f64::from(k) / 10.0).collect())];
     let found =
         sweep((&system, &spectrum), (points, points), &grid, None, &stop, rounding_floor(surface.diagonal()), &|_| ())?;

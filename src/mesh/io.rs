@@ -38,6 +38,8 @@ pub struct Loaded {
     pub attributes: Attributes,
     /// The scheme that the file is made for, if it says that. USD only.
     pub subdivision: Option<Subdivision>,
+    /// CRC-32 of the bytes of the file, as zlib has it; `None` from the readers of one format.
+    pub checksum: Option<u32>,
     /// What a user should know, a sentence each: above all what the file holds and the mesh does not keep.
     pub remarks: Vec<String>,
 }
@@ -80,6 +82,15 @@ pub struct WriteOptions<'a> {
     pub attributes: Option<&'a Attributes>,
     /// PLY as text; the other formats always are.
     pub ascii: bool,
+    /// Lines without line ends that stand near the top of the file, for people.
+    pub comments: &'a [String],
+}
+
+impl WriteOptions<'_> {
+    /// Writes each comment as a line that opens with `sign`.
+    pub(crate) fn write_comments(&self, out: &mut dyn Write, sign: &str) -> io::Result<()> {
+        self.comments.iter().try_for_each(|comment| writeln!(out, "{sign} {comment}"))
+    }
 }
 
 impl FromStr for Format {
@@ -161,12 +172,13 @@ impl Format {
     }
 
     fn parse(self, bytes: &[u8], path: &Path) -> Result<Loaded> {
-        match self {
+        let loaded = match self {
             Format::Obj => obj::read_bytes(bytes, path),
             Format::Off => off::read_bytes(bytes, path),
             Format::Ply => ply::read_bytes(bytes, path),
             Format::Usd => usd::read_bytes(bytes, path),
-        }
+        }?;
+        Ok(Loaded { checksum: Some(crc32fast::hash(bytes)), ..loaded })
     }
 }
 
@@ -261,9 +273,8 @@ pub fn write_control(path: &Path, mesh: &Mesh, options: &WriteOptions) -> Result
 pub fn write_control_to(out: &mut dyn Write, format: Format, mesh: &Mesh, options: &WriteOptions) -> io::Result<()> {
     match format {
         Format::Obj => obj::write_control_to(out, mesh, options),
-        Format::Off => off::write_to(out, mesh, options.normals),
-        Format::Ply if options.ascii => ply::write_text_to(out, mesh, options.normals),
-        Format::Ply => ply::write_to(out, mesh, options.normals),
+        Format::Off => off::write_control_to(out, mesh, options),
+        Format::Ply => ply::write_control_to(out, mesh, options),
         Format::Usd => usd::write_control_to(out, mesh, options),
     }
 }
@@ -429,6 +440,7 @@ impl Builder {
             tags: FileTags::default(),
             attributes: Attributes::default(),
             subdivision: None,
+            checksum: None,
             remarks,
         }
     }

@@ -476,6 +476,7 @@ pub fn write_control_to(out: &mut dyn Write, mesh: &Mesh, options: &WriteOptions
     check_normals(mesh, normals);
     let none = Attributes::default();
     let attributes = attributes.unwrap_or(&none);
+    options.write_comments(out, "#")?;
     write_rows(out, mesh.len(), |text, v| {
         text.extend_from_slice(b"v ");
         push_point(text, mesh.positions[v])

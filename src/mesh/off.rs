@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::Mesh;
-use super::io::{Builder, Lines, Loaded, check_normals, write_text_rows};
+use super::io::{Builder, Lines, Loaded, WriteOptions, check_normals, write_text_rows};
 use super::magic::other_kind;
 use crate::text::{Scanner, quoted};
 use crate::{Error, Result};
@@ -310,9 +310,19 @@ fn numbers_to_line_end(s: &mut Scanner, mut each: impl FnMut(f64)) -> Result<()>
 /// # Panics
 /// If there are not as many normals as vertices.
 pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<()> {
+    write_control_to(out, mesh, &WriteOptions { normals, ..WriteOptions::default() })
+}
+
+/// As [`write_to`], with comments after the first line.
+///
+/// # Panics
+/// If there are not as many normals as vertices.
+pub fn write_control_to(out: &mut dyn Write, mesh: &Mesh, options: &WriteOptions) -> io::Result<()> {
+    let normals = options.normals;
     check_normals(mesh, normals);
-    let word = if normals.is_some() { "NOFF" } else { "OFF" };
-    writeln!(out, "{word}\n{} {} 0", mesh.len(), mesh.faces.len())?;
+    writeln!(out, "{}", if normals.is_some() { "NOFF" } else { "OFF" })?;
+    options.write_comments(out, "#")?;
+    writeln!(out, "{} {} 0", mesh.len(), mesh.faces.len())?;
     write_text_rows(out, mesh, normals)
 }
 

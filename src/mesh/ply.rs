@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::Mesh;
-use super::io::{Builder, Lines, Loaded, check_normals, write_text_rows};
+use super::io::{Builder, Lines, Loaded, WriteOptions, check_normals, write_text_rows};
 use crate::Result;
 use crate::text::Scanner;
 
@@ -168,7 +168,19 @@ fn first_of<T: AsRef<str>>(names: &[T], separator: &str) -> String {
 /// # Panics
 /// If there are not as many normals as vertices.
 pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<()> {
-    let short = write_header(out, "binary_little_endian", mesh, normals)?;
+    write_control_to(out, mesh, &WriteOptions { normals, ..WriteOptions::default() })
+}
+
+/// As [`write_to`], or [`write_text_to`] where text is asked for, with comments in the header.
+///
+/// # Panics
+/// If there are not as many normals as vertices.
+pub fn write_control_to(out: &mut dyn Write, mesh: &Mesh, options: &WriteOptions) -> io::Result<()> {
+    let short = write_header(out, mesh, options)?;
+    let normals = options.normals;
+    if options.ascii {
+        return write_text_rows(out, mesh, normals);
+    }
     let mut row = Vec::new();
     let push_point = |row: &mut Vec<u8>, p: DVec3| {
         for coordinate in p.to_array() {
@@ -200,21 +212,23 @@ pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> 
 /// # Panics
 /// If there are not as many normals as vertices.
 pub fn write_text_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<()> {
-    write_header(out, "ascii", mesh, normals)?;
-    write_text_rows(out, mesh, normals)
+    write_control_to(out, mesh, &WriteOptions { normals, ascii: true, ..WriteOptions::default() })
 }
 
 /// Writes the header. Whether a byte holds the size of every face.
-fn write_header(out: &mut dyn Write, format: &str, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<bool> {
-    check_normals(mesh, normals);
+fn write_header(out: &mut dyn Write, mesh: &Mesh, options: &WriteOptions) -> io::Result<bool> {
+    check_normals(mesh, options.normals);
     let faces = &mesh.faces;
     // The usual types unless something does not fit them.
     let short = faces.iter().all(|f| f.len() <= usize::from(u8::MAX));
     let length = if short { "uchar" } else { "uint" };
     let fits_int = faces.corners().iter().all(|&v| i32::try_from(v).is_ok());
     let index = if fits_int { "int" } else { "uint" };
-    let coordinates = if normals.is_some() { 6 } else { 3 };
-    write!(out, "ply\nformat {format} 1.0\nelement vertex {}\n", mesh.len())?;
+    let coordinates = if options.normals.is_some() { 6 } else { 3 };
+    let format = if options.ascii { "ascii" } else { "binary_little_endian" };
+    writeln!(out, "ply\nformat {format} 1.0")?;
+    options.write_comments(out, "comment")?;
+    writeln!(out, "element vertex {}", mesh.len())?;
     for name in &COORDINATES[..coordinates] {
         writeln!(out, "property double {name}")?;
     }

@@ -101,7 +101,9 @@ pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> 
 pub fn write_control_to(out: &mut dyn Write, mesh: &Mesh, options: &WriteOptions) -> io::Result<()> {
     let &WriteOptions { normals, subdivision, tags, .. } = options;
     check_normals(mesh, normals);
-    out.write_all(b"#usda 1.0\n(\n    defaultPrim = \"mesh\"\n)\n\ndef Mesh \"mesh\"\n{\n")?;
+    out.write_all(b"#usda 1.0\n")?;
+    options.write_comments(out, "#")?;
+    out.write_all(b"(\n    defaultPrim = \"mesh\"\n)\n\ndef Mesh \"mesh\"\n{\n")?;
     writeln!(out, "    uniform token subdivisionScheme = \"{subdivision}\"")?;
     if let Some(rule) = tags.and_then(|tags| boundary_token(tags.boundary)) {
         writeln!(out, "    uniform token interpolateBoundary = \"{rule}\"")?;

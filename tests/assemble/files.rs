@@ -33,18 +33,18 @@ fn matrices_and_arrays_read_back_bit_by_bit() {
         for seed in 0..10 {
             let mesh = scattered(&small_mesh(scheme, seed), seed);
             let system = system(&mesh, scheme);
-            let path = write(folder.path(), "A.mtx", |out| matrix_market::write_general(&system.a, out));
+            let path = write(folder.path(), "A.mtx", |out| matrix_market::write_general(&system.a, &[], out));
             assert_reads_back(&path, &system.a);
-            let path = write(folder.path(), "M.mtx", |out| matrix_market::write_symmetric(&system.m, out));
+            let path = write(folder.path(), "M.mtx", |out| matrix_market::write_symmetric(&system.m, &[], out));
             let text = std::fs::read_to_string(&path).unwrap();
             assert!(text.starts_with("%%MatrixMarket matrix coordinate real symmetric\n"));
             let lower = (0..mesh.len()).flat_map(|i| system.m.row(i).filter(move |e| e.0 <= i)).count();
             assert_eq!(text.lines().count(), 2 + lower);
             assert_reads_back(&path, &system.m);
 
-            let path = write(folder.path(), "H.mtx", |out| matrix_market::write_vector(&system.h, out));
+            let path = write(folder.path(), "H.mtx", |out| matrix_market::write_vector(&system.h, &[], out));
             assert_eq!(read_array(&path), vec![system.h.clone()]);
-            let path = write(folder.path(), "P.mtx", |out| matrix_market::write_points(&mesh.positions, out));
+            let path = write(folder.path(), "P.mtx", |out| matrix_market::write_points(&mesh.positions, &[], out));
             let columns: Vec<Vec<f64>> = (0..3).map(|axis| mesh.positions.iter().map(|p| p[axis]).collect()).collect();
             assert_eq!(read_array(&path), columns);
         }

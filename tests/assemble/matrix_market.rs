@@ -59,10 +59,10 @@ fn systems_read_back_bit_by_bit() {
             let system = system(&mesh, scheme);
             let folder = tempdir().unwrap();
             let path = |name: &str| folder.path().join(name);
-            write_file(&path("A.mtx"), |out| write_general(&system.a, out)).unwrap();
-            write_file(&path("M.mtx"), |out| write_symmetric(&system.m, out)).unwrap();
-            write_file(&path("H.mtx"), |out| write_vector(&system.h, out)).unwrap();
-            write_file(&path("P.mtx"), |out| write_points(&mesh.positions, out)).unwrap();
+            write_file(&path("A.mtx"), |out| write_general(&system.a, &[], out)).unwrap();
+            write_file(&path("M.mtx"), |out| write_symmetric(&system.m, &[], out)).unwrap();
+            write_file(&path("H.mtx"), |out| write_vector(&system.h, &[], out)).unwrap();
+            write_file(&path("P.mtx"), |out| write_points(&mesh.positions, &[], out)).unwrap();
             assert_eq!(read_matrix(&path("A.mtx")).unwrap(), system.a);
             let (read, points) = read_system(folder.path()).unwrap();
             assert_eq!(
@@ -311,7 +311,7 @@ fn damaged_files_are_read_or_refused() {
                 read += 1;
                 assert!(m.values().iter().all(|v| v.is_finite()));
                 let again = file.folder.path().join("again.mtx");
-                write_file(&again, |out| write_general(&m, out)).unwrap();
+                write_file(&again, |out| write_general(&m, &[], out)).unwrap();
                 assert_eq!(read_matrix(&again).unwrap(), m);
             }
             error => drop(refused(error)),

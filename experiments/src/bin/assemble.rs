@@ -2,10 +2,10 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
-use limitlab_experiments::programs::assemble::{self, Arguments};
+use limitlab_experiments::cli;
+use limitlab_experiments::programs::assemble;
 
 fn main() -> ExitCode {
-    assemble::main(Arguments::parse())
+    let (arguments, provenance) = cli::parse();
+    assemble::main(arguments, provenance)
 }

@@ -2,10 +2,10 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
-use limitlab_experiments::programs::compare_solvers::{self, Arguments};
+use limitlab_experiments::cli;
+use limitlab_experiments::programs::compare_solvers;
 
 fn main() -> ExitCode {
-    compare_solvers::main(Arguments::parse())
+    let (arguments, provenance) = cli::parse();
+    compare_solvers::main(arguments, provenance)
 }

@@ -2,10 +2,10 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
-use limitlab_experiments::programs::interpolate::{self, Arguments};
+use limitlab_experiments::cli;
+use limitlab_experiments::programs::interpolate;
 
 fn main() -> ExitCode {
-    interpolate::main(Arguments::parse())
+    let (arguments, provenance) = cli::parse();
+    interpolate::main(arguments, provenance)
 }

@@ -2,10 +2,10 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use peak_alloc::PeakAlloc;
 
-use limitlab_experiments::cli::VERSION;
+use limitlab_experiments::cli::{self, VERSION};
 use limitlab_experiments::programs::{
     assemble, compare_solvers, interpolate, reproduce, scaling, spectrum, splitting, sweep_omega,
 };
@@ -37,14 +37,19 @@ enum Program {
 }
 
 fn main() -> ExitCode {
-    match Front::parse().program {
-        Program::Interpolate(arguments) => interpolate::main(arguments),
-        Program::CompareSolvers(arguments) => compare_solvers::main(arguments),
-        Program::SweepOmega(arguments) => sweep_omega::main(arguments),
-        Program::Spectrum(arguments) => spectrum::main(arguments),
-        Program::Splitting(arguments) => splitting::main(arguments),
-        Program::Assemble(arguments) => assemble::main(arguments),
-        Program::Reproduce(arguments) => reproduce::main(arguments),
-        Program::Scaling(arguments) => scaling::main(arguments),
+    let mut command = Front::command();
+    let matches = command.get_matches_mut();
+    let program = Front::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit()).program;
+    let chosen = matches.subcommand().and_then(|(name, of)| Some((command.find_subcommand(name)?, of)));
+    let provenance = chosen.map(|(program, of)| cli::provenance(program, of)).unwrap_or_default();
+    match program {
+        Program::Interpolate(arguments) => interpolate::main(arguments, provenance),
+        Program::CompareSolvers(arguments) => compare_solvers::main(arguments, provenance),
+        Program::SweepOmega(arguments) => sweep_omega::main(arguments, provenance),
+        Program::Spectrum(arguments) => spectrum::main(arguments, provenance),
+        Program::Splitting(arguments) => splitting::main(arguments, provenance),
+        Program::Assemble(arguments) => assemble::main(arguments, provenance),
+        Program::Reproduce(arguments) => reproduce::main(arguments, provenance),
+        Program::Scaling(arguments) => scaling::main(arguments, provenance),
     }
 }

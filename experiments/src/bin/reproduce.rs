@@ -2,10 +2,10 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
-use limitlab_experiments::programs::reproduce::{self, Arguments};
+use limitlab_experiments::cli;
+use limitlab_experiments::programs::reproduce;
 
 fn main() -> ExitCode {
-    reproduce::main(Arguments::parse())
+    let (arguments, provenance) = cli::parse();
+    reproduce::main(arguments, provenance)
 }

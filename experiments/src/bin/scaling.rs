@@ -2,15 +2,16 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use peak_alloc::PeakAlloc;
 
-use limitlab_experiments::programs::scaling::{self, Arguments};
+use limitlab_experiments::cli;
+use limitlab_experiments::programs::scaling;
 
 /// What `scaling` reads the heap from.
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
 
 fn main() -> ExitCode {
-    scaling::main(Arguments::parse())
+    let (arguments, provenance) = cli::parse();
+    scaling::main(arguments, provenance)
 }

@@ -2,10 +2,10 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
-use limitlab_experiments::programs::spectrum::{self, Arguments};
+use limitlab_experiments::cli;
+use limitlab_experiments::programs::spectrum;
 
 fn main() -> ExitCode {
-    spectrum::main(Arguments::parse())
+    let (arguments, provenance) = cli::parse();
+    spectrum::main(arguments, provenance)
 }

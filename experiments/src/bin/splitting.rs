@@ -2,10 +2,10 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
-use limitlab_experiments::programs::splitting::{self, Arguments};
+use limitlab_experiments::cli;
+use limitlab_experiments::programs::splitting;
 
 fn main() -> ExitCode {
-    splitting::main(Arguments::parse())
+    let (arguments, provenance) = cli::parse();
+    splitting::main(arguments, provenance)
 }

@@ -2,10 +2,10 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
-use limitlab_experiments::programs::sweep_omega::{self, Arguments};
+use limitlab_experiments::cli;
+use limitlab_experiments::programs::sweep_omega;
 
 fn main() -> ExitCode {
-    sweep_omega::main(Arguments::parse())
+    let (arguments, provenance) = cli::parse();
+    sweep_omega::main(arguments, provenance)
 }

@@ -8,7 +8,9 @@ use clap::Args;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::{CommonFlags, StopFlags, advice};
+use super::{CommonFlags, StopFlags, advice, print_results};
+use crate::report::Provenance;
+use crate::report::provenance::Source;
 use limitlab::assemble::Stages;
 use limitlab::error::{Error, Result, short};
 use limitlab::interpolate::solver::require_memory;
@@ -76,6 +78,8 @@ pub struct Input {
     /// Where the file's own points lie: all lengths of this mesh times [`Frame::scale`] are in mesh units.
     pub frame: Frame,
     pub scheme: Scheme,
+    /// CRC-32 of the bytes of the file, or of the label of a built-in mesh.
+    pub checksum: u32,
     /// What is sharp, by the file and by the flags. The rule of the boundary is to refuse it where there is none.
     pub tags: Tags,
     /// What the file says of its faces beyond what is computed with.
@@ -149,6 +153,7 @@ impl MeshFlags {
             tags: FileTags::default(),
             attributes: Attributes::default(),
             subdivision: None,
+            checksum: None,
             remarks: Vec::new(),
         })
     }
@@ -158,16 +163,21 @@ impl MeshFlags {
     ///
     /// # Errors
     /// As [`load`](Self::load); if standard output cannot be written.
-    pub fn print_defects<N: AsRef<str>>(&self, names: &[N], common: &CommonFlags) -> Result<bool> {
+    pub fn print_defects<N: AsRef<str>>(
+        &self,
+        names: &[N],
+        common: &CommonFlags,
+        provenance: &Provenance,
+    ) -> Result<bool> {
         if !self.defects {
             return Ok(false);
         }
         let mut results = Vec::with_capacity(names.len());
         for name in names {
             let loaded = self.loaded(name.as_ref(), common)?;
-            results.push(validate(&loaded.mesh, numbers(&loaded.lines), self.rule(&loaded.tags)));
+            results.push(json!(validate(&loaded.mesh, numbers(&loaded.lines), self.rule(&loaded.tags))));
         }
-        super::print_results(&results)?;
+        print_results(results, provenance)?;
         Ok(true)
     }
 
@@ -191,7 +201,7 @@ impl MeshFlags {
         let loaded = self.loaded(name, common)?;
         let read_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let Loaded { name, mesh, mut lines, tags, mut attributes, subdivision, .. } = loaded;
+        let Loaded { name, mesh, mut lines, tags, mut attributes, subdivision, checksum, .. } = loaded;
         let name = &name[..];
         let rule = self.rule(&tags);
         let (mesh, origin, repairs) = self.mended(name, mesh, &mut lines, &mut attributes, rule, common);
@@ -224,6 +234,7 @@ impl MeshFlags {
         };
         Ok(Input {
             name: name.to_owned(),
+            checksum: checksum.unwrap_or_else(|| crc32fast::hash(label.as_bytes())),
             label,
             surface,
             frame,
@@ -506,6 +517,12 @@ impl Input {
         format!("{prefix}-{}-{}", plain(&name), self.scheme)
     }
 
+    /// The mesh as it was given, for the provenance of files about it.
+    pub fn source(&self) -> Source {
+        let size = format!("{} vertices, {} faces", self.surface.len(), self.surface.faces().len());
+        Source { name: self.label.clone(), size, checksum: self.checksum }
+    }
+
     /// The JSON object of one mesh: what every program tells of it, and `fields`.
     ///
     /// # Panics
@@ -515,6 +532,7 @@ impl Input {
         let count = |rule| features.map_or(0, |f| f.count(rule));
         let head = json!({
             "mesh": self.name,
+            "hash": self.source().hash(),
             "scheme": self.scheme.name(),
             "vertices": self.surface.len(),
             "faces": self.surface.faces().len(),

@@ -7,6 +7,7 @@ mod monitor;
 mod problem;
 mod process;
 mod progress;
+mod provenance;
 
 pub use input::{Input, MeshFlags, STAND_IN_NOISE, STANDARD_STREAM, subdivision_of};
 pub use json::print_json;
@@ -14,16 +15,15 @@ pub use monitor::MonitorFlags;
 pub use problem::{Given, Matrix, Problem, Subject};
 pub use process::{exit, say};
 pub use progress::Progress;
+pub use provenance::{parse, print_object, provenance};
 
-use std::collections::BTreeMap;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::PathBuf;
 
 use clap::Args;
-use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::report::{Figure, Format, Table, fitted};
+use crate::report::{Figure, Format, Provenance, Table, fitted};
 use limitlab::error::{Error, Result};
 use limitlab::solvers::Stop;
 
@@ -45,14 +45,15 @@ pub struct CommonFlags {
 }
 
 impl CommonFlags {
-    /// Prepares the process for work: addresses, signals, then threads.
+    /// Prepares the process for work: addresses, signals, then threads, whose number joins the provenance.
     ///
     /// # Errors
     /// If threads were started before.
-    pub fn apply(&self) -> Result<()> {
+    pub fn apply(&self, provenance: Provenance) -> Result<Provenance> {
         process::share_addresses();
         process::heed_signals();
-        process::start_threads(self.threads, |text| self.remark(text))
+        process::start_threads(self.threads, |text| self.remark(text))?;
+        Ok(Provenance { threads: Some(rayon::current_num_threads()), ..provenance })
     }
 
     /// Tells the user something on standard error, unless asked to be quiet.
@@ -143,8 +144,8 @@ impl OutputFlags {
     ///
     /// # Errors
     /// As [`Figure::write`].
-    pub fn figure(&self, stem: &str, figure: &Figure) -> Result<()> {
-        figure.write(&self.out, stem, self.figures.formats())
+    pub fn figure(&self, stem: &str, figure: &Figure, provenance: &Provenance) -> Result<()> {
+        figure.write(&self.out, stem, self.figures.formats(), provenance)
     }
 }
 
@@ -247,20 +248,18 @@ pub fn print_table(table: &Table) -> Result<()> {
 ///
 /// # Errors
 /// If standard output cannot be written.
-pub fn finish(results: &[Value], output: &OutputFlags, common: &CommonFlags) -> Result<()> {
+pub fn finish(results: Vec<Value>, output: &OutputFlags, common: &CommonFlags, provenance: &Provenance) -> Result<()> {
     common.remark(format_args!("tables and plots: {}", output.out.display()));
     if !output.json {
         return Ok(());
     }
-    print_results(results)
+    print_results(results, provenance)
 }
 
 /// Prints the object of one mesh, or `{"results": […]}` of several.
-fn print_results<T: Serialize>(results: &[T]) -> Result<()> {
-    match results {
-        [one] => print_json(one),
-        several => print_json(&BTreeMap::from([("results", several)])),
-    }
+fn print_results(mut results: Vec<Value>, provenance: &Provenance) -> Result<()> {
+    let object = if results.len() == 1 { results.remove(0) } else { json!({ "results": results }) };
+    print_object(object, provenance)
 }
 
 /// What a program of several tables prints on standard output: each as soon as it is there, with `--json`
@@ -312,12 +311,12 @@ impl Printer {
     ///
     /// # Panics
     /// If `fields` is not an object.
-    pub fn finish(self, mut fields: Value) -> Result<()> {
+    pub fn finish(self, mut fields: Value, provenance: &Provenance) -> Result<()> {
         let Printer::Json(tables) = self else {
             return Ok(());
         };
         fields["tables"] = tables.into();
-        print_json(&fields)
+        print_object(fields, provenance)
     }
 }
 

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::input::{all_fields, plain};
 use super::{CommonFlags, Input, MeshFlags, StopFlags};
+use crate::report::provenance::Source as Origin;
 use limitlab::assemble::matrix_market::{self, is_missing};
 use limitlab::assemble::{GeneralSystem, LimitSystem, Stages};
 use limitlab::error::{Error, Result};
@@ -26,6 +27,8 @@ pub struct Subject {
     pub title: String,
     /// How large it is, in words.
     pub size: String,
+    /// As it was given, for the provenance of files about it.
+    pub source: Origin,
     /// What errors are measured in.
     pub unit: &'static str,
     /// The end of the names of files.
@@ -59,7 +62,7 @@ impl Subject {
 impl Input {
     /// The size of the mesh in words, and that of its stages where there are several.
     fn size(&self) -> String {
-        let whole = format!("{} vertices, {} faces", self.surface.len(), self.surface.faces().len());
+        let whole = self.source().size;
         let Some(features) = self.surface.features() else { return whole };
         if features.has_stars() {
             let [darts, semi_sharp] = [Rule::Dart, Rule::SemiSharp].map(|rule| features.count(rule));
@@ -77,6 +80,7 @@ impl Input {
             name: self.name.clone(),
             title: format!("{} under {}", self.label, self.scheme),
             size: self.size(),
+            source: self.source(),
             unit: "mesh units",
             stem: self.stem(""),
             head: self.json(json!({})),
@@ -218,16 +222,19 @@ impl MeshFlags {
         };
         frame.enter(&mut points);
         let (n, entries) = (system.len(), system.a.values().len());
+        let size = format!("{n} rows, {entries} entries");
+        let source = Origin { name: name.to_owned(), size: size.clone(), checksum: checksum(path)? };
         let whole = path.canonicalize().unwrap_or_else(|_| path.into());
         let subject = Subject {
             name: name.to_owned(),
             title: name.to_owned(),
-            size: format!("{n} rows, {entries} entries"),
+            size,
             unit: "units of P",
             stem: format!("-{}", plain(&whole.file_name().unwrap_or_default().to_string_lossy())),
             head: json!({
-                "mesh": null, "scheme": null, "vertices": n, "faces": null, "system": name, "entries": entries,
+                "mesh": null, "hash": source.hash(), "scheme": null, "vertices": n, "faces": null, "system": name, "entries": entries,
             }),
+            source,
         };
         Ok(Some(Given { subject, system, points, frame }))
     }
@@ -256,6 +263,15 @@ impl MeshFlags {
             points: given.points,
         })
     }
+}
+
+/// CRC-32 of the bytes of M.mtx, H.mtx if it is there, and P.mtx, one after the other.
+fn checksum(folder: &Path) -> Result<u32> {
+    let mut hasher = crc32fast::Hasher::new();
+    for file in ["M.mtx", "H.mtx", "P.mtx"].map(|name| folder.join(name)).iter().filter(|file| !is_missing(file)) {
+        hasher.update(&std::fs::read(file).map_err(|e| Error::io(file, "read", e))?);
+    }
+    Ok(hasher.finalize())
 }
 
 fn of_mesh(input: Input, stop: &StopFlags, order: Order) -> Result<Problem> {

@@ -7,6 +7,7 @@ use clap::Parser;
 use serde_json::json;
 
 use crate::cli::{self, CommonFlags, MeshFlags};
+use crate::report::Provenance;
 use limitlab::Result;
 use limitlab::assemble::matrix_market;
 use limitlab::output::{Batch, check_target, create_dir};
@@ -41,15 +42,15 @@ pub struct Arguments {
 const FILES: [&str; 5] = ["A.mtx", "M.mtx", "H.mtx", "P.mtx", "R.mtx"];
 
 /// Runs the program.
-pub fn main(arguments: Arguments) -> ExitCode {
+pub fn main(arguments: Arguments, provenance: Provenance) -> ExitCode {
     cli::exit(|| {
-        arguments.common.apply()?;
-        run(&arguments)
+        let provenance = arguments.common.apply(provenance)?;
+        run(&arguments, &provenance)
     })
 }
 
-fn run(arguments: &Arguments) -> Result<()> {
-    if arguments.mesh.print_defects(&[&arguments.input], &arguments.common)? {
+fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
+    if arguments.mesh.print_defects(&[&arguments.input], &arguments.common, provenance)? {
         return Ok(());
     }
     create_dir(&arguments.out)?;
@@ -62,12 +63,13 @@ fn run(arguments: &Arguments) -> Result<()> {
     let points = &*input.given_points();
     let known = stages.known(points);
     let mut files = Vec::new();
+    let comments = provenance.about(&input.source()).lines();
     let mut batch = Batch::default();
     let whole = ["A.mtx", "P.mtx"].map(|name| arguments.out.join(name));
     let mut folder = arguments.out.clone();
     if stages.vertices().is_some() {
-        batch.write(&whole[0], |out| matrix_market::write_general(&matrix, out))?;
-        batch.write(&whole[1], |out| matrix_market::write_points(points, out))?;
+        batch.write(&whole[0], |out| matrix_market::write_general(&matrix, &comments, out))?;
+        batch.write(&whole[1], |out| matrix_market::write_points(points, &comments, out))?;
         files.extend(whole);
         folder.push("smooth");
     }
@@ -78,11 +80,11 @@ fn run(arguments: &Arguments) -> Result<()> {
         let block = stages.block();
         let right = stages.right_hand_side(&known);
         let symmetric = block.symmetric_right_hand_side(&right);
-        batch.write(&of_block[0], |out| matrix_market::write_general(&block.a, out))?;
-        batch.write(&of_block[1], |out| matrix_market::write_symmetric(&block.m, out))?;
-        batch.write(&of_block[2], |out| matrix_market::write_vector(&block.h, out))?;
-        batch.write(&of_block[3], |out| matrix_market::write_points(&right, out))?;
-        batch.write(&of_block[4], |out| matrix_market::write_points(&symmetric, out))?;
+        batch.write(&of_block[0], |out| matrix_market::write_general(&block.a, &comments, out))?;
+        batch.write(&of_block[1], |out| matrix_market::write_symmetric(&block.m, &comments, out))?;
+        batch.write(&of_block[2], |out| matrix_market::write_vector(&block.h, &comments, out))?;
+        batch.write(&of_block[3], |out| matrix_market::write_points(&right, &comments, out))?;
+        batch.write(&of_block[4], |out| matrix_market::write_points(&symmetric, &comments, out))?;
         files.extend(of_block);
     }
     batch.commit()?;
@@ -103,7 +105,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             "bandwidth": matrix.pattern().bandwidth(),
             "files": files,
         }));
-        cli::print_json(&object)?;
+        cli::print_object(object, provenance)?;
     }
     Ok(())
 }

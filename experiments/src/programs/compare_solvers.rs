@@ -12,6 +12,8 @@ use serde_json::json;
 use crate::cli::{
     self, CommonFlags, List, Matrix, MeshFlags, MonitorFlags, OutputFlags, Problem, Progress, StopFlags, WHICH_METHOD,
 };
+use crate::report::Provenance;
+use crate::report::page::Page;
 use crate::studies::comparison::{self as study, AUTO, Asked};
 use crate::studies::histories;
 use crate::studies::page::{self, Measured};
@@ -62,20 +64,20 @@ pub struct Arguments {
 }
 
 /// Runs the program.
-pub fn main(mut arguments: Arguments) -> ExitCode {
+pub fn main(mut arguments: Arguments, provenance: Provenance) -> ExitCode {
     if let (Some(_), several @ 2..) = (&arguments.html, arguments.meshes.len()) {
         let what = format!("--html makes a page of one mesh, and {several} are named: run the program once for each");
         Arguments::command().error(ErrorKind::ArgumentConflict, what).exit();
     }
     cli::exit(|| {
-        arguments.common.apply()?;
+        let provenance = arguments.common.apply(provenance)?;
         arguments.mesh.or_built_in(&mut arguments.meshes, &["torus:32x32"]);
-        run(&arguments)
+        run(&arguments, &provenance)
     })
 }
 
-fn run(arguments: &Arguments) -> Result<()> {
-    if arguments.mesh.print_defects(&arguments.meshes, &arguments.common)? {
+fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
+    if arguments.mesh.print_defects(&arguments.meshes, &arguments.common, provenance)? {
         return Ok(());
     }
     arguments.output.prepare()?;
@@ -85,6 +87,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let mut results = Vec::new();
     for name in &arguments.meshes {
         let problem = arguments.mesh.problem(name, &arguments.stop, arguments.order, &arguments.common)?;
+        let made = provenance.about(&problem.subject.source);
         let Compared { rows, refused, measured } = compare(&problem, &arguments.wanted())?;
         let about = format!(
             "{}; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:e} ({}).",
@@ -94,18 +97,19 @@ fn run(arguments: &Arguments) -> Result<()> {
         );
         let stem = problem.subject.stem("compare-solvers");
         let table = study::table(stem.clone(), format!("All methods on {}", problem.subject.title), about, &rows);
-        table.write(&arguments.output.out)?;
+        table.write(&arguments.output.out, &made)?;
         let figure = study::figure(problem.subject.caption(), problem.subject.unit, &rows);
-        arguments.output.figure(&stem, &figure)?;
+        arguments.output.figure(&stem, &figure, &made)?;
         let histories = rows.iter().map(|row| &row.solution.report.history);
         let runs = rows.iter().map(|row| [row.method.to_string(), row.parameter.clone()]);
         histories::write(
             &arguments.output.out.join(format!("{stem}-history.csv")),
             ["method", "parameter"],
             runs.zip(histories.clone().map(Vec::as_slice)),
+            &made,
         )?;
         if let (Some(path), Some(measured)) = (&arguments.html, measured) {
-            write(path, &problem, measured, &rows, refused, &arguments.common)?;
+            write(path, page::page(&problem, measured, &rows, refused)?, &made, &arguments.common)?;
         }
         if !arguments.output.json {
             cli::print_table(&table)?;
@@ -116,29 +120,32 @@ fn run(arguments: &Arguments) -> Result<()> {
         }
         results.push(problem.subject.json(json!({ "rows": objects })));
     }
-    cli::finish(&results, &arguments.output, &arguments.common)
+    cli::finish(results, &arguments.output, &arguments.common, provenance)
 }
 
 /// Writes the interactive page of all methods on one mesh, as `--html` does.
 ///
 /// # Errors
 /// As the program has them.
-pub fn write_page(path: &Path, name: &str, mesh: &MeshFlags, common: &CommonFlags) -> Result<()> {
+pub fn write_page(
+    path: &Path,
+    name: &str,
+    mesh: &MeshFlags,
+    common: &CommonFlags,
+    provenance: &Provenance,
+) -> Result<()> {
     let problem = mesh.problem(name, &StopFlags::default(), Order::File, common)?;
     let wanted = Wanted { methods: None, order: Order::File, page: true, monitor: &MonitorFlags::default(), common };
     let Compared { rows, refused, measured } = compare(&problem, &wanted)?;
-    measured.map_or(Ok(()), |measured| write(path, &problem, measured, &rows, refused, common))
+    let Some(measured) = measured else {
+        return Ok(());
+    };
+    let page = page::page(&problem, measured, &rows, refused)?;
+    write(path, page, &provenance.about(&problem.subject.source), common)
 }
 
-fn write(
-    path: &Path,
-    problem: &Problem,
-    measured: Measured,
-    rows: &[MethodRow],
-    refused: Option<String>,
-    common: &CommonFlags,
-) -> Result<()> {
-    page::page(problem, measured, rows, refused)?.write(path)?;
+fn write(path: &Path, page: Page, made: &Provenance, common: &CommonFlags) -> Result<()> {
+    page.write(path, made)?;
     common.remark(format_args!("interactive page: {}", path.display()));
     Ok(())
 }

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use crate::cli::{self, CommonFlags, Given, Input, MeshFlags, OutputFlags, Progress, StopFlags, Subject, number};
 use crate::report::series::Bars;
-use crate::report::{Column, Columns, Figure, LinePlot, Rule, Table};
+use crate::report::{Column, Columns, Figure, LinePlot, Provenance, Rule, Table};
 use crate::studies::complex_spectrum::{ComplexFindings, radii_of_sweeps};
 use limitlab::Result;
 use limitlab::analysis::a_priori::{IterationCounts, Promise};
@@ -68,11 +68,11 @@ const BUILT_IN: [&str; 4] = ["torus:32x32", "quad-sphere:4", "icosphere:3", "pri
 const BINS: usize = 60;
 
 /// Runs the program.
-pub fn main(mut arguments: Arguments) -> ExitCode {
+pub fn main(mut arguments: Arguments, provenance: Provenance) -> ExitCode {
     cli::exit(|| {
-        arguments.common.apply()?;
+        let provenance = arguments.common.apply(provenance)?;
         arguments.mesh.or_built_in(&mut arguments.meshes, &BUILT_IN);
-        run(&arguments)
+        run(&arguments, &provenance)
     })
 }
 
@@ -175,8 +175,8 @@ impl Findings {
     }
 }
 
-fn run(arguments: &Arguments) -> Result<()> {
-    if arguments.mesh.print_defects(&arguments.meshes, &arguments.common)? {
+fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
+    if arguments.mesh.print_defects(&arguments.meshes, &arguments.common, provenance)? {
         return Ok(());
     }
     arguments.output.prepare()?;
@@ -190,35 +190,36 @@ fn run(arguments: &Arguments) -> Result<()> {
             None => {
                 let input = arguments.mesh.input(name, &arguments.common)?;
                 if input.surface.features().is_some_and(Features::has_stars) {
-                    results.push(complex(&input, arguments)?);
+                    results.push(complex(&input, arguments, provenance)?);
                     continue;
                 }
                 (input.subject(), analyse(&input, arguments)?, input.surface.len())
             }
         };
         let out = &arguments.output.out;
+        let made = &provenance.about(&subject.source);
         let tables = [eigenvalue_table(&subject, &findings, n), radius_table(&subject, &findings)];
         for table in &tables {
-            table.write(out)?;
+            table.write(out, made)?;
             if !arguments.output.json {
                 cli::print_table(table)?;
             }
         }
         if let Some(full) = &findings.full {
-            full_table(&subject, full).write(out)?;
+            full_table(&subject, full).write(out, made)?;
             let figure = histogram(&subject, full, &findings.promise);
-            arguments.output.figure(&subject.stem("spectrum-histogram"), &figure)?;
+            arguments.output.figure(&subject.stem("spectrum-histogram"), &figure, made)?;
         }
         if !findings.modes.is_empty() {
-            mode_table(&subject, &findings.modes).write(out)?;
+            mode_table(&subject, &findings.modes).write(out, made)?;
         }
         results.push(json(&subject, &findings, n));
     }
-    cli::finish(&results, &arguments.output, &arguments.common)
+    cli::finish(results, &arguments.output, &arguments.common, provenance)
 }
 
 /// Writes what there is to say of a mesh with darts or semi-sharp vertices, and gives its JSON object.
-fn complex(input: &Input, arguments: &Arguments) -> Result<Value> {
+fn complex(input: &Input, arguments: &Arguments, provenance: &Provenance) -> Result<Value> {
     let left_out = [("--modes", arguments.modes > 0), ("--certify", arguments.certify)];
     for (flag, _) in left_out.into_iter().filter(|flag| flag.1) {
         arguments.common.remark(format_args!(
@@ -231,15 +232,16 @@ fn complex(input: &Input, arguments: &Arguments) -> Result<Value> {
     drop(progress);
     let subject = input.subject();
     let out = &arguments.output.out;
+    let made = &provenance.about(&subject.source);
     for table in found.tables(&subject) {
-        table.write(out)?;
+        table.write(out, made)?;
         if !arguments.output.json {
             cli::print_table(&table)?;
         }
     }
     if arguments.full {
-        found.full_table(&subject).write(out)?;
-        arguments.output.figure(&subject.stem("spectrum-eigenvalues"), &found.figure(&subject))?;
+        found.full_table(&subject).write(out, made)?;
+        arguments.output.figure(&subject.stem("spectrum-eigenvalues"), &found.figure(&subject), made)?;
     }
     Ok(subject.json(found.json(arguments.full)))
 }

@@ -8,6 +8,7 @@ use clap::{CommandFactory, Parser};
 use serde_json::{Value, json};
 
 use crate::cli::{self, CommonFlags, OutputFlags, number};
+use crate::report::Provenance;
 use crate::studies::splitting as study;
 use limitlab::analysis::splitting::{
     Condition, Crossing, LocalScheme, SharpRow, SharpVertex, StarRow, VALENCES, rows, sharp_rows,
@@ -69,7 +70,7 @@ fn valences(text: &str, all: &RangeInclusive<usize>) -> std::result::Result<Vec<
 }
 
 /// Runs the program.
-pub fn main(arguments: Arguments) -> ExitCode {
+pub fn main(arguments: Arguments, provenance: Provenance) -> ExitCode {
     let refuse = |what: String| -> ! { Arguments::command().error(ErrorKind::InvalidValue, what).exit() };
     let scheme = LocalScheme::new(&arguments.scheme, arguments.alpha).unwrap_or_else(|error| refuse(error.to_string()));
     let At(vertex) = arguments.at;
@@ -81,21 +82,26 @@ pub fn main(arguments: Arguments) -> ExitCode {
     let range = vertex.map_or(VALENCES, SharpVertex::valences);
     let valences = valences(&arguments.valence, &range).unwrap_or_else(|what| refuse(what));
     cli::exit(|| {
-        arguments.common.apply()?;
+        let provenance = arguments.common.apply(provenance)?;
         arguments.output.prepare()?;
         match vertex {
-            None => run(&arguments, scheme, &valences),
-            Some(vertex) => run_sharp(&arguments, (scheme, vertex), &valences),
+            None => run(&arguments, scheme, &valences, &provenance),
+            Some(vertex) => run_sharp(&arguments, (scheme, vertex), &valences, &provenance),
         }
     })
 }
 
 /// At a vertex that is not smooth.
-fn run_sharp(arguments: &Arguments, (scheme, vertex): (LocalScheme, SharpVertex), valences: &[usize]) -> Result<()> {
+fn run_sharp(
+    arguments: &Arguments,
+    (scheme, vertex): (LocalScheme, SharpVertex),
+    valences: &[usize],
+    provenance: &Provenance,
+) -> Result<()> {
     let rows = sharp_rows(scheme, vertex, valences)?;
     let tables = study::sharp_tables(scheme, vertex, &rows);
     for table in &tables {
-        table.write(&arguments.output.out)?;
+        table.write(&arguments.output.out, provenance)?;
     }
     if !arguments.output.json {
         cli::print_table(&tables[0])?;
@@ -105,7 +111,7 @@ fn run_sharp(arguments: &Arguments, (scheme, vertex): (LocalScheme, SharpVertex)
         "at": vertex.name(),
         "rows": rows.iter().map(sharp_json).collect::<Vec<_>>(),
     });
-    cli::finish(&[object], &arguments.output, &arguments.common)
+    cli::finish(vec![object], &arguments.output, &arguments.common, provenance)
 }
 
 fn sharp_json(row: &SharpRow) -> Value {
@@ -139,7 +145,7 @@ fn sharp_json(row: &SharpRow) -> Value {
     })
 }
 
-fn run(arguments: &Arguments, scheme: LocalScheme, valences: &[usize]) -> Result<()> {
+fn run(arguments: &Arguments, scheme: LocalScheme, valences: &[usize], provenance: &Provenance) -> Result<()> {
     let out = &arguments.output.out;
     let rows = rows(scheme, valences)?;
     let sampled = study::sampled(scheme, valences)?;
@@ -160,15 +166,15 @@ fn run(arguments: &Arguments, scheme: LocalScheme, valences: &[usize]) -> Result
         arguments.common.remark("no characteristic map to draw: the leading pairs are complex");
     }
     for (stem, figure) in &figures {
-        arguments.output.figure(stem, figure)?;
+        arguments.output.figure(stem, figure, provenance)?;
     }
     for table in &tables {
-        table.write(out)?;
+        table.write(out, provenance)?;
     }
     if !arguments.output.json {
         cli::print_table(&tables[0])?;
     }
-    cli::finish(&[object], &arguments.output, &arguments.common)
+    cli::finish(vec![object], &arguments.output, &arguments.common, provenance)
 }
 
 fn row_json(row: &StarRow) -> Value {

@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use crate::cli::{
     self, CommonFlags, Grid, List, Matrix, MeshFlags, MonitorFlags, OutputFlags, Problem, Progress, StopFlags, number,
 };
-use crate::report::Table;
+use crate::report::{Provenance, Table};
 use crate::studies::{histories, sweep as study};
 use limitlab::Result;
 use limitlab::analysis::complex_spectrum::ComplexSpectrum;
@@ -73,22 +73,23 @@ fn omegas(text: &str) -> std::result::Result<List<f64>, String> {
 }
 
 /// Runs the program.
-pub fn main(mut arguments: Arguments) -> ExitCode {
+pub fn main(mut arguments: Arguments, provenance: Provenance) -> ExitCode {
     cli::exit(|| {
-        arguments.common.apply()?;
+        let provenance = arguments.common.apply(provenance)?;
         arguments.mesh.or_built_in(&mut arguments.meshes, &BUILT_IN);
-        run(&arguments)
+        run(&arguments, &provenance)
     })
 }
 
-fn run(arguments: &Arguments) -> Result<()> {
-    if arguments.mesh.print_defects(&arguments.meshes, &arguments.common)? {
+fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
+    if arguments.mesh.print_defects(&arguments.meshes, &arguments.common, provenance)? {
         return Ok(());
     }
     arguments.output.prepare()?;
     let mut results = Vec::new();
     for name in &arguments.meshes {
         let problem = arguments.mesh.problem(name, &arguments.stop, arguments.order, &arguments.common)?;
+        let made = provenance.about(&problem.subject.source);
         let table = |sweep: &OmegaSweep| {
             study::table(
                 problem.subject.stem("sweep-omega"),
@@ -102,16 +103,16 @@ fn run(arguments: &Arguments) -> Result<()> {
                 sweep,
             )
         };
-        let write = |sweep: &OmegaSweep| table(sweep).write(&arguments.output.out);
+        let write = |sweep: &OmegaSweep| table(sweep).write(&arguments.output.out, &made);
         let (sweep, histories) = sweep_one(&problem, arguments, &write)?;
         write(&sweep)?;
         let table = table(&sweep);
         let figure = study::plot(problem.subject.caption(), &arguments.method.0, &sweep);
-        arguments.output.figure(&table.id, &figure)?;
+        arguments.output.figure(&table.id, &figure, &made)?;
         if arguments.history.is_some() {
             let runs = histories.iter().map(|of| ([of.method.to_string(), short(of.omega)], &of.history[..]));
             let path = arguments.output.out.join(format!("{}-history.csv", table.id));
-            histories::write(&path, ["method", "omega"], runs)?;
+            histories::write(&path, ["method", "omega"], runs, &made)?;
         }
         if !arguments.output.json {
             cli::print_table(&table)?;
@@ -119,7 +120,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         }
         results.push(json(&problem, arguments, (&sweep, &histories), &table));
     }
-    cli::finish(&results, &arguments.output, &arguments.common)
+    cli::finish(results, &arguments.output, &arguments.common, provenance)
 }
 
 /// Between two times that the rows which are there are written.

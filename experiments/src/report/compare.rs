@@ -134,6 +134,7 @@ fn disagreement(kind: Kind, a: &str, b: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::provenance::Provenance;
     use super::super::table::{Cell, Column};
     use super::*;
     use limitlab::Error;
@@ -287,7 +288,7 @@ mod tests {
         for (i, x) in [1.0 / 3.0, f64::NAN, -1e-300, 0.1 + 0.2].into_iter().enumerate() {
             table.push(vec![i.into(), x.into()]);
         }
-        table.write(dir.path()).unwrap();
+        table.write(dir.path(), &Provenance::default()).unwrap();
         assert_eq!(compare(&table, &dir.path().join("own.csv")).unwrap(), []);
     }
 

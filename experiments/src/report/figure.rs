@@ -5,6 +5,7 @@ use super::canvas::{Canvas, Rect};
 use super::frame::{BARE_RIGHT, Slot, draw_fitted, title_room};
 use super::plot::LinePlot;
 use super::png::Image;
+use super::provenance::Provenance;
 use super::render::Picture;
 use super::sparsity::SparsityPlot;
 use limitlab::output::write_file;
@@ -204,21 +205,21 @@ impl Figure {
         self.drawing()?.to_image()
     }
 
-    /// Writes the files `STEM.png`, `STEM.svg` and `STEM.pdf`, as far as they are asked for.
+    /// Writes the files `STEM.png`, `STEM.svg` and `STEM.pdf`, as far as they are asked for, which say what made them.
     ///
     /// # Errors
     /// As [`render`](Self::render), and [`Error::Io`] if a file cannot be written.
     ///
     /// # Panics
     /// As [`render`](Self::render).
-    pub fn write(&self, folder: &Path, stem: &str, formats: &[Format]) -> Result<()> {
+    pub fn write(&self, folder: &Path, stem: &str, formats: &[Format], provenance: &Provenance) -> Result<()> {
         let drawing = self.drawing()?;
         formats.iter().try_for_each(|&format| {
             let path = folder.join(format!("{stem}.{}", format.name()));
             match format {
-                Format::Png => drawing.to_image()?.save(&path),
-                Format::Svg => write_bytes(&path, drawing.to_svg()?.as_bytes()),
-                Format::Pdf => write_bytes(&path, &drawing.to_pdf()),
+                Format::Png => drawing.to_image()?.save(&path, provenance),
+                Format::Svg => write_bytes(&path, drawing.to_svg(provenance)?.as_bytes()),
+                Format::Pdf => write_bytes(&path, &drawing.to_pdf(provenance)),
             }
         })
     }

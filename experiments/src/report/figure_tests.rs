@@ -193,7 +193,7 @@ fn elements(text: &str) -> Vec<&str> {
 #[test]
 fn vector_graphics_are_valid_and_of_the_figures_size() {
     for figure in [histories(), sweep(), patterns(64), spectrum(), mixed()] {
-        let svg = figure.drawing().unwrap().to_svg().unwrap();
+        let svg = figure.drawing().unwrap().to_svg(&Provenance::default()).unwrap();
         let names = elements(&svg);
         assert_eq!(names.iter().filter(|&&name| name == "svg").count(), 1);
         let (width, height) = (figure.width, figure.height);
@@ -206,7 +206,7 @@ fn vector_graphics_are_valid_and_of_the_figures_size() {
         assert!(!defined.is_empty() && after("href=\"#letter-").all(|letter| defined.contains(&letter)));
         assert!(defined.iter().enumerate().all(|(k, letter)| !defined[..k].contains(letter)));
     }
-    let svg = mixed().drawing().unwrap().to_svg().unwrap();
+    let svg = mixed().drawing().unwrap().to_svg(&Provenance::default()).unwrap();
     assert!(svg.contains("aria-label=\"a &amp; b &lt; &quot;c&quot;\""));
     assert_eq!(svg.matches("data:image/png;base64,iVBOR").count(), 2);
 }
@@ -215,7 +215,7 @@ fn vector_graphics_are_valid_and_of_the_figures_size() {
 fn a_page_has_the_figures_size_and_everything_in_it() {
     let find = |bytes: &[u8], mark: &[u8]| bytes.windows(mark.len()).filter(|&w| w == mark).count();
     for (figure, images) in [(histories(), 0), (mixed(), 2)] {
-        let pdf = figure.drawing().unwrap().to_pdf();
+        let pdf = figure.drawing().unwrap().to_pdf(&Provenance::default());
         assert!(pdf.starts_with(b"%PDF-1.7") && pdf.ends_with(b"%%EOF"));
         assert_eq!((find(&pdf, b"/Type /Page\n"), find(&pdf, b"/Subtype /Image")), (1, images));
         let size = format!("/MediaBox [0 0 {} {}]", figure.width, figure.height);
@@ -239,7 +239,9 @@ fn a_page_has_the_figures_size_and_everything_in_it() {
 #[test]
 fn figures_are_written_in_the_formats_that_are_asked_for() {
     let folder = tempfile::tempdir().unwrap();
-    sweep().write(folder.path(), "sweep", &["svg", "PDF"].map(|name| name.parse().unwrap())).unwrap();
+    sweep()
+        .write(folder.path(), "sweep", &["svg", "PDF"].map(|name| name.parse().unwrap()), &Provenance::default())
+        .unwrap();
     let written = |name: &str| folder.path().join(name).exists();
     assert!(written("sweep.svg") && written("sweep.pdf") && !written("sweep.png"));
     assert!("jpg".parse::<Format>().unwrap_err().to_string().contains("use png, svg or pdf"));

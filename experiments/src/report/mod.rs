@@ -14,6 +14,7 @@
 //! - [`sparsity`]: the pattern of a sparse matrix;
 //! - [`render`]: pictures of meshes, points and vectors;
 //! - [`png`]: images and their files;
+//! - [`provenance`]: what made a file, as every format says it;
 //! - [`page`]: one HTML file with interactive plots and a view of surfaces;
 //! - [`index`]: the page that leads into a folder of reports, by questions.
 
@@ -32,6 +33,7 @@ pub mod page;
 mod pdf;
 pub mod plot;
 pub mod png;
+pub mod provenance;
 pub mod render;
 pub mod series;
 pub mod sparsity;
@@ -47,6 +49,7 @@ pub use fitted::fitted;
 pub use number::readable;
 pub use plot::LinePlot;
 pub use png::{Animation, Image};
+pub use provenance::Provenance;
 pub use render::{ColourMap, ColourScale, Finish, Paint, Picture, Points, ShadedMesh, Stroke, Vectors, View};
 pub use series::{Rule, Series, Style, palette};
 pub use sparsity::SparsityPlot;

@@ -1,10 +1,11 @@
 //! Portable document format of a drawing: one page of its size, text as outlines, images as they are.
 
 use pdf_writer::types::LineJoinStyle;
-use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect as Box, Ref};
+use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect as Box, Ref, TextStr};
 
 use super::canvas::{Canvas, Colour, Point, SUPERSAMPLING, Shape};
 use super::glyphs::{self, Piece};
+use super::provenance::Provenance;
 
 /// Of zlib, from 0 to 10.
 const COMPRESSION: u8 = 8;
@@ -13,15 +14,17 @@ const CATALOG: Ref = Ref::new(1);
 const PAGES: Ref = Ref::new(2);
 const PAGE: Ref = Ref::new(3);
 const CONTENT: Ref = Ref::new(4);
-const FIRST_IMAGE: i32 = 5;
+const ABOUT: Ref = Ref::new(5);
+const FIRST_IMAGE: i32 = 6;
 
 impl Canvas {
-    /// The drawing as PDF 1.7. No date, so that the same drawing gives the same bytes.
-    pub fn to_pdf(&self) -> Vec<u8> {
+    /// The drawing as PDF 1.7, whose subject is what made it. No other date, so that the same drawing gives the same bytes.
+    pub fn to_pdf(&self, provenance: &Provenance) -> Vec<u8> {
         let (width, height) = (self.width as f32, self.height as f32);
         let mut pdf = Pdf::new();
         pdf.catalog(CATALOG).pages(PAGES);
         pdf.pages(PAGES).kids([PAGE]).count(1);
+        pdf.document_info(ABOUT).subject(TextStr(&provenance.lines().join("\n")));
         let mut content = Content::new();
         // From here on points from the top left.
         content.transform([1.0, 0.0, 0.0, -1.0, 0.0, height]);

@@ -1,6 +1,7 @@
 //! Images and their PNG form.
 
 use super::canvas::PIXELS_PER_POINT;
+use super::provenance::Provenance;
 use limitlab::Result;
 use limitlab::output::write_file;
 use std::io::{self, Write};
@@ -60,12 +61,17 @@ impl Image {
     /// # Errors
     /// Those of `out`, and a width or height of 0.
     pub fn write_png(&self, out: &mut dyn Write) -> io::Result<()> {
-        let mut writer = self.encoder(out).write_header()?;
+        self.write(out, &Provenance::default())
+    }
+
+    fn write(&self, out: &mut dyn Write, provenance: &Provenance) -> io::Result<()> {
+        let mut writer = self.encoder(out, provenance)?.write_header()?;
         writer.write_image_data(&self.rgb)?;
         Ok(writer.finish()?)
     }
 
-    fn encoder<W: Write>(&self, out: W) -> png::Encoder<'static, W> {
+    /// With the lines of the provenance as chunks of text.
+    fn encoder<W: Write>(&self, out: W, provenance: &Provenance) -> io::Result<png::Encoder<'static, W>> {
         let mut encoder = png::Encoder::new(out, self.width, self.height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
@@ -74,15 +80,19 @@ impl Image {
         encoder.set_filter(png::Filter::NoFilter);
         let unit = png::Unit::Meter;
         encoder.set_pixel_dims(Some(png::PixelDimensions { xppu: PIXELS_PER_METRE, yppu: PIXELS_PER_METRE, unit }));
-        encoder
+        for line in provenance.lines() {
+            let (keyword, text) = line.split_once(": ").unwrap_or(("Comment", &line));
+            encoder.add_itxt_chunk(keyword.into(), text.into())?;
+        }
+        Ok(encoder)
     }
 
-    /// Writes the PNG file at `path`.
+    /// Writes the PNG file at `path`, which says what made it.
     ///
     /// # Errors
     /// [`Error::Io`](limitlab::Error::Io) if it cannot be written.
-    pub fn save(&self, path: &Path) -> Result<()> {
-        write_file(path, |out| self.write_png(out))
+    pub fn save(&self, path: &Path, provenance: &Provenance) -> Result<()> {
+        write_file(path, |out| self.write(out, provenance))
     }
 }
 
@@ -96,11 +106,11 @@ pub struct Animation {
 }
 
 impl Animation {
-    /// Writes the animated PNG.
+    /// Writes the animated PNG, which says what made it.
     ///
     /// # Errors
     /// Those of `out`; no image at all, or images of different sizes.
-    pub fn write_png(&self, out: &mut dyn Write) -> io::Result<()> {
+    pub fn write_png(&self, out: &mut dyn Write, provenance: &Provenance) -> io::Result<()> {
         let refuse = |what| io::Error::new(io::ErrorKind::InvalidInput, what);
         let (Some(first), Ok(count)) = (self.frames.first(), u32::try_from(self.frames.len())) else {
             return Err(refuse("an animation needs an image"));
@@ -109,7 +119,7 @@ impl Animation {
         if self.frames.iter().any(|f| size(f) != size(first)) {
             return Err(refuse("the images of an animation are of one size"));
         }
-        let mut encoder = first.encoder(out);
+        let mut encoder = first.encoder(out, provenance)?;
         encoder.set_animated(count, 0)?;
         let mut writer = encoder.write_header()?;
         for (i, frame) in (1..).zip(&self.frames) {
@@ -124,8 +134,8 @@ impl Animation {
     ///
     /// # Errors
     /// [`Error::Io`](limitlab::Error::Io) if it cannot be written.
-    pub fn save(&self, path: &Path) -> Result<()> {
-        write_file(path, |out| self.write_png(out))
+    pub fn save(&self, path: &Path, provenance: &Provenance) -> Result<()> {
+        write_file(path, |out| self.write_png(out, provenance))
     }
 }
 
@@ -168,7 +178,7 @@ mod tests {
         let frame = |shade: u8| Image { width: 4, height: 3, rgb: (0..36).map(|i| shade.wrapping_add(i)).collect() };
         let animation = Animation { frames: [7, 90, 200].map(frame).to_vec(), milliseconds: 400 };
         let mut bytes = Vec::new();
-        animation.write_png(&mut bytes).unwrap();
+        animation.write_png(&mut bytes, &Provenance::default()).unwrap();
         let mut reader = png::Decoder::new(io::Cursor::new(&bytes)).read_info().unwrap();
         let control = *reader.info().animation_control().unwrap();
         assert_eq!((control.num_frames, control.num_plays), (3, 0));
@@ -182,9 +192,9 @@ mod tests {
         }
         let mut odd = animation.clone();
         odd.frames[1].width = 2;
-        assert!(odd.write_png(&mut Vec::new()).is_err());
+        assert!(odd.write_png(&mut Vec::new(), &Provenance::default()).is_err());
         odd.frames.clear();
-        assert!(odd.write_png(&mut Vec::new()).is_err());
+        assert!(odd.write_png(&mut Vec::new(), &Provenance::default()).is_err());
     }
 
     #[test]

@@ -9,14 +9,15 @@ use std::fmt::Write as _;
 use super::canvas::{Canvas, PIXELS_PER_POINT, Point, SUPERSAMPLING, Shape};
 use super::glyphs::{self, Piece};
 use super::page::{base64, hex};
+use super::provenance::Provenance;
 use limitlab::{Error, Result};
 
 impl Canvas {
-    /// The drawing as SVG 1.1; images are PNGs in it.
+    /// The drawing as SVG 1.1, with what made it as metadata; images are PNGs in it.
     ///
     /// # Errors
     /// Those of the PNG encoder; none are known.
-    pub fn to_svg(&self) -> Result<String> {
+    pub fn to_svg(&self, provenance: &Provenance) -> Result<String> {
         let mut letters = BTreeMap::new();
         let mut body = String::new();
         for shape in &self.shapes {
@@ -88,10 +89,11 @@ impl Canvas {
             all
         });
         let (width, height) = (self.width, self.height);
+        let made: String = provenance.lines().iter().map(|line| escaped(line) + "\n").collect();
         Ok(format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
              <svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" version=\"1.1\" \
-             width=\"{width}pt\" height=\"{height}pt\" viewBox=\"0 0 {width} {height}\">\n<defs>\n{letters}</defs>\n\
+             width=\"{width}pt\" height=\"{height}pt\" viewBox=\"0 0 {width} {height}\">\n<metadata>\n{made}</metadata>\n<defs>\n{letters}</defs>\n\
              <rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n{body}</svg>\n"
         ))
     }
@@ -120,8 +122,8 @@ fn outline(pieces: &[Piece]) -> String {
     pieces.iter().map(command).collect()
 }
 
-/// Text as the value of an attribute; what XML has no place for is a space.
-fn escaped(text: &str) -> String {
+/// Text of an element, or the value of an attribute; what XML has no place for is a space.
+pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

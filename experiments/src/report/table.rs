@@ -1,6 +1,7 @@
 //! A table of typed columns, written as CSV, Markdown or JSON.
 
 use super::number::{csv_number, readable};
+use super::provenance::Provenance;
 use limitlab::output::write_file;
 use limitlab::{Error, Result};
 use std::fmt::Write as _;
@@ -249,7 +250,8 @@ impl Table {
     /// # Errors
     /// Those of `out`.
     pub fn write_csv(&self, out: &mut dyn Write) -> io::Result<()> {
-        let mut writer = csv::Writer::from_writer(out);
+        // What begins as a comment would is quoted.
+        let mut writer = csv::WriterBuilder::new().comment(Some(COMMENT)).from_writer(out);
         writer.write_record(self.columns.iter().map(|c| &c.name))?;
         for row in self.csv_rows() {
             writer.write_record(row)?;
@@ -340,25 +342,51 @@ impl Table {
         self.rows.iter().map(object).collect()
     }
 
-    /// Writes `<id>.csv` and `<id>.md` into the folder `dir` and returns their names there.
+    /// Writes `<id>.csv` and `<id>.md` into the folder `dir` and returns their names there. Both say what made them: CSV in
+    /// lines before the header that begin with `#`, which pandas passes over with `comment="#"`.
     ///
     /// # Errors
     /// [`Error::Io`] if one of them cannot be written.
-    pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>> {
-        self.write_with_page(dir, &self.to_markdown())
+    pub fn write(&self, dir: &Path, provenance: &Provenance) -> Result<Vec<PathBuf>> {
+        self.write_with_page(dir, &self.to_markdown(), provenance)
     }
 
     /// As [`write`](Table::write), with `page` for the Markdown file.
     ///
     /// # Errors
     /// As [`write`](Table::write).
-    pub fn write_with_page(&self, dir: &Path, page: &str) -> Result<Vec<PathBuf>> {
+    pub fn write_with_page(&self, dir: &Path, page: &str, provenance: &Provenance) -> Result<Vec<PathBuf>> {
         let (csv, markdown) = (format!("{}.csv", self.id), format!("{}.md", self.id));
-        write_file(&dir.join(&csv), |out| self.write_csv(out))?;
-        write_file(&dir.join(&markdown), |out| out.write_all(page.as_bytes()))?;
+        self.write_csv_file(&dir.join(&csv), provenance)?;
+        write_page(&dir.join(&markdown), page, provenance)?;
         Ok(vec![csv.into(), markdown.into()])
     }
+
+    /// Writes the CSV file alone, to `path`.
+    ///
+    /// # Errors
+    /// As [`write`](Table::write).
+    pub fn write_csv_file(&self, path: &Path, provenance: &Provenance) -> Result<()> {
+        write_file(path, |out| {
+            out.write_all(provenance.comments("#").as_bytes())?;
+            self.write_csv(out)
+        })
+    }
 }
+
+/// Writes a page in Markdown, with what made it at its foot.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be written.
+pub fn write_page(path: &Path, page: &str, provenance: &Provenance) -> Result<()> {
+    write_file(path, |out| {
+        out.write_all(page.as_bytes())?;
+        out.write_all(provenance.footer().as_bytes())
+    })
+}
+
+/// What begins a line of CSV that is no row.
+const COMMENT: u8 = b'#';
 
 /// A CSV file as text: what [`Table::write_csv`] wrote, read back.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -376,7 +404,7 @@ impl CsvFile {
     /// or is not UTF-8.
     pub fn read(path: &Path) -> Result<CsvFile> {
         let file = std::fs::File::open(path).map_err(|e| Error::io(path, "read", e))?;
-        let mut reader = csv::Reader::from_reader(file);
+        let mut reader = csv::ReaderBuilder::new().comment(Some(COMMENT)).from_reader(file);
         let header = reader.headers().map_err(|e| csv_error(path, e))?;
         let header = header.iter().map(str::to_owned).collect();
         let rows = reader
@@ -442,7 +470,8 @@ mod tests {
     fn csv_comes_back_as_it_was_written() {
         let dir = tempfile::tempdir().unwrap();
         let table = awkward();
-        let files = table.write(dir.path()).unwrap();
+        let made = Provenance { command: "p '#x'".into(), ..Provenance::default() };
+        let files = table.write(dir.path(), &made).unwrap();
         assert_eq!(files, [PathBuf::from("awkward.csv"), PathBuf::from("awkward.md")]);
         let read = CsvFile::read(&dir.path().join("awkward.csv")).unwrap();
         assert_eq!(read.header, ["mesh", "verdict", "iterations", "max_error", "seconds"]);
@@ -457,7 +486,7 @@ mod tests {
         let mut table = Table::new("one", "One", vec![Column::text("only")]);
         table.push(vec![Cell::Empty]);
         table.push(vec!["x".into()]);
-        table.write(dir.path()).unwrap();
+        table.write(dir.path(), &Provenance::default()).unwrap();
         let read = CsvFile::read(&dir.path().join("one.csv")).unwrap();
         assert_eq!(read.rows, [[""], ["x"]]);
     }

@@ -5,9 +5,8 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::cli::number;
-use crate::report::{Column, Columns};
+use crate::report::{Column, Columns, Provenance};
 use limitlab::Result;
-use limitlab::output::write_file;
 use limitlab::solvers::Recorded;
 
 /// An array with an object an iterate: `iteration`, `max_error` and `mean_error`.
@@ -31,6 +30,7 @@ pub fn write<'a>(
     path: &Path,
     keys: [&str; 2],
     runs: impl IntoIterator<Item = ([String; 2], &'a [Recorded])>,
+    provenance: &Provenance,
 ) -> Result<()> {
     let columns = Columns::<([String; 2], Recorded)>::new()
         .col(Column::key(keys[0]), |(run, _)| run[0].clone())
@@ -44,5 +44,5 @@ pub fn write<'a>(
             table.push(columns.row(&(run.clone(), at)));
         }
     }
-    write_file(path, |out| table.write_csv(out))
+    table.write_csv_file(path, provenance)
 }

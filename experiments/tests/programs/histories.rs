@@ -112,7 +112,7 @@ fn three_programs_tell_one_history() {
     assert_eq!(&interpolated["history"], &rows[3]["history"]);
     for (name, key) in [("compare-solvers", "ω=1"), ("sweep-omega", "1")] {
         let path = folder.join(format!("out/{name}-torus-8x6-catmull-clark-history.csv"));
-        let mut reader = csv::Reader::from_path(path).unwrap();
+        let mut reader = csv(&path);
         let rows: Vec<csv::StringRecord> = reader.records().map(|row| row.unwrap()).collect();
         assert_eq!(rows.len(), history.len(), "{name}");
         for (row, entry) in rows.iter().zip(history) {

@@ -10,6 +10,7 @@ mod metadata;
 mod page;
 #[cfg(target_os = "linux")]
 mod process;
+mod provenance;
 mod results;
 mod systems;
 mod tags;
@@ -101,4 +102,28 @@ pub fn assert_no_files(folder: &Path, what: &str) {
     for name in below(folder) {
         assert!(folder.join(&name).is_dir(), "{what}: left {name} behind");
     }
+}
+
+/// What a file holds beside what made it: the rows and pixels, without comments and footers.
+pub fn content(path: &Path) -> Vec<u8> {
+    let bytes = fs::read(path).unwrap();
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("png") => {
+            let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+            let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+            reader.next_frame(&mut pixels).unwrap();
+            pixels
+        }
+        Some("md") => text(&bytes).split("\n---\n").next().unwrap().into(),
+        _ => {
+            let signs = [&b"# "[..], b"% ", b"comment "];
+            let lines = bytes.split_inclusive(|&b| b == b'\n');
+            lines.filter(|line| !signs.iter().any(|sign| line.starts_with(sign))).flatten().copied().collect()
+        }
+    }
+}
+
+/// A reader of a CSV file whose comments are passed over.
+pub fn csv(path: &Path) -> csv::Reader<fs::File> {
+    csv::ReaderBuilder::new().comment(Some(b'#')).from_path(path).unwrap()
 }

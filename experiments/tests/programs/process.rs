@@ -161,7 +161,7 @@ fn what_was_measured_is_kept_when_scaling_is_stopped() {
     let child = command.spawn().unwrap();
     let rows = || {
         let table = fs::read_to_string(folder.path().join("out/scaling.csv")).unwrap_or_default();
-        let mut reader = csv::Reader::from_reader(table.as_bytes());
+        let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(table.as_bytes());
         reader.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()).collect::<Vec<Vec<String>>>()
     };
     while rows().len() < 3 {

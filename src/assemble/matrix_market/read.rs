@@ -98,9 +98,9 @@ pub fn read_points(path: &Path) -> Result<Vec<DVec3>> {
 /// let system = LimitSystem::new(&surface, Scheme::Loop)?;
 /// let folder = std::env::temp_dir().join(format!("limitlab-doc-{}", std::process::id()));
 /// limitlab::output::create_dir(&folder)?;
-/// write_file(&folder.join("M.mtx"), |out| write_symmetric(&system.m, out))?;
-/// write_file(&folder.join("H.mtx"), |out| write_vector(&system.h, out))?;
-/// write_file(&folder.join("P.mtx"), |out| write_points(surface.positions(), out))?;
+/// write_file(&folder.join("M.mtx"), |out| write_symmetric(&system.m, &[], out))?;
+/// write_file(&folder.join("H.mtx"), |out| write_vector(&system.h, &[], out))?;
+/// write_file(&folder.join("P.mtx"), |out| write_points(surface.positions(), &[], out))?;
 /// let (read, points) = read_system(&folder)?;
 /// assert_eq!((read.a, points.as_slice()), (system.a, surface.positions()));
 /// # std::fs::remove_dir_all(&folder).unwrap();

@@ -305,6 +305,7 @@ impl<'a> Parts<'a> {
             attributes: Attributes::default(),
             tags,
             subdivision: self.subdivision,
+            checksum: None,
             remarks,
         })
     }

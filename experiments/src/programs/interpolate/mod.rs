@@ -12,6 +12,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use crate::cli::{self, Input, STANDARD_STREAM, subdivision_of};
+use crate::report::Provenance;
 
 use limitlab::Result;
 use limitlab::error::Error;
@@ -31,7 +32,7 @@ use surfaces::{fairest, keeping, leave, refine, request, require_finite, unified
 use vertex_options::VertexOptions;
 
 /// Runs the program.
-pub fn main(mut arguments: Arguments) -> ExitCode {
+pub fn main(mut arguments: Arguments, provenance: Provenance) -> ExitCode {
     if arguments.shape.alpha.is_some() {
         if *arguments.mesh.scheme.get_or_insert(Scheme::Sqrt3) != Scheme::Sqrt3 {
             conflict("--alpha belongs to the unified √3 scheme: use it with --scheme sqrt3");
@@ -81,8 +82,8 @@ pub fn main(mut arguments: Arguments) -> ExitCode {
         }
     }
     cli::exit(|| {
-        arguments.common.apply()?;
-        run(&arguments)
+        let provenance = arguments.common.apply(provenance)?;
+        run(&arguments, &provenance)
     })
 }
 
@@ -145,8 +146,8 @@ fn remark_on_output(arguments: &Arguments, input: &Input, target: &Target, optio
     }
 }
 
-fn run(arguments: &Arguments) -> Result<()> {
-    if arguments.mesh.print_defects(&[&arguments.input], &arguments.common)? {
+fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
+    if arguments.mesh.print_defects(&[&arguments.input], &arguments.common, provenance)? {
         return Ok(());
     }
     let target = Target::of(arguments)?;
@@ -192,12 +193,14 @@ fn run(arguments: &Arguments) -> Result<()> {
         (true, false) => Cow::Owned(made.surface.tags()),
         (false, _) => Cow::Owned(Tags::default()),
     };
+    let comments = provenance.about(&input.source()).lines();
     let options = WriteOptions {
         normals: made.normals.as_deref(),
         subdivision: if is_control { subdivision_of(input.scheme) } else { Subdivision::None },
         tags: Some(&tags),
         attributes: keeps_faces.then_some(&input.attributes),
         ascii: arguments.ascii,
+        comments: &comments,
     };
     match input.origin.as_ref().filter(|_| keeps_faces) {
         None => target.write(made.surface.mesh(), &options)?,
@@ -210,5 +213,5 @@ fn run(arguments: &Arguments) -> Result<()> {
     }
     remark_on_output(arguments, &input, &target, &options);
     result.seconds.write = start.elapsed().as_secs_f64();
-    print_summary(arguments, &input, &per_vertex, &result)
+    print_summary(arguments, &input, &per_vertex, &result, provenance)
 }

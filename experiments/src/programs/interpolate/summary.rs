@@ -1,6 +1,7 @@
 //! Summary of a run: remarks on standard error, and the JSON object.
 
 use crate::cli::{self, Input, advice, number};
+use crate::report::Provenance;
 use crate::studies::histories;
 use glam::DVec3;
 use limitlab::Result;
@@ -16,6 +17,7 @@ pub fn print_summary(
     input: &Input,
     per_vertex: &VertexOptions,
     result: &Finished,
+    provenance: &Provenance,
 ) -> Result<()> {
     let Finished { made, errors, seconds, .. } = result;
     let common = &arguments.common;
@@ -93,5 +95,5 @@ pub fn print_summary(
     if let Choice::Keeping(scheme) = arguments.method {
         object["scheme"] = json!(scheme.name());
     }
-    cli::print_json(&object)
+    cli::print_object(object, provenance)
 }

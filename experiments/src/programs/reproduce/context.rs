@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crate::cli::{self, Printer, STAND_IN_NOISE};
-use crate::report::{Animation, Figure, Format, Table, compare};
+use crate::report::{Animation, Figure, Format, Provenance, Table, compare};
 use crate::studies::histories;
 use glam::DVec3;
 use limitlab::Result;
@@ -58,6 +58,8 @@ pub struct Context {
     pub ledger: Vec<Record>,
     /// What was made since it was last taken.
     pub made: Made,
+    /// The ID of the item at work.
+    item: Option<&'static str>,
     /// Tables that the item at work has made, and the stems of its pictures.
     tables: Vec<Table>,
     pictures: Vec<String>,
@@ -167,6 +169,7 @@ impl Context {
             printer,
             ledger: Vec::new(),
             made: Made::default(),
+            item: None,
             tables: Vec::new(),
             pictures: Vec::new(),
         };
@@ -316,9 +319,27 @@ impl Context {
     /// # Errors
     /// Those of the item; a file that cannot be written.
     pub fn run(&mut self, item: &Item) -> Result<()> {
+        self.item = Some(item.id);
         (item.run)(self)?;
         let (tables, pictures) = (std::mem::take(&mut self.tables), std::mem::take(&mut self.pictures));
-        pages::write_tables(&self.folder(), item, &tables, &pictures)
+        pages::write_tables(&self.folder(), item, &tables, &pictures, &self.provenance())?;
+        self.item = None;
+        Ok(())
+    }
+
+    /// The command that makes the files of the item at work again, or all of them, with the flags that results depend on: the
+    /// same wherever, whenever and on however many threads it runs, as these files are.
+    pub fn provenance(&self) -> Provenance {
+        let flags = [("--meshes DIR", self.real()), ("--quick", self.quick), ("--times", self.times)];
+        let words = ["reproduce".to_owned()].into_iter();
+        let words = words.chain(self.item.map(|id| format!("--only {id}")));
+        let words = words.chain(flags.into_iter().filter(|flag| flag.1).map(|(flag, _)| flag.into()));
+        Provenance {
+            program: "reproduce".into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            command: words.collect::<Vec<_>>().join(" "),
+            ..Provenance::default()
+        }
     }
 
     /// Takes a table to be written as CSV and as a page, prints it, and holds it against the one in `--check`.
@@ -373,7 +394,7 @@ impl Context {
     /// If it cannot be drawn or written.
     pub fn figure(&mut self, stem: &str, figure: &Figure) -> Result<()> {
         self.picture(stem);
-        figure.write(&self.folder(), stem, &self.formats)
+        figure.write(&self.folder(), stem, &self.formats, &self.provenance())
     }
 
     /// Writes the histories that a figure of this stem shows as `STEM.csv`.
@@ -386,7 +407,7 @@ impl Context {
         keys: [&str; 2],
         runs: impl IntoIterator<Item = ([String; 2], &'a [Recorded])>,
     ) -> Result<()> {
-        histories::write(&self.folder().join(format!("{stem}.csv")), keys, runs)
+        histories::write(&self.folder().join(format!("{stem}.csv")), keys, runs, &self.provenance())
     }
 
     /// Writes figures of one size as an animation, `STEM.png`.
@@ -397,7 +418,7 @@ impl Context {
         self.picture(stem);
         let animation =
             Animation { frames: figures.iter().map(Figure::render).collect::<Result<_>>()?, milliseconds: 700 };
-        animation.save(&self.folder().join(format!("{stem}.png")))
+        animation.save(&self.folder().join(format!("{stem}.png")), &self.provenance())
     }
 
     /// Counts a picture, and remembers it for the page of its table.
@@ -416,7 +437,7 @@ impl Context {
     /// # Errors
     /// If a file cannot be read or written.
     pub fn write_index(&self, items: &[Item]) -> Result<()> {
-        pages::write_index(&self.root, &self.folder(), items)
+        pages::write_index(&self.root, &self.folder(), items, &self.provenance())
     }
 
     /// The end of a run: with `--json` its object, in which `claims` are those that were computed; then success, or what differs from
@@ -424,15 +445,16 @@ impl Context {
     ///
     /// # Errors
     /// The first difference and their number; standard output that cannot be written.
-    pub fn finish(self, claims: Json) -> Result<()> {
+    pub fn finish(self, claims: Json, provenance: &Provenance) -> Result<()> {
         let folder = self.folder();
-        self.printer.finish(json!({
+        let fields = json!({
             "meshes": self.models.map_or("built-in".into(), |folder| folder.display().to_string()),
             "quick": self.quick,
             "folder": folder.display().to_string(),
             "claims": claims,
             "differences": self.differences,
-        }))?;
+        });
+        self.printer.finish(fields, provenance)?;
         for difference in &self.differences {
             cli::say(format_args!("differs: {difference}"));
         }

@@ -256,7 +256,8 @@ fn run(context: &mut Context) -> Result<()> {
         if let Some(best) = &climb.best {
             smooth = Some(smooth_rho(search, &best.surface)?);
             let name = format!("{}--{}.obj", DARTS.id, k + 1);
-            let options = WriteOptions { tags: Some(&best.tags), ..WriteOptions::default() };
+            let comments = context.provenance().lines();
+            let options = WriteOptions { tags: Some(&best.tags), comments: &comments, ..WriteOptions::default() };
             io::write_control(&context.folder().join(&name), best.surface.mesh(), &options)?;
             file = Some(name);
         }

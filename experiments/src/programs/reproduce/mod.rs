@@ -33,6 +33,7 @@ use serde_json::json;
 
 use crate::cli::{self, CommonFlags, FigureFlags, MeshFlags, Printer, Progress};
 use crate::programs::compare_solvers;
+use crate::report::Provenance;
 use claims::Claim;
 use context::{Context, Item, Made};
 use limitlab::error::Error;
@@ -106,22 +107,23 @@ const ITEMS: [Item; 18] = [
 ];
 
 /// Runs the program.
-pub fn main(arguments: Arguments) -> ExitCode {
+pub fn main(arguments: Arguments, provenance: Provenance) -> ExitCode {
     cli::exit(|| {
-        arguments.common.apply()?;
-        run(&arguments)
+        let provenance = arguments.common.apply(provenance)?;
+        run(&arguments, &provenance)
     })
 }
 
-fn run(arguments: &Arguments) -> Result<()> {
+fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     if arguments.list {
         let claims = claims::all().map(|c| (c.id, c.title));
         if arguments.json {
             let entry = |id: &str, title: &str| json!({ "id": id, "title": title });
-            return cli::print_json(&json!({
+            let lists = json!({
                 "items": ITEMS.iter().map(|i| entry(i.id, i.title)).collect::<Vec<_>>(),
                 "claims": claims::all().map(|c| entry(c.id, c.title)).collect::<Vec<_>>(),
-            }));
+            });
+            return cli::print_object(lists, provenance);
         }
         let all: Vec<(&str, &str)> = ITEMS.iter().map(|i| (i.id, i.title)).chain(claims).collect();
         let width = all.iter().map(|(id, _)| id.len()).max().unwrap_or(0);
@@ -179,7 +181,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     if let Some(path) = &arguments.html {
         let (name, noise) = context.argument(&corpus::HORSE);
         let mesh = MeshFlags { noise, ..MeshFlags::default() };
-        compare_solvers::write_page(path, &name, &mesh, &arguments.common)?;
+        compare_solvers::write_page(path, &name, &mesh, &arguments.common, provenance)?;
     }
     if !chosen.is_empty() {
         context.write_index(&ITEMS)?;
@@ -190,5 +192,5 @@ fn run(arguments: &Arguments) -> Result<()> {
         arguments.common.remark(format_args!("reports: {}", context.folder().display()));
     }
     let claims = claims::json(&context.ledger);
-    context.finish(claims)
+    context.finish(claims, provenance)
 }

@@ -4,12 +4,11 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use crate::report::Table;
 use crate::report::index::{self, Link, Section, anchor, gallery, link};
-use crate::report::table::CsvFile;
+use crate::report::table::{CsvFile, write_page};
+use crate::report::{Provenance, Table};
 use limitlab::Result;
 use limitlab::error::Error;
-use limitlab::output::write_file;
 
 use crate::programs::reproduce::claims::{self, FINDINGS, LEDGER, Tally, links::linked};
 use crate::programs::reproduce::context::{BUILT_IN, Item};
@@ -35,7 +34,13 @@ pub fn of_words(page: &str, files: &[(&str, String)]) -> String {
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn write_tables(folder: &Path, item: &Item, tables: &[Table], pictures: &[String]) -> Result<()> {
+pub fn write_tables(
+    folder: &Path,
+    item: &Item,
+    tables: &[Table],
+    pictures: &[String],
+    provenance: &Provenance,
+) -> Result<()> {
     for table in tables {
         let mut page = table.clone();
         page.notes.insert(0, way_back(&[("as CSV", format!("{}.csv", table.id))]));
@@ -44,7 +49,7 @@ pub fn write_tables(folder: &Path, item: &Item, tables: &[Table], pictures: &[St
         if !shown.is_empty() {
             page.note(shown);
         }
-        table.write_with_page(folder, &linked(&page.to_markdown()))?;
+        table.write_with_page(folder, &linked(&page.to_markdown()), provenance)?;
     }
     Ok(())
 }
@@ -69,7 +74,7 @@ fn picture(item: &Item, stem: &str) -> Link {
 ///
 /// # Errors
 /// If a file cannot be read or written.
-pub fn write_index(root: &Path, folder: &Path, items: &[Item]) -> Result<()> {
+pub fn write_index(root: &Path, folder: &Path, items: &[Item], provenance: &Provenance) -> Result<()> {
     let files = listing(folder)?;
     let mut sections = Vec::new();
     for item in items {
@@ -96,7 +101,7 @@ pub fn write_index(root: &Path, folder: &Path, items: &[Item]) -> Result<()> {
         sections.extend(scaling(folder, &files)?);
     }
     let page = index::index("Reports", &introduction(root, folder, &files)?, &sections);
-    write_file(&folder.join(INDEX), |out| out.write_all(linked(&page).as_bytes()))
+    write_page(&folder.join(INDEX), &linked(&page), provenance)
 }
 
 /// The section on what the program `scaling` wrote.

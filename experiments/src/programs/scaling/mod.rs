@@ -18,7 +18,7 @@ use glam::DVec3;
 use serde_json::json;
 
 use crate::cli::{self, CommonFlags, FigureFlags, List, Printer, Progress, number};
-use crate::report::{Colour, Column, Columns, Dash, Figure, LinePlot, Marker, Scale, Series, Style, Table};
+use crate::report::{Colour, Column, Columns, Dash, Figure, LinePlot, Marker, Provenance, Scale, Series, Style, Table};
 use crate::studies::style;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::{LimitSystem, Operator};
@@ -94,15 +94,15 @@ const LEAST: usize = 100;
 const ESTIMATE: usize = 4000;
 
 /// Runs the program.
-pub fn main(arguments: Arguments) -> ExitCode {
+pub fn main(arguments: Arguments, provenance: Provenance) -> ExitCode {
     cli::exit(|| {
-        arguments.common.apply()?;
+        let provenance = arguments.common.apply(provenance)?;
         limitlab::output::create_dir(&arguments.out)?;
-        measure(&arguments)
+        measure(&arguments, &provenance)
     })
 }
 
-fn measure(arguments: &Arguments) -> Result<()> {
+fn measure(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     let threads = rayon::current_num_threads();
     let bandwidth = machine::triad();
     let mut printer = Printer::new(arguments.json);
@@ -121,7 +121,7 @@ fn measure(arguments: &Arguments) -> Result<()> {
     );
     let mut panels = Vec::new();
     for &scheme in &arguments.scheme.0 {
-        panels.extend(of_scheme(arguments, scheme, bandwidth, &mut table)?);
+        panels.extend(of_scheme(arguments, scheme, bandwidth, &mut table, provenance)?);
     }
     let progress = Progress::open("scaling", arguments.common.quiet);
     if !panels.is_empty() {
@@ -131,32 +131,37 @@ fn measure(arguments: &Arguments) -> Result<()> {
             format!("Time from faces to control points, {threads} threads, triad {:.1} GB/s", bandwidth / 1e9);
         figure.columns = 2;
         (figure.width, figure.height) = (900, 40 + 230 * rows);
-        figure.write(&arguments.out, "scaling", arguments.figures.formats())?;
+        figure.write(&arguments.out, "scaling", arguments.figures.formats(), provenance)?;
     }
-    local_edits(arguments, &progress, &mut printer)?;
+    local_edits(arguments, &progress, &mut printer, provenance)?;
     if arguments.steps >= LEAST {
-        steps::steps(arguments.steps, &arguments.out, &progress, &mut printer)?;
+        steps::steps(arguments.steps, &arguments.out, &progress, &mut printer, provenance)?;
     }
     let all = rayon::current_num_threads();
     if arguments.gains >= LEAST && all > 1 {
-        threads::gains(arguments, all, &progress, &mut printer)?;
+        threads::gains(arguments, all, &progress, &mut printer, provenance)?;
     }
     if arguments.profile >= LEAST {
         let name = family(Scheme::CatmullClark, arguments.profile);
         let mesh = noisy(&name)?;
         progress.message(format!("profile: {name}"));
         let profile = profile::profile(&name, &mesh, Scheme::CatmullClark, all)?;
-        profile.write(&arguments.out)?;
+        profile.write(&arguments.out, provenance)?;
         printer.table(&profile)?;
     }
     drop(progress);
     printer.table(&table)?;
     arguments.common.remark(format_args!("tables and plot: {}", arguments.out.display()));
-    printer.finish(json!({ "threads": threads, "triad_bytes_per_second": number(bandwidth) }))
+    printer.finish(json!({ "threads": threads, "triad_bytes_per_second": number(bandwidth) }), provenance)
 }
 
 /// Local edits on the meshes of all schemes and sizes, and the decay on the largest.
-fn local_edits(arguments: &Arguments, progress: &Progress, printer: &mut Printer) -> Result<()> {
+fn local_edits(
+    arguments: &Arguments,
+    progress: &Progress,
+    printer: &mut Printer,
+    provenance: &Provenance,
+) -> Result<()> {
     let mut sizes = arguments.sizes.0.clone();
     sizes.retain(|&n| n <= arguments.most_edits);
     let Some(&last) = sizes.last() else {
@@ -170,7 +175,7 @@ fn local_edits(arguments: &Arguments, progress: &Progress, printer: &mut Printer
             let mesh = noisy(&name)?;
             progress.message(format!("local edits: {name}, {scheme}"));
             let operator = edits::edits(&name, mesh, scheme, arguments.tol, &mut rows)?;
-            edits::edits_table(arguments.tol, &rows).write(&arguments.out)?;
+            edits::edits_table(arguments.tol, &rows).write(&arguments.out, provenance)?;
             progress.step();
             if n == last {
                 largest.push((format!("{name}, {scheme}"), operator));
@@ -179,7 +184,7 @@ fn local_edits(arguments: &Arguments, progress: &Progress, printer: &mut Printer
     }
     let table = edits::edits_table(arguments.tol, &rows);
     progress.message("decay of the inverse");
-    edits::decay_table(&largest)?.write(&arguments.out)?;
+    edits::decay_table(&largest)?.write(&arguments.out, provenance)?;
     printer.table(&table)
 }
 
@@ -327,7 +332,13 @@ fn estimate(scheme: Scheme) -> Result<f64> {
     Ok(0.98 * spectrum(&system)?.a.min)
 }
 
-fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut Table) -> Result<[LinePlot; 2]> {
+fn of_scheme(
+    arguments: &Arguments,
+    scheme: Scheme,
+    bandwidth: f64,
+    table: &mut Table,
+    provenance: &Provenance,
+) -> Result<[LinePlot; 2]> {
     let columns = columns();
     let estimate = estimate(scheme)?;
     let mut curves: Vec<Curve> = Vec::new();
@@ -359,7 +370,7 @@ fn of_scheme(arguments: &Arguments, scheme: Scheme, bandwidth: f64, table: &mut 
                 progress.line(&row);
                 table.push(columns.row(&row));
                 // A run of hours may be stopped: what was measured is kept.
-                table.write(&arguments.out)?;
+                table.write(&arguments.out, provenance)?;
                 let at = (row.vertices as f64, row.nanoseconds_per_vertex());
                 let known = curves.iter_mut().find(|c| c.way == way && c.random == random);
                 match known {

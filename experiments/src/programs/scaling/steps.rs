@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use crate::cli::{Printer, Progress};
-use crate::report::{Column, Columns, Table};
+use crate::report::{Column, Columns, Provenance, Table};
 use limitlab::Result;
 use limitlab::assemble::LimitSystem;
 use limitlab::error::Error;
@@ -22,7 +22,13 @@ const RUNS: usize = 3;
 
 /// Measures all steps at about `n` vertices and writes the table to `folder`, which also takes the mesh files for a
 /// while.
-pub fn steps(n: usize, folder: &Path, progress: &Progress, printer: &mut Printer) -> Result<()> {
+pub fn steps(
+    n: usize,
+    folder: &Path,
+    progress: &Progress,
+    printer: &mut Printer,
+    provenance: &Provenance,
+) -> Result<()> {
     let mut rows = Vec::new();
     let quads = noisy(&format!("irregular-quad:{}", n & !1))?;
     let triangles = noisy(&format!("irregular-tri:{n}"))?;
@@ -39,7 +45,7 @@ pub fn steps(n: usize, folder: &Path, progress: &Progress, printer: &mut Printer
                 progress.message(format!("steps around the solve: {name}, {order} order, threads: {threads}"));
                 let on = On { name, order, threads, vertices: mesh.len() };
                 on_threads(threads, || Rows { rows: &mut rows, mesh, on }.measure(folder))??;
-                table(&rows).write(folder)?;
+                table(&rows).write(folder, provenance)?;
                 progress.step();
             }
         }

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::cli::{Printer, Progress};
-use crate::report::{Column, Columns};
+use crate::report::{Column, Columns, Provenance};
 use limitlab::Result;
 use limitlab::assemble::Operator;
 use limitlab::error::Error;
@@ -54,7 +54,13 @@ struct Row {
 }
 
 /// Writes the table of quads under Catmull-Clark and triangles under Loop.
-pub fn gains(arguments: &Arguments, all: usize, progress: &Progress, printer: &mut Printer) -> Result<()> {
+pub fn gains(
+    arguments: &Arguments,
+    all: usize,
+    progress: &Progress,
+    printer: &mut Printer,
+    provenance: &Provenance,
+) -> Result<()> {
     let runs = usize::from(arguments.runs).max(2);
     let columns = Columns::<Row>::new()
         .col(Column::key("scheme"), |r| r.scheme.name())
@@ -120,7 +126,7 @@ pub fn gains(arguments: &Arguments, all: usize, progress: &Progress, printer: &m
             let name = name.clone();
             table.push(columns.row(&Row { scheme, name, method, part, seconds, bandwidth }));
         }
-        table.write(&arguments.out)?;
+        table.write(&arguments.out, provenance)?;
         progress.step();
     }
     printer.table(&table)

@@ -17,7 +17,9 @@ use limitlab::output::write_file;
 use limitlab::{Error, Result};
 
 use super::canvas::Dash;
+use super::provenance::Provenance;
 use super::series::Style;
+use super::svg::escaped;
 use super::{Colour, ColourMap};
 pub use thinned::Thinned;
 
@@ -225,7 +227,7 @@ impl Page {
     ///
     /// # Errors
     /// Data that JSON cannot hold; there are none.
-    pub fn to_html(&self) -> Result<String> {
+    pub fn to_html(&self, provenance: &Provenance) -> Result<String> {
         let json = serde_json::to_string(self).map_err(|e| Error::Computation(format!("JSON: {e}")))?;
         // Within strings only: nothing in the data can end the element that they are in.
         let island = json.replace('<', "\\u003c");
@@ -234,17 +236,27 @@ impl Page {
         Ok(FRAME
             .replace("/*STYLE*/", STYLE)
             .replace("/*SCRIPT*/", &SCRIPTS.concat().replace("/*COLOURS*/", &colours.concat()))
-            .replace("/*DATA*/", &island))
+            .replace("/*DATA*/", &island)
+            .replace("<!--PROVENANCE-->", &metadata(provenance)))
     }
 
     /// Writes the file.
     ///
     /// # Errors
     /// As [`write_file`].
-    pub fn write(&self, path: &Path) -> Result<()> {
-        let html = self.to_html()?;
+    pub fn write(&self, path: &Path, provenance: &Provenance) -> Result<()> {
+        let html = self.to_html(provenance)?;
         write_file(path, |out| out.write_all(html.as_bytes()))
     }
+}
+
+/// What made the page, for who reads its source.
+fn metadata(provenance: &Provenance) -> String {
+    let meta = |line: &String| {
+        let (name, content) = line.split_once(": ").unwrap_or(("description", line));
+        format!(r#"<meta name="{name}" content="{}">"#, escaped(content))
+    };
+    provenance.lines().iter().map(meta).collect::<Vec<_>>().join("\n")
 }
 
 #[cfg(test)]
@@ -276,7 +288,7 @@ mod tests {
             spectra: Vec::new(),
             view: None,
         };
-        let html = page.to_html().unwrap();
+        let html = page.to_html(&Provenance::default()).unwrap();
         // The island, the script, and their ends.
         assert_eq!((html.matches("<script").count(), html.matches("</script").count()), (2, 2));
         assert!(!html.contains("<!-- /*DATA*/") && !html.contains("/*STYLE*/") && !html.contains("/*COLOURS*/"));

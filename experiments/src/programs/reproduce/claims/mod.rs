@@ -34,7 +34,7 @@ use limitlab::output::write_file;
 use limitlab::{Result, names};
 
 use crate::programs::reproduce::context::{Context, Item};
-use crate::report::table::CsvFile;
+use crate::report::table::{CsvFile, write_page};
 
 use crate::programs::reproduce::pages;
 use finding::{Evidence, Finding, Value, Verdict};
@@ -106,13 +106,12 @@ fn run_ledger(context: &mut Context) -> Result<()> {
     let quick = context.quick;
     let records = compute(context, all().filter(|c| !(quick && c.slow)))?;
     let table = table(&records);
-    let folder = context.folder();
-    let write = |name: &str, text: &str| write_file(&folder.join(name), |out| out.write_all(text.as_bytes()));
+    let (folder, provenance) = (context.folder(), context.provenance());
     let page = page(context, &records);
     let other = [("as CSV", "claims.csv".into()), ("as JSON", "claims.json".into())];
-    write("claims.md", &pages::of_words(&page, &other))?;
-    write("claims.csv", &table.to_csv())?;
-    write("claims.json", &format!("{:#}\n", json(&records)))?;
+    write_page(&folder.join("claims.md"), &pages::of_words(&page, &other), &provenance)?;
+    table.write_csv_file(&folder.join("claims.csv"), &provenance)?;
+    write_file(&folder.join("claims.json"), |out| writeln!(out, "{:#}", json(&records)))?;
     context.printer.page(&page)?;
     context.made.pages += 1;
     context.note_table(&table);
@@ -132,7 +131,7 @@ fn run_findings(context: &mut Context) -> Result<()> {
     }
     let page = findings::page(&context.note_on_meshes(), &context.ledger)?;
     let written = pages::of_words(&page, &[]);
-    write_file(&context.folder().join("findings.md"), |out| out.write_all(written.as_bytes()))?;
+    write_page(&context.folder().join("findings.md"), &written, &context.provenance())?;
     context.made.pages += 1;
     context.printer.page(&page)
 }
