@@ -100,7 +100,7 @@ pub fn abandon() -> Vec<PathBuf> {
     complete
 }
 
-/// The files with other content that those of this process took the place of, in order.
+/// The files with other content that those of this process took the place of, in order and as they were named.
 pub fn replaced() -> Vec<PathBuf> {
     ledger().replaced.clone()
 }
@@ -109,7 +109,7 @@ pub fn replaced() -> Vec<PathBuf> {
 struct Ledger {
     temporary: Vec<PathBuf>,
     complete: Vec<PathBuf>,
-    /// Of `complete`, those that took the place of a file with other content.
+    /// Of the complete ones, those that took the place of a file with other content, as they were asked for.
     replaced: Vec<PathBuf>,
 }
 
@@ -156,7 +156,7 @@ impl Batch {
     /// those before it stay and the rest is removed.
     pub fn commit(self) -> Result<()> {
         for staged in self.staged {
-            staged.temporary.rename(&staged.target).map_err(|e| Error::io(&staged.asked, "write", e))?;
+            staged.temporary.rename(&staged.target, &staged.asked).map_err(|e| Error::io(&staged.asked, "write", e))?;
         }
         Ok(())
     }
@@ -255,7 +255,7 @@ impl Temporary {
         }
     }
 
-    fn rename(self, target: &Path) -> io::Result<()> {
+    fn rename(self, target: &Path, asked: &Path) -> io::Result<()> {
         let mut ledger = ledger();
         let is_first = !ledger.complete.iter().any(|known| known == target);
         let replaces = is_first && target.exists() && !is_same(&self.path, target).unwrap_or(false);
@@ -265,7 +265,7 @@ impl Temporary {
             ledger.complete.push(target.to_path_buf());
         }
         if replaces {
-            ledger.replaced.push(target.to_path_buf());
+            ledger.replaced.push(asked.to_path_buf());
         }
         Ok(())
     }
@@ -317,6 +317,20 @@ mod tests {
             assert_eq!(fs::read_to_string(&path).unwrap(), text);
         }
         assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn what_is_replaced_is_known_if_it_was_another_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let [other, same, new] = ["other", "same", "new"].map(|name| folder.path().join(name));
+        fs::write(&other, "theirs").unwrap();
+        fs::write(&same, "ours").unwrap();
+        for path in [&other, &same, &new] {
+            write(path, "ours").unwrap();
+            write(path, "ours, later").unwrap();
+        }
+        let here: Vec<PathBuf> = replaced().into_iter().filter(|path| path.starts_with(folder.path())).collect();
+        assert_eq!(here, [other]);
     }
 
     #[test]

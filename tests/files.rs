@@ -53,6 +53,40 @@ fn any_mesh() -> impl Strategy<Value = (Mesh, Vec<DVec3>)> {
     })
 }
 
+#[test]
+fn comments_stand_near_the_top_of_every_format_and_readers_pass_over_them() {
+    let positions = [[0.0, 0.0, 0.5], [1.0, 0.25, 0.0], [0.0, 1.0, 0.0]].map(DVec3::from).to_vec();
+    let mesh = Mesh::new(positions, Faces::from_lists([[0, 1, 2]]));
+    let normals = [DVec3::Z; 3];
+    let comments = ["command: x 'y z' # f 1 2 3".to_owned(), "end_header 1".into()];
+    for (ending, sign, ascii) in [
+        ("obj", "#", false),
+        ("off", "#", false),
+        ("ply", "comment", false),
+        ("ply", "comment", true),
+        ("usda", "#", false),
+    ] {
+        let format: io::Format = ending.parse().unwrap();
+        for normals in [None, Some(&normals[..])] {
+            let options = io::WriteOptions { normals, ascii, comments: &comments, ..Default::default() };
+            let mut bytes = Vec::new();
+            io::write_control_to(&mut bytes, format, &mesh, &options).unwrap();
+            let top = String::from_utf8_lossy(&bytes[..150]);
+            assert!(
+                comments.iter().all(|comment| top.contains(&format!("\n{sign} {comment}\n"))
+                    || top.starts_with(&format!("{sign} {comment}\n"))),
+                "{top}"
+            );
+            let read = io::read_from(&bytes[..], format, Path::new(ending)).unwrap();
+            assert_eq!((&read.mesh.positions, &read.mesh.faces), (&mesh.positions, &mesh.faces), "{ending}");
+            // By the polynomial, bit by bit.
+            let step = |sum: u32, _| if sum & 1 == 1 { sum >> 1 ^ 0xEDB8_8320 } else { sum >> 1 };
+            let sum = bytes.iter().fold(u32::MAX, |sum, &byte| (0..8).fold(sum ^ u32::from(byte), step));
+            assert_eq!(read.checksum, Some(!sum), "{ending}");
+        }
+    }
+}
+
 proptest! {
     #[test]
     fn every_mesh_reads_back_bit_by_bit((mesh, normals) in any_mesh(), with_normals: bool) {

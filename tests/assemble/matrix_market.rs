@@ -53,16 +53,19 @@ fn refused<T: std::fmt::Debug>(result: limitlab::Result<T>) -> (Option<usize>, S
 
 #[test]
 fn systems_read_back_bit_by_bit() {
+    let comments = ["command: any %d # of them".to_owned(), String::new()];
     for scheme in Scheme::ALL {
         for seed in 0..6 {
             let mesh = scattered(&small_mesh(scheme, seed), seed);
             let system = system(&mesh, scheme);
             let folder = tempdir().unwrap();
             let path = |name: &str| folder.path().join(name);
-            write_file(&path("A.mtx"), |out| write_general(&system.a, &[], out)).unwrap();
-            write_file(&path("M.mtx"), |out| write_symmetric(&system.m, &[], out)).unwrap();
-            write_file(&path("H.mtx"), |out| write_vector(&system.h, &[], out)).unwrap();
-            write_file(&path("P.mtx"), |out| write_points(&mesh.positions, &[], out)).unwrap();
+            write_file(&path("A.mtx"), |out| write_general(&system.a, &comments, out)).unwrap();
+            write_file(&path("M.mtx"), |out| write_symmetric(&system.m, &comments, out)).unwrap();
+            write_file(&path("H.mtx"), |out| write_vector(&system.h, &comments, out)).unwrap();
+            write_file(&path("P.mtx"), |out| write_points(&mesh.positions, &comments, out)).unwrap();
+            let text = std::fs::read_to_string(path("A.mtx")).unwrap();
+            assert_eq!(text.lines().nth(1), Some("% command: any %d # of them"));
             assert_eq!(read_matrix(&path("A.mtx")).unwrap(), system.a);
             let (read, points) = read_system(folder.path()).unwrap();
             assert_eq!(

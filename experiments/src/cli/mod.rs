@@ -18,7 +18,7 @@ pub use progress::Progress;
 pub use provenance::{parse, print_object, provenance};
 
 use std::io::{BufWriter, ErrorKind, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -54,6 +54,17 @@ impl CommonFlags {
         process::heed_signals();
         process::start_threads(self.threads, |text| self.remark(text))?;
         Ok(Provenance { threads: Some(rayon::current_num_threads()), ..provenance })
+    }
+
+    /// Says at the end which files were replaced, if any.
+    pub fn remark_on_replaced(&self) {
+        match limitlab::output::replaced().as_slice() {
+            [] => {}
+            [one] => self.remark(format_args!("replaced: {}", one.display())),
+            all @ [first, ..] => {
+                self.remark(format_args!("replaced: {} files, the first {}", all.len(), first.display()));
+            }
+        }
     }
 
     /// Tells the user something on standard error, unless asked to be quiet.
@@ -118,6 +129,46 @@ impl FigureFlags {
     }
 }
 
+/// What becomes of files that are there already.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct ReplaceFlags {
+    /// Refuse, before the work, to replace a file that is there. Unless told, files are replaced, and a remark says which
+    #[arg(long, conflicts_with = "force")]
+    no_clobber: bool,
+    /// Replace read-only files too
+    #[arg(long)]
+    force: bool,
+}
+
+impl ReplaceFlags {
+    /// Does before the work what was asked for the file of this name, if there is one.
+    ///
+    /// # Errors
+    /// A file that would be replaced, with --no-clobber; one that is not ours, with --force.
+    pub fn settle(&self, path: &Path) -> Result<()> {
+        match path.is_file() {
+            true if self.no_clobber => {
+                let what = "it is there already: name another place, or leave out --no-clobber";
+                Err(Error::io(path, "write", std::io::Error::new(ErrorKind::AlreadyExists, what)))
+            }
+            true if self.force => limitlab::output::allow_replacing(path),
+            _ => Ok(()),
+        }
+    }
+
+    /// As [`settle`](Self::settle), for all tables and figures of these names in a folder.
+    ///
+    /// # Errors
+    /// As [`settle`](Self::settle).
+    pub fn settle_all<S: AsRef<str>>(&self, folder: &Path, stems: impl IntoIterator<Item = S>) -> Result<()> {
+        const ENDS: [&str; 6] = [".csv", ".md", "-history.csv", ".png", ".svg", ".pdf"];
+        let mut stems = stems.into_iter();
+        stems.try_for_each(|stem| {
+            ENDS.iter().try_for_each(|end| self.settle(&folder.join(stem.as_ref().to_owned() + end)))
+        })
+    }
+}
+
 /// Where results go.
 #[derive(Args, Clone, Debug)]
 pub struct OutputFlags {
@@ -129,9 +180,19 @@ pub struct OutputFlags {
     pub json: bool,
     #[command(flatten)]
     figures: FigureFlags,
+    #[command(flatten)]
+    pub replace: ReplaceFlags,
 }
 
 impl OutputFlags {
+    /// Does what was asked for tables and figures that have these names already: before the work.
+    ///
+    /// # Errors
+    /// As [`ReplaceFlags::settle`].
+    pub fn settle<S: AsRef<str>>(&self, stems: impl IntoIterator<Item = S>) -> Result<()> {
+        self.replace.settle_all(&self.out, stems)
+    }
+
     /// Creates the folder: before the work, so that a place that cannot be written is told at once.
     ///
     /// # Errors
@@ -250,6 +311,7 @@ pub fn print_table(table: &Table) -> Result<()> {
 /// If standard output cannot be written.
 pub fn finish(results: Vec<Value>, output: &OutputFlags, common: &CommonFlags, provenance: &Provenance) -> Result<()> {
     common.remark(format_args!("tables and plots: {}", output.out.display()));
+    common.remark_on_replaced();
     if !output.json {
         return Ok(());
     }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use serde_json::json;
 
-use crate::cli::{self, CommonFlags, MeshFlags};
+use crate::cli::{self, CommonFlags, MeshFlags, ReplaceFlags};
 use crate::report::Provenance;
 use limitlab::Result;
 use limitlab::assemble::matrix_market;
@@ -33,11 +33,15 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    replace: ReplaceFlags,
+    #[command(flatten)]
     mesh: MeshFlags,
     #[command(flatten)]
     common: CommonFlags,
 }
 
+/// The folder of the system of the smooth vertices.
+const OF_BLOCK: &str = "smooth";
 /// What is written.
 const FILES: [&str; 5] = ["A.mtx", "M.mtx", "H.mtx", "P.mtx", "R.mtx"];
 
@@ -55,6 +59,8 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     }
     create_dir(&arguments.out)?;
     for name in FILES {
+        arguments.replace.settle(&arguments.out.join(name))?;
+        arguments.replace.settle(&arguments.out.join(OF_BLOCK).join(name))?;
         check_target(&arguments.out.join(name))?;
     }
     let input = arguments.mesh.input(&arguments.input, &arguments.common)?;
@@ -71,7 +77,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         batch.write(&whole[0], |out| matrix_market::write_general(&matrix, &comments, out))?;
         batch.write(&whole[1], |out| matrix_market::write_points(points, &comments, out))?;
         files.extend(whole);
-        folder.push("smooth");
+        folder.push(OF_BLOCK);
     }
     // With darts and semi-sharp vertices the smooth ones have no system of their own.
     if stages.stars().is_none() {
@@ -98,6 +104,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         names.diagonal,
         names.symmetric
     ));
+    arguments.common.remark_on_replaced();
     if arguments.json {
         let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
         let object = input.json(json!({

@@ -82,11 +82,14 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     }
     arguments.output.prepare()?;
     if let Some(path) = &arguments.html {
+        arguments.output.replace.settle(path)?;
         check_target(path)?;
     }
     let mut results = Vec::new();
     for name in &arguments.meshes {
         let problem = arguments.mesh.problem(name, &arguments.stop, arguments.order, &arguments.common)?;
+        let stem = problem.subject.stem("compare-solvers");
+        arguments.output.settle([&stem])?;
         let made = provenance.about(&problem.subject.source);
         let Compared { rows, refused, measured } = compare(&problem, &arguments.wanted())?;
         let about = format!(
@@ -95,7 +98,6 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
             problem.stop.tolerance * problem.scale,
             problem.subject.unit
         );
-        let stem = problem.subject.stem("compare-solvers");
         let table = study::table(stem.clone(), format!("All methods on {}", problem.subject.title), about, &rows);
         table.write(&arguments.output.out, &made)?;
         let figure = study::figure(problem.subject.caption(), problem.subject.unit, &rows);

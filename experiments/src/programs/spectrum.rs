@@ -63,6 +63,10 @@ pub struct Arguments {
     common: CommonFlags,
 }
 
+/// What begins the names of its files.
+const STEMS: [&str; 6] =
+    ["spectrum", "spectrum-rates", "spectrum-full", "spectrum-modes", "spectrum-histogram", "spectrum-eigenvalues"];
+
 /// What `spectrum` runs on without arguments.
 const BUILT_IN: [&str; 4] = ["torus:32x32", "quad-sphere:4", "icosphere:3", "prism:9"];
 const BINS: usize = 60;
@@ -184,11 +188,13 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     for name in &arguments.meshes {
         let (subject, findings, n) = match arguments.mesh.given(name)? {
             Some(given) => {
+                arguments.output.settle(STEMS.map(|stem| given.subject.stem(stem)))?;
                 let findings = analyse_given(&given, arguments)?;
                 (given.subject, findings, given.points.len())
             }
             None => {
                 let input = arguments.mesh.input(name, &arguments.common)?;
+                arguments.output.settle(STEMS.map(|stem| input.stem(stem)))?;
                 if input.surface.features().is_some_and(Features::has_stars) {
                     results.push(complex(&input, arguments, provenance)?);
                     continue;

@@ -100,6 +100,7 @@ fn run_sharp(
 ) -> Result<()> {
     let rows = sharp_rows(scheme, vertex, valences)?;
     let tables = study::sharp_tables(scheme, vertex, &rows);
+    arguments.output.settle(tables.iter().map(|table| &table.id))?;
     for table in &tables {
         table.write(&arguments.output.out, provenance)?;
     }
@@ -151,6 +152,7 @@ fn run(arguments: &Arguments, scheme: LocalScheme, valences: &[usize], provenanc
     let sampled = study::sampled(scheme, valences)?;
     let tables = study::tables(scheme, valences, &rows, sampled.as_ref())?;
     let figures = study::figures(scheme, valences, sampled.as_ref())?;
+    arguments.output.settle(tables.iter().map(|table| &table.id).chain(figures.iter().map(|(stem, _)| stem)))?;
     let mut object = json!({
         "scheme": scheme.name(),
         "alpha": match scheme {

@@ -89,6 +89,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     let mut results = Vec::new();
     for name in &arguments.meshes {
         let problem = arguments.mesh.problem(name, &arguments.stop, arguments.order, &arguments.common)?;
+        arguments.output.settle([problem.subject.stem("sweep-omega")])?;
         let made = provenance.about(&problem.subject.source);
         let table = |sweep: &OmegaSweep| {
             study::table(

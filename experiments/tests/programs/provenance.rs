@@ -166,3 +166,77 @@ fn reproduce_writes_the_same_bytes_every_time() {
         assert!(!contains(&bytes, "date: ") && !contains(&bytes, "--threads"), "{name}");
     }
 }
+
+/// Standard error of a run that is done.
+fn remarks(program: &str, folder: &Path, arguments: &[&str]) -> String {
+    let output = run(program, folder, arguments);
+    assert_done(&output, program);
+    text(&output.stderr).into()
+}
+
+#[test]
+fn no_file_is_replaced_without_a_word() {
+    let folder = tempdir().unwrap();
+    let at = |arguments: &[&str]| remarks(COMPARE, folder.path(), arguments);
+    let first = ["cube", "--method", "pia", "--out", "o"];
+    assert!(!at(&first).contains("replaced"));
+    let said = at(&["cube", "--method", "lu", "--out", "o"]);
+    assert!(said.contains("replaced: 4 files, the first o/compare-solvers-cube-catmull-clark.csv"), "{said}");
+    let output = run(COMPARE, folder.path(), [&first[..], &["--json"]].concat());
+    assert_eq!(json(&output)["replaced"].as_array().unwrap().len(), 4);
+    // Another mesh has other files.
+    assert!(!at(&["prism:5", "--method", "lu", "--out", "o"]).contains("replaced"));
+
+    let cage = |more: &[&str]| remarks(INTERPOLATE, folder.path(), &[&["cube", "-o", "x.off"], more].concat());
+    assert!(!cage(&[]).contains("replaced"));
+    assert!(cage(&["--tol", "1e-8"]).contains("replaced: x.off\n"));
+    // Who names one file twice wants it replaced.
+    assert!(!remarks(INTERPOLATE, folder.path(), &["x.off", "-o", "x.off"]).contains("replaced"));
+    // The same bytes replace nothing.
+    let reproduce = ["--only", "sparsity", "--quick", "--out", "r"];
+    for _ in 0..2 {
+        assert!(!remarks(REPRODUCE, folder.path(), &reproduce).contains("replaced"));
+    }
+}
+
+#[test]
+fn no_clobber_refuses_before_the_work() {
+    let folder = tempdir().unwrap();
+    let runs: [(&str, &[&str], &str); 6] = [
+        (COMPARE, &["cube", "--method", "pia", "--out", "c"], "c/compare-solvers-cube-catmull-clark.csv"),
+        (SWEEP, &["cube", "--omega", "1:1:1", "--out", "w"], "w/sweep-omega-cube-catmull-clark.csv"),
+        (SPECTRUM, &["cube", "--out", "s"], "s/spectrum-cube-catmull-clark.csv"),
+        (SPLITTING, &["--valence", "5", "--out", "l"], "l/splitting-catmull-clark"),
+        (ASSEMBLE, &["cube", "--out", "a"], "a/A.mtx"),
+        (INTERPOLATE, &["cube", "-o", "x.off"], "x.off"),
+    ];
+    for (program, arguments, file) in runs {
+        let refuse = [arguments, &["--no-clobber", "--quiet"]].concat();
+        assert_done(&run(program, folder.path(), &refuse), "nothing is there");
+        let all: Vec<_> = below(folder.path()).into_iter().map(|name| folder.path().join(name)).collect();
+        let bytes = |all: &[std::path::PathBuf]| all.iter().map(|path| fs::read(path).ok()).collect::<Vec<_>>();
+        let before = bytes(&all);
+        let error = assert_refused(&run(program, folder.path(), &refuse), program);
+        assert!(error.starts_with(&format!("error: {file}")), "{error}");
+        assert!(error.ends_with("it is there already: name another place, or leave out --no-clobber"), "{error}");
+        assert!(before == bytes(&all) && below(folder.path()).len() == all.len(), "{program}");
+    }
+    // A table of another mesh whose name ends alike is not in the way.
+    let other = ["prism:4", "--method", "pia", "--out", "c", "--no-clobber", "--quiet"];
+    assert_done(&run(COMPARE, folder.path(), other), "another mesh");
+    let both = run(INTERPOLATE, folder.path(), ["cube", "-o", "x.off", "--no-clobber", "--force"]);
+    assert_eq!(both.status.code(), Some(2));
+}
+
+#[test]
+fn force_replaces_what_is_read_only() {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("x.off");
+    fs::write(&path, "mine").unwrap();
+    let mut permissions = fs::metadata(&path).unwrap().permissions();
+    permissions.set_readonly(true);
+    fs::set_permissions(&path, permissions).unwrap();
+    let error = assert_refused(&run(INTERPOLATE, folder.path(), ["cube", "-o", "x.off", "--quiet"]), "read-only");
+    assert!(error.contains("read-only"), "{error}");
+    assert!(remarks(INTERPOLATE, folder.path(), &["cube", "-o", "x.off", "--force"]).contains("replaced: x.off"));
+}

@@ -299,7 +299,6 @@ fn without_times(path: &Path) -> Vec<Vec<String>> {
 fn results_do_not_depend_on_the_number_of_threads() {
     let folder = tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    let bytes = |name: &str| fs::read(path(name)).unwrap();
     for threads in ["1", "2"] {
         let common = ["--noise", "0.1", "--threads", threads, "--quiet"];
         let with = |more: &[&str]| -> Vec<String> { more.iter().chain(&common).map(|s| s.to_string()).collect() };

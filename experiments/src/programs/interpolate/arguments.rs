@@ -5,7 +5,7 @@ use std::path::{Display, Path, PathBuf};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser};
 
-use crate::cli::{self, CommonFlags, MeshFlags, MonitorFlags, STANDARD_STREAM, StopFlags, WHICH_METHOD};
+use crate::cli::{self, CommonFlags, MeshFlags, MonitorFlags, ReplaceFlags, STANDARD_STREAM, StopFlags, WHICH_METHOD};
 use limitlab::mesh::order::Order;
 use limitlab::schemes::Refinement;
 use limitlab::solvers::Method;
@@ -46,6 +46,8 @@ pub struct Arguments {
     /// Print one JSON object on standard output, and nothing else there
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub replace: ReplaceFlags,
     #[command(flatten)]
     pub shape: ShapeFlags,
     #[command(flatten)]

@@ -152,8 +152,11 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     }
     let target = Target::of(arguments)?;
     let in_place = target.file.is_some_and(|file| is_file_of(&arguments.input, file));
-    if let Some(file) = target.file.filter(|_| !in_place) {
-        check_target(file)?;
+    if let Some(file) = target.file {
+        arguments.replace.settle(file)?;
+        if !in_place {
+            check_target(file)?;
+        }
     }
     let input = arguments.mesh.input(&arguments.input, &arguments.common)?;
     let refinement = match arguments.method {
@@ -212,6 +215,9 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         }
     }
     remark_on_output(arguments, &input, &target, &options);
+    if !in_place {
+        arguments.common.remark_on_replaced();
+    }
     result.seconds.write = start.elapsed().as_secs_f64();
     print_summary(arguments, &input, &per_vertex, &result, provenance)
 }

@@ -191,6 +191,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     } else if !chosen.is_empty() {
         arguments.common.remark(format_args!("reports: {}", context.folder().display()));
     }
+    arguments.common.remark_on_replaced();
     let claims = claims::json(&context.ledger);
     context.finish(claims, provenance)
 }

@@ -17,7 +17,7 @@ use clap::Parser;
 use glam::DVec3;
 use serde_json::json;
 
-use crate::cli::{self, CommonFlags, FigureFlags, List, Printer, Progress, number};
+use crate::cli::{self, CommonFlags, FigureFlags, List, Printer, Progress, ReplaceFlags, number};
 use crate::report::{Colour, Column, Columns, Dash, Figure, LinePlot, Marker, Provenance, Scale, Series, Style, Table};
 use crate::studies::style;
 use limitlab::analysis::spectrum::spectrum;
@@ -83,11 +83,16 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    replace: ReplaceFlags,
+    #[command(flatten)]
     figures: FigureFlags,
     #[command(flatten)]
     common: CommonFlags,
 }
 
+/// The names of its files.
+const STEMS: [&str; 6] =
+    ["scaling", "scaling-threads", "scaling-profile", "scaling-edits", "scaling-steps", "scaling-decay"];
 /// The smallest mesh that every generator makes.
 const LEAST: usize = 100;
 /// Vertices of the mesh that the interval of Chebyshev iterations is estimated on.
@@ -98,6 +103,7 @@ pub fn main(arguments: Arguments, provenance: Provenance) -> ExitCode {
     cli::exit(|| {
         let provenance = arguments.common.apply(provenance)?;
         limitlab::output::create_dir(&arguments.out)?;
+        arguments.replace.settle_all(&arguments.out, STEMS)?;
         measure(&arguments, &provenance)
     })
 }
@@ -152,6 +158,7 @@ fn measure(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     drop(progress);
     printer.table(&table)?;
     arguments.common.remark(format_args!("tables and plot: {}", arguments.out.display()));
+    arguments.common.remark_on_replaced();
     printer.finish(json!({ "threads": threads, "triad_bytes_per_second": number(bandwidth) }), provenance)
 }
 
