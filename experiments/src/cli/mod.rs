@@ -10,7 +10,7 @@ mod progress;
 mod provenance;
 
 pub use input::{Input, MeshFlags, STAND_IN_NOISE, STANDARD_STREAM, subdivision_of};
-pub use json::print_json;
+use json::print_json;
 pub use monitor::MonitorFlags;
 pub use problem::{Given, Matrix, Problem, Subject};
 pub use process::{exit, say};
@@ -29,6 +29,22 @@ use limitlab::solvers::Stop;
 
 /// Version and commit, as `--version` says them.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("LIMITLAB_COMMIT"), ")");
+
+/// Exit status 0 of most programs.
+pub const DONE: &str = "done";
+
+/// Exit status 0 of programs whose rows are results whatever came of them.
+pub const DONE_ANYHOW: &str = "done, also where a method did not converge, which is a result";
+
+/// The end of a program's help: examples, the exit statuses, what else to read.
+pub fn ending(examples: &[&str], done: &str, more: Option<&str>) -> String {
+    let examples: String = examples.iter().map(|example| format!("  {example}\n")).collect();
+    let more = more.map_or_else(String::new, |more| format!("\n\n{more}"));
+    format!(
+        "Examples:\n{examples}\nExit status: 0 {done}; 1 the input or the computation failed, and one line \"error: …\" says what \
+         to do; 2 bad arguments.{more}"
+    )
+}
 
 /// The end of the help of programs that take a method.
 pub const WHICH_METHOD: &str = "Which method for which mesh: docs/methods.md, ten lines with their evidence.";

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{Parser, ValueHint};
 use serde_json::json;
 
 use crate::cli::{self, CommonFlags, MeshFlags, ReplaceFlags};
@@ -11,6 +11,10 @@ use crate::report::Provenance;
 use limitlab::Result;
 use limitlab::assemble::matrix_market;
 use limitlab::output::{Batch, check_target, create_dir};
+
+/// In its help.
+const EXAMPLES: [&str; 2] =
+    ["assemble model.ply --out system", "assemble torus:8x6 --scheme nasri --out system --json"];
 
 /// Writes A, M, H and P of the limit system A V = P, A = H·M, as Matrix Market files with 17 significant digits,
 /// in the vertex order of the mesh. On an open or creased mesh A is no such product: A.mtx and P.mtx are those of all
@@ -21,10 +25,10 @@ use limitlab::output::{Batch, check_target, create_dir};
 /// given points, and R.mtx = H⁻¹P, the right-hand side of M V = R. With --scheme zheng-cai, M and R are the paper's
 /// Eq. 6 in its own scaling.
 #[derive(Parser)]
-#[command(name = "assemble", version = cli::VERSION)]
+#[command(name = "assemble", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE, None))]
 pub struct Arguments {
     /// A mesh file (.obj, .off, .ply, .usda) or a built-in name
-    #[arg(value_name = "MESH")]
+    #[arg(value_name = "MESH", value_hint = ValueHint::FilePath)]
     input: String,
     /// Folder for the five files
     #[arg(long, value_name = "DIR")]

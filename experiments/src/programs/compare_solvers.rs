@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser};
+use clap::{CommandFactory, Parser, ValueHint};
 use nalgebra::Complex;
 use serde_json::json;
 
@@ -27,6 +27,13 @@ use limitlab::output::check_target;
 use limitlab::solvers::{Errors, Method, Step, System};
 use limitlab::{Error, Result};
 
+/// In its help.
+const EXAMPLES: [&str; 3] = [
+    "compare-solvers model.off --tol 1e-8",
+    "compare-solvers model.off --method pia,cg,auto --html page.html",
+    "compare-solvers system/",
+];
+
 /// Runs every method on the same system from the same start V = P, and prints iterations, errors, observed and
 /// predicted rate, and the seconds of set-up and solve apart, the least of several runs where a run is short. Beside the
 /// picture stands a CSV file with the errors of every iterate.
@@ -36,10 +43,10 @@ use limitlab::{Error, Result};
 ///
 /// Where a mesh has darts or semi-sharp vertices, methods that need a symmetric M are left out, and the others run on all of A.
 #[derive(Parser)]
-#[command(name = "compare-solvers", version = cli::VERSION, after_help = WHICH_METHOD)]
+#[command(name = "compare-solvers", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE_ANYHOW, Some(WHICH_METHOD)))]
 pub struct Arguments {
     /// Mesh files (.obj, .off, .ply, .usda), built-in names, or folders with M.mtx, H.mtx and P.mtx; torus:32x32 with --noise 0.1 unless told
-    #[arg(value_name = "MESH|SYSTEM_DIR")]
+    #[arg(value_name = "MESH|SYSTEM_DIR", value_hint = ValueHint::AnyPath)]
     meshes: Vec<String>,
     /// Methods, separated by commas, auto among them; all unless told
     #[arg(long, value_name = "NAME,…")]

@@ -3,6 +3,7 @@
 
 pub mod assemble;
 pub mod compare_solvers;
+pub mod front;
 pub mod interpolate;
 pub mod reproduce;
 pub mod scaling;

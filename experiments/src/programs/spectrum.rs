@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{Parser, ValueHint};
 use glam::DVec3;
 use serde_json::{Map, Value, json};
 
@@ -25,6 +25,9 @@ use limitlab::mesh::features::Features;
 use limitlab::solvers::direct::SINGULAR;
 use limitlab::solvers::{Method, Stop, System};
 
+/// In its help.
+const EXAMPLES: [&str; 2] = ["spectrum model.off --modes 6", "spectrum icosphere:2 --scheme loop --full --json"];
+
 /// The ends of the spectra of A and D⁻¹A and the spectral radius of each method's error matrix, with proven bounds
 /// beside them, and whether the system is singular. A folder is taken for a system of anybody, as `compare-solvers` does:
 /// then the bounds are those of its entries, and singular is what rounding cannot tell from it.
@@ -32,11 +35,11 @@ use limitlab::solvers::{Method, Stop, System};
 /// Where a mesh has darts or semi-sharp vertices, no diagonal makes A symmetric: all eigenvalues, which may be complex, are
 /// computed (up to 2000 vertices), without bounds, which are proven for symmetric matrices.
 #[derive(Parser)]
-#[command(name = "spectrum", version = cli::VERSION)]
+#[command(name = "spectrum", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE_ANYHOW, None))]
 pub struct Arguments {
     /// Mesh files (.obj, .off, .ply, .usda), built-in names, or folders with M.mtx, H.mtx and P.mtx; unless told, four
     /// built-in ones with --noise 0.1
-    #[arg(value_name = "MESH|SYSTEM_DIR")]
+    #[arg(value_name = "MESH|SYSTEM_DIR", value_hint = ValueHint::AnyPath)]
     meshes: Vec<String>,
     /// Compute all eigenvalues (up to 4000 vertices), with a histogram
     #[arg(long)]

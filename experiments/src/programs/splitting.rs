@@ -15,12 +15,15 @@ use limitlab::analysis::splitting::{
 };
 use limitlab::{Error, Result, names};
 
+/// In its help.
+const EXAMPLES: [&str; 2] = ["splitting --valence 3..12 --scheme loop", "splitting --at crease --scheme catmull-clark"];
+
 /// Local splitting matrices, read off from the refinement rules: eigenvalues, limit and tangent masks with closed
 /// forms beside them, characteristic maps. For catmull-clark also what Thall prints, for sqrt3 also Lin and Luo's
 /// eigenvalue condition over α. With --at, the same at vertices that are not smooth, under catmull-clark and loop: on a
 /// boundary, on a crease with half of the faces on each side, at a corner of a boundary, at a dart.
 #[derive(Parser)]
-#[command(name = "splitting", version = cli::VERSION)]
+#[command(name = "splitting", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE, None))]
 pub struct Arguments {
     /// Valences from A to B, both included, or a single one; within 3..100, on a boundary, where it is the number of faces,
     /// 1..100

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use clap::Parser;
+use clap::{Parser, ValueHint};
 use serde_json::{Map, Value, json};
 
 use crate::cli::{
@@ -21,15 +21,21 @@ use limitlab::error::short;
 use limitlab::mesh::order::Order;
 use limitlab::solvers::{Method, Recorded};
 
+/// In its help.
+const EXAMPLES: [&str; 2] = [
+    "sweep-omega model.obj --method jacobi,pia --omega 0.05:1.2:0.05",
+    "sweep-omega torus:32x32 --noise 0.1 --figure png,svg",
+];
+
 /// Sweeps the damping ω of Jacobi, PIA and SOR: iterations to the tolerance and the measured rate, with the
 /// predicted spectral radius ρ(ω), the critical and the optimal ω beside them. A folder is taken for a system of anybody,
 /// as `compare-solvers` does.
 #[derive(Parser)]
-#[command(name = "sweep-omega", version = cli::VERSION)]
+#[command(name = "sweep-omega", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE_ANYHOW, None))]
 pub struct Arguments {
     /// Mesh files (.obj, .off, .ply, .usda), built-in names, or folders with M.mtx, H.mtx and P.mtx; unless
     /// told, four built-in ones with --noise 0.1
-    #[arg(value_name = "MESH|SYSTEM_DIR")]
+    #[arg(value_name = "MESH|SYSTEM_DIR", value_hint = ValueHint::AnyPath)]
     meshes: Vec<String>,
     /// Methods to sweep: jacobi, pia, sor
     #[arg(long, value_name = "NAME,…", default_value = "jacobi,pia,sor", value_parser = methods)]

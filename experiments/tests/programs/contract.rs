@@ -16,7 +16,7 @@ fn help_and_version_end_with_success() {
         assert!(help.stderr.is_empty());
         let version = run(program, folder.path(), ["--version"]);
         assert_done(&version, program);
-        assert!(text(&version.stdout).trim_end().ends_with(env!("CARGO_PKG_VERSION")));
+        assert!(text(&version.stdout).contains(env!("CARGO_PKG_VERSION")));
     }
     assert_no_files(folder.path(), "help");
 }

@@ -4,6 +4,7 @@ mod bad_input;
 mod contract;
 mod darts;
 mod exchange;
+mod front;
 mod guide;
 mod histories;
 mod metadata;

@@ -3,13 +3,20 @@
 use std::path::{Display, Path, PathBuf};
 
 use clap::error::ErrorKind;
-use clap::{Args, CommandFactory, Parser};
+use clap::{Args, CommandFactory, Parser, ValueHint};
 
 use crate::cli::{self, CommonFlags, MeshFlags, MonitorFlags, ReplaceFlags, STANDARD_STREAM, StopFlags, WHICH_METHOD};
 use limitlab::mesh::order::Order;
 use limitlab::schemes::Refinement;
 use limitlab::solvers::Method;
 use limitlab::{Result, names};
+
+/// In its help.
+const EXAMPLES: [&str; 3] = [
+    "interpolate model.obj -o cage.obj --scheme catmull-clark",
+    "interpolate model.usda -o surface.ply --subdivide 2 --limit",
+    "interpolate - -o - --format off --quiet",
+];
 
 /// Computes the control mesh V with A V = P: the vertices P of the mesh become points of the limit surface. Unless
 /// refined by --subdivide, the faces stay, vertex for vertex, so that the result can replace the mesh in a tool that
@@ -18,10 +25,10 @@ use limitlab::{Result, names};
 /// Blender, Maya and Rhino subdivide by Catmull-Clark: for these say --scheme catmull-clark, also of a triangle mesh,
 /// which is taken for Loop unless told. The last line of a run says which tools show its surface.
 #[derive(Parser)]
-#[command(name = "interpolate", version = cli::VERSION, after_help = WHICH_METHOD)]
+#[command(name = "interpolate", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE, Some(WHICH_METHOD)))]
 pub struct Arguments {
     /// A mesh file (.obj, .off, .ply, .usda), a built-in name, or - for standard input (with --format)
-    #[arg(value_name = "MESH")]
+    #[arg(value_name = "MESH", value_hint = ValueHint::FilePath)]
     pub input: String,
     /// The mesh to write (.obj, .off, .ply, .usda; - for standard output, with --format): the control mesh, or the surface
     /// with --subdivide or --limit. In .obj a control mesh has the texture coordinates, groups, materials and normals (vn)

@@ -40,6 +40,10 @@ use limitlab::error::Error;
 use limitlab::output::check_target;
 use limitlab::{Result, names};
 
+/// In its help.
+const EXAMPLES: [&str; 3] =
+    ["reproduce", "reproduce --meshes DIR --only pia-table1", "reproduce --quick --out new --check reports"];
+
 /// Regenerates the papers' tables and figures with what this workbench measures beside what they print.
 ///
 /// With --meshes the papers' own models are read from that folder, and the results go to the report folder itself;
@@ -47,7 +51,7 @@ use limitlab::{Result, names};
 /// item on standard error as it works, and ends with one screen: the claims by verdict, the findings, where the tables
 /// are. It writes the same files every time: only --times writes what a clock measured.
 #[derive(Parser)]
-#[command(name = "reproduce", version = cli::VERSION)]
+#[command(name = "reproduce", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE, None))]
 pub struct Arguments {
     /// Only the item or claim with this ID, with its tables on standard output; may be repeated. A claim alone is
     /// printed and not written

@@ -34,6 +34,9 @@ use limitlab::schemes::Scheme;
 use limitlab::solvers::gauss_seidel::{by_colours, in_waves};
 use limitlab::solvers::{Method, Report, Stop, run};
 
+/// In its help.
+const EXAMPLES: [&str; 1] = ["scaling --sizes 1000,10000,100000 --profile 0 --gains 0 --steps 0"];
+
 /// Measures time, memory and iterations of the methods over growing meshes, from faces in memory to control points,
 /// everything counted.
 ///
@@ -41,7 +44,7 @@ use limitlab::solvers::{Method, Report, Stop, run};
 /// vertices, and 5 GB of memory; --sizes 1000,10000,100000 --profile 0 --gains 0 --steps 0 takes one. Each row is said on standard
 /// error and written as soon as it is measured, and what is there stays when the program is stopped.
 #[derive(Parser)]
-#[command(name = "scaling", version = cli::VERSION)]
+#[command(name = "scaling", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE, None))]
 pub struct Arguments {
     /// Numbers of vertices
     #[arg(long, value_name = "N,N,…", default_value = "1000,10000,100000,1000000")]
