@@ -95,7 +95,7 @@ impl CommonFlags {
 #[derive(Args, Clone, Debug)]
 pub struct StopFlags {
     /// Stop at max_i ‖p_i − (A v)_i‖ ≤ T·L, L the diagonal of the bounding box
-    #[arg(long, value_name = "T", default_value_t = StopFlags::default().tol, value_parser = positive)]
+    #[arg(long, value_name = "T", default_value = "1e-10", value_parser = positive)]
     pub tol: f64,
     /// Stop at max_i ‖p_i − (A v)_i‖ ≤ T, in the units of the mesh
     #[arg(long, value_name = "T", value_parser = positive, conflicts_with = "tol")]

@@ -24,7 +24,7 @@ impl Canvas {
         let mut pdf = Pdf::new();
         pdf.catalog(CATALOG).pages(PAGES);
         pdf.pages(PAGES).kids([PAGE]).count(1);
-        pdf.document_info(ABOUT).subject(TextStr(&provenance.lines().join("\n")));
+        pdf.document_info(ABOUT).subject(TextStr(&provenance.lines().join("; ")));
         let mut content = Content::new();
         // From here on points from the top left.
         content.transform([1.0, 0.0, 0.0, -1.0, 0.0, height]);

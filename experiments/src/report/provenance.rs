@@ -69,7 +69,7 @@ impl Provenance {
             ("program", Some(format!("limitlab {} {}", self.program, self.version))),
             ("command", Some(self.command.clone())),
             ("options", Some(options.join(" "))),
-            ("mesh", source),
+            ("input", source),
             ("threads", self.threads.map(|threads| threads.to_string())),
             ("commit", run.map(|run| run.commit.clone())),
             ("date", run.map(|run| run.date.clone())),
@@ -165,7 +165,7 @@ mod tests {
             made.lines()[2..],
             [
                 r"options: input=$'a\nb',c json=false tol=1e-10",
-                "mesh: 'x y', 8 vertices, crc32:000000ab",
+                "input: 'x y', 8 vertices, crc32:000000ab",
                 "threads: 2",
                 "commit: unknown",
                 "date: 2026-01-02T03:04:05Z"

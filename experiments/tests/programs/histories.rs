@@ -14,11 +14,13 @@ fn lines(of: &str, history: &Value) -> Vec<String> {
     history.as_array().unwrap().iter().map(line).collect()
 }
 
-/// An object without what a clock measures.
+/// An object without what a clock measures, and without what made it.
 fn without_seconds(mut value: Value) -> Value {
     match &mut value {
         Value::Object(fields) => {
-            fields.remove("seconds");
+            for name in ["seconds", "command", "options", "provenance", "replaced"] {
+                fields.remove(name);
+            }
             fields.values_mut().for_each(|field| *field = without_seconds(field.take()));
         }
         Value::Array(items) => items.iter_mut().for_each(|item| *item = without_seconds(item.take())),

@@ -116,12 +116,15 @@ pub fn content(path: &Path) -> Vec<u8> {
             pixels
         }
         Some("md") => text(&bytes).split("\n---\n").next().unwrap().into(),
-        _ => {
-            let signs = [&b"# "[..], b"% ", b"comment "];
-            let lines = bytes.split_inclusive(|&b| b == b'\n');
-            lines.filter(|line| !signs.iter().any(|sign| line.starts_with(sign))).flatten().copied().collect()
-        }
+        _ => without_comments(&bytes),
     }
+}
+
+/// The lines of a file that are no comments.
+pub fn without_comments(bytes: &[u8]) -> Vec<u8> {
+    let signs = [&b"# "[..], b"% ", b"comment "];
+    let lines = bytes.split_inclusive(|&b| b == b'\n');
+    lines.filter(|line| !signs.iter().any(|sign| line.starts_with(sign))).flatten().copied().collect()
 }
 
 /// A reader of a CSV file whose comments are passed over.

@@ -330,7 +330,7 @@ impl Context {
     /// The command that makes the files of the item at work again, or all of them, with the flags that results depend on: the
     /// same wherever, whenever and on however many threads it runs, as these files are.
     pub fn provenance(&self) -> Provenance {
-        let flags = [("--meshes DIR", self.real()), ("--quick", self.quick), ("--times", self.times)];
+        let flags = [("--meshes DIR", self.real()), ("--quick", self.quick)];
         let words = ["reproduce".to_owned()].into_iter();
         let words = words.chain(self.item.map(|id| format!("--only {id}")));
         let words = words.chain(flags.into_iter().filter(|flag| flag.1).map(|(flag, _)| flag.into()));

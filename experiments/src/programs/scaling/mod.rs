@@ -65,7 +65,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     most_edits: usize,
     /// Stop at max_i ‖p_i − (A v)_i‖ ≤ T·L, L the diagonal of the bounding box
-    #[arg(long, value_name = "T", default_value_t = 1e-10, value_parser = cli::positive)]
+    #[arg(long, value_name = "T", default_value = "1e-10", value_parser = cli::positive)]
     tol: f64,
     /// Runs of which the fastest counts, where a run takes less than a second; more where it takes milliseconds
     #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
