@@ -73,6 +73,7 @@ const PROGRAMS: &[Program] = &[
                 ("--eps", "1e-9|1|0"),
                 ("--thin-plate", "0|1|1e9|-1|nan"),
                 ("--membrane", "1|1e-9|0"),
+                ("--picture", "p.png|p.svg|p.pdf|p.gif|no/p.png"),
             ],
         ],
     },
@@ -86,7 +87,14 @@ const PROGRAMS: &[Program] = &[
         name: "compare-solvers",
         meshes: 2,
         needed: &[],
-        groups: &[COMMON, JSON, ON_MESHES, STOP, FOLDER, &[("--method", METHODS), ("--order", ORDERS)]],
+        groups: &[
+            COMMON,
+            JSON,
+            ON_MESHES,
+            STOP,
+            FOLDER,
+            &[("--method", METHODS), ("--order", ORDERS), ("--errors-at", "0|1,2|5,0,900|x")],
+        ],
     },
     Program {
         name: "sweep-omega",

@@ -10,10 +10,10 @@
 
 use glam::DVec3;
 
+use super::dense;
 use super::inertia::eigenvalues_below;
-use super::subspace_iteration::{self, EigenpairRequest, End};
+use super::subspace_iteration::{self, Cluster, EigenpairRequest, Eigenpairs, Eigenvalue, End};
 use super::symmetric::{SymmetricForm, scales, symmetric};
-use super::{dense, subspace_iteration::Eigenvalue};
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::Surface;
@@ -220,6 +220,9 @@ pub fn numerical_kernel_dimension(system: &LimitSystem) -> Result<usize> {
     Ok(eigenvalues_below(system, SymmetricForm::A, ZERO)?.below)
 }
 
+/// Relative accuracy of the eigenvalues of modes, within which they count as equal.
+const ACCURACY: f64 = 1e-9;
+
 /// A slow mode: an eigenvector of A or D⁻¹A at an end of the spectrum.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlowMode {
@@ -231,48 +234,81 @@ pub struct SlowMode {
     pub participation: f64,
 }
 
+/// Modes at one end of a spectrum.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SlowModes {
+    /// From the end inwards, those of a multiple eigenvalue one after the other.
+    pub modes: Vec<SlowMode>,
+    /// Their distinct eigenvalues, in the same order.
+    pub clusters: Vec<Cluster>,
+    /// Whether all eigenvalues have their accuracy, 1e-9 relative.
+    pub converged: bool,
+}
+
 /// The `count` modes at one end, with multiplicity: null and near-null vectors at the lowest. In a multiple
-/// eigenvalue's space the vectors are an arbitrary orthonormal basis. Dense up to 600 vertices.
+/// eigenvalue's space the vectors are an arbitrary basis, orthonormal before they are scaled. Dense up to
+/// [`dense::LARGEST`] vertices, where every multiplicity is known; by [subspace iteration](subspace_iteration) beyond, where
+/// that of the last eigenvalue may be larger.
 ///
 /// # Errors
 /// As [`subspace_iteration::extreme`] and [`dense::eigenpairs`].
-pub fn modes(system: &LimitSystem, form: SymmetricForm, end: End, count: usize) -> Result<Vec<SlowMode>> {
+///
+/// ```
+/// use limitlab::analysis::singularity::modes;
+/// use limitlab::analysis::{subspace_iteration::End, symmetric::SymmetricForm};
+/// use limitlab::assemble::LimitSystem;
+/// use limitlab::mesh::{Surface, builtin};
+/// use limitlab::schemes::Scheme;
+///
+/// let icosahedron = Surface::new(builtin::builtin("icosahedron")?)?;
+/// let system = LimitSystem::new(&icosahedron, Scheme::Loop)?;
+/// let slowest = modes(&system, SymmetricForm::A, End::Lowest, 5)?;
+/// // The graph's eigenvalue −√5 has multiplicity 3, −1 has 5.
+/// assert_eq!(slowest.clusters.iter().map(|c| c.multiplicity).collect::<Vec<_>>(), [3, 5]);
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn modes(system: &LimitSystem, form: SymmetricForm, end: End, count: usize) -> Result<SlowModes> {
     let s = symmetric(system, form);
-    let pairs: Vec<(Eigenvalue, Vec<f64>)> = if system.len() <= dense::LARGEST {
-        let (values, vectors) = dense::eigenpairs(&s)?;
-        let mut pairs: Vec<_> = values.into_iter().zip(vectors).collect();
+    let pairs = if system.len() <= dense::LARGEST {
+        let (values, mut vectors) = dense::eigenpairs(&s)?;
+        let eigenvalue = |(value, x): (f64, &Vec<f64>)| {
+            let (_, residual) = super::lanczos::rayleigh(&s, x);
+            Eigenvalue { value, residual, error: residual }
+        };
+        let mut values: Vec<Eigenvalue> = values.into_iter().zip(&vectors).map(eigenvalue).collect();
         if end == End::Highest {
-            pairs.reverse();
+            values.reverse();
+            vectors.reverse();
         }
-        pairs.truncate(count);
-        pairs
-            .into_iter()
-            .map(|(value, x)| {
-                let (_, residual) = super::lanczos::rayleigh(&s, &x);
-                let error = residual;
-                (Eigenvalue { value, residual, error }, x)
-            })
-            .collect()
+        Eigenpairs { values, vectors, converged: true, applications: 0 }
     } else {
         let b = &system.bounds;
         let spectrum = match form {
             SymmetricForm::A => (b.lambda_min, b.lambda_max),
             SymmetricForm::Jacobi => (b.jacobi_lambda_min, b.jacobi_lambda_max),
         };
-        let request = EigenpairRequest { end, count, tolerance: 1e-9, spectrum };
-        let found = subspace_iteration::extreme(&s, &request)?;
-        found.values.into_iter().zip(found.vectors).collect()
+        subspace_iteration::extreme(&s, &EigenpairRequest { end, count, tolerance: ACCURACY, spectrum })?
     };
+    let mut clusters = pairs.clusters(ACCURACY);
+    // All pairs of a small matrix are known: the last one is no part of a larger cluster.
+    if let Some(last) = clusters.last_mut().filter(|_| pairs.values.len() == system.len()) {
+        last.complete = true;
+    }
+    let mut before = 0;
+    clusters.retain(|cluster| {
+        let is_reached = before < count;
+        before += cluster.multiplicity;
+        is_reached
+    });
     let scale = scales(system, form);
-    Ok(pairs
-        .into_iter()
-        .map(|(eigenvalue, x)| {
-            let squares: f64 = x.iter().map(|x| x * x).sum();
-            let fourth: f64 = x.iter().map(|x| x.powi(4)).sum();
-            let mut values: Vec<f64> = x.iter().zip(&scale).map(|(x, s)| x * s).collect();
-            let largest = values.iter().fold(0.0f64, |m, &v| if v.abs() > m.abs() { v } else { m });
-            values.iter_mut().for_each(|v| *v /= largest);
-            SlowMode { eigenvalue, values, participation: squares * squares / (x.len() as f64 * fourth) }
-        })
-        .collect())
+    let mode = |(eigenvalue, x): (Eigenvalue, Vec<f64>)| {
+        let squares: f64 = x.iter().map(|x| x * x).sum();
+        let fourth: f64 = x.iter().map(|x| x.powi(4)).sum();
+        let mut values: Vec<f64> = x.iter().zip(&scale).map(|(x, s)| x * s).collect();
+        let largest = values.iter().fold(0.0f64, |m, &v| if v.abs() > m.abs() { v } else { m });
+        values.iter_mut().for_each(|v| *v /= largest);
+        SlowMode { eigenvalue, values, participation: squares * squares / (x.len() as f64 * fourth) }
+    };
+    let modes = pairs.values.into_iter().zip(pairs.vectors).take(count).map(mode).collect();
+    Ok(SlowModes { modes, clusters, converged: pairs.converged })
 }

@@ -103,7 +103,7 @@ fn row(scheme: Scheme, valence: usize) -> Result<ValenceRow> {
         }
     }
     let locate = |form, end| -> Result<Located> {
-        let mode = modes(&system, form, end, 1)?.remove(0);
+        let mode = modes(&system, form, end, 1)?.modes.remove(0);
         let total: f64 = mode.values.iter().map(|x| x * x).sum();
         let inside: f64 = mode.values.iter().zip(&near).filter(|(_, near)| **near).map(|(x, _)| x * x).sum();
         let peak =

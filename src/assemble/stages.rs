@@ -243,12 +243,12 @@ impl Stages {
         GeneralSystem::new(self.matrix())
     }
 
-    /// All control points, from the [known](Self::known) ones and those of the block.
+    /// All control points, or what else there is at the vertices, from the [known](Self::known) ones and those of the block.
     ///
     /// # Panics
-    /// If there is not one point a vertex of the block.
-    pub fn joined(&self, mut known: Vec<DVec3>, block: Vec<DVec3>) -> Vec<DVec3> {
-        assert_eq!(block.len(), self.block.len(), "one point a vertex of the block");
+    /// If there is not one a vertex of the block.
+    pub fn joined<T>(&self, mut known: Vec<T>, block: Vec<T>) -> Vec<T> {
+        assert_eq!(block.len(), self.block.len(), "one a vertex of the block");
         let Some(part) = &self.part else { return block };
         for (&v, x) in part.vertices.iter().zip(block) {
             known[v as usize] = x;

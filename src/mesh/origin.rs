@@ -98,7 +98,7 @@ impl Origin {
     }
 
     /// Values by vertex of the mesh for those that are written; zero for one that no face has.
-    pub fn spread(&self, values: &[DVec3]) -> Vec<DVec3> {
-        self.places().map(|there| there.map_or(DVec3::ZERO, |there| values[there as usize])).collect()
+    pub fn spread<T: Copy + Default>(&self, values: &[T]) -> Vec<T> {
+        self.places().map(|there| there.map_or_else(T::default, |there| values[there as usize])).collect()
     }
 }

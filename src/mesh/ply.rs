@@ -176,23 +176,83 @@ pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> 
 /// # Panics
 /// If there are not as many normals as vertices.
 pub fn write_control_to(out: &mut dyn Write, mesh: &Mesh, options: &WriteOptions) -> io::Result<()> {
-    let short = write_header(out, mesh, options)?;
-    let normals = options.normals;
+    let short = write_header(out, mesh, &coordinates(mesh, options.normals), options)?;
     if options.ascii {
-        return write_text_rows(out, mesh, normals);
+        return write_text_rows(out, mesh, options.normals);
     }
-    let mut row = Vec::new();
-    let push_point = |row: &mut Vec<u8>, p: DVec3| {
-        for coordinate in p.to_array() {
-            row.extend_from_slice(&coordinate.to_le_bytes());
+    write_binary_rows(out, mesh, short, |v, row| {
+        if let Some(normals) = options.normals {
+            push_point(row, normals[v]);
         }
-    };
+    })
+}
+
+/// Numbers at the vertices of a mesh under a name, which is a word.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scalars {
+    /// The property of the file.
+    pub name: String,
+    /// One a vertex.
+    pub values: Vec<f64>,
+}
+
+/// Writes `mesh` as PLY, binary little-endian, with a colour and any number of scalars at each vertex: properties
+/// `red green blue` (bytes), which every viewer shows, and doubles under their names; comments, lines without line ends, in
+/// the header.
+///
+/// # Panics
+/// If there is not one colour and one number of each name a vertex.
+///
+/// ```
+/// use limitlab::mesh::{builtin, ply::{Scalars, read_bytes, write_painted_to}};
+///
+/// let cube = builtin::builtin("cube")?;
+/// let height = Scalars { name: "height".into(), values: cube.positions.iter().map(|p| p.z).collect() };
+/// let mut bytes = Vec::new();
+/// write_painted_to(&mut bytes, &cube, &[[255, 0, 0]; 8], &[height], &[]).unwrap();
+/// let read = read_bytes(&bytes, "cube.ply".as_ref())?;
+/// assert_eq!(read.mesh, cube);
+/// assert_eq!(read.remarks, ["not kept: vertex properties red green blue height"]);
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn write_painted_to(
+    out: &mut dyn Write,
+    mesh: &Mesh,
+    colours: &[[u8; 3]],
+    scalars: &[Scalars],
+    comments: &[String],
+) -> io::Result<()> {
+    let is_whole = colours.len() == mesh.len() && scalars.iter().all(|s| s.values.len() == mesh.len());
+    assert!(is_whole, "one colour and one number of each name a vertex");
+    let mut properties = coordinates(mesh, None);
+    properties.extend(["red", "green", "blue"].map(|name| ("uchar", name)));
+    properties.extend(scalars.iter().map(|s| ("double", s.name.as_str())));
+    let options = WriteOptions { comments, ..WriteOptions::default() };
+    let short = write_header(out, mesh, &properties, &options)?;
+    write_binary_rows(out, mesh, short, |v, row| {
+        row.extend_from_slice(&colours[v]);
+        scalars.iter().for_each(|s| row.extend_from_slice(&s.values[v].to_le_bytes()));
+    })
+}
+
+fn push_point(row: &mut Vec<u8>, p: DVec3) {
+    for coordinate in p.to_array() {
+        row.extend_from_slice(&coordinate.to_le_bytes());
+    }
+}
+
+/// Positions, each with what `extend` adds to the row of its vertex, then faces.
+fn write_binary_rows(
+    out: &mut dyn Write,
+    mesh: &Mesh,
+    short: bool,
+    extend: impl Fn(usize, &mut Vec<u8>),
+) -> io::Result<()> {
+    let mut row = Vec::new();
     for (v, &position) in mesh.positions.iter().enumerate() {
         row.clear();
         push_point(&mut row, position);
-        if let Some(normals) = normals {
-            push_point(&mut row, normals[v]);
-        }
+        extend(v, &mut row);
         out.write_all(&row)?;
     }
     for face in mesh.faces.iter() {
@@ -215,22 +275,32 @@ pub fn write_text_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>
     write_control_to(out, mesh, &WriteOptions { normals, ascii: true, ..WriteOptions::default() })
 }
 
+/// The properties of positions and normals: type and name.
+fn coordinates(mesh: &Mesh, normals: Option<&[DVec3]>) -> Vec<(&'static str, &'static str)> {
+    check_normals(mesh, normals);
+    let count = if normals.is_some() { 6 } else { 3 };
+    COORDINATES[..count].iter().map(|&name| ("double", name)).collect()
+}
+
 /// Writes the header. Whether a byte holds the size of every face.
-fn write_header(out: &mut dyn Write, mesh: &Mesh, options: &WriteOptions) -> io::Result<bool> {
-    check_normals(mesh, options.normals);
+fn write_header(
+    out: &mut dyn Write,
+    mesh: &Mesh,
+    properties: &[(&str, &str)],
+    options: &WriteOptions,
+) -> io::Result<bool> {
     let faces = &mesh.faces;
     // The usual types unless something does not fit them.
     let short = faces.iter().all(|f| f.len() <= usize::from(u8::MAX));
     let length = if short { "uchar" } else { "uint" };
     let fits_int = faces.corners().iter().all(|&v| i32::try_from(v).is_ok());
     let index = if fits_int { "int" } else { "uint" };
-    let coordinates = if options.normals.is_some() { 6 } else { 3 };
     let format = if options.ascii { "ascii" } else { "binary_little_endian" };
     writeln!(out, "ply\nformat {format} 1.0")?;
     options.write_comments(out, "comment")?;
     writeln!(out, "element vertex {}", mesh.len())?;
-    for name in &COORDINATES[..coordinates] {
-        writeln!(out, "property double {name}")?;
+    for (kind, name) in properties {
+        writeln!(out, "property {kind} {name}")?;
     }
     write!(out, "element face {}\nproperty list {length} {index} vertex_indices\nend_header\n", faces.len())?;
     Ok(short)
@@ -332,6 +402,28 @@ mod tests {
                 assert_eq!(lines.vertices, [39, 47, 56]);
             }
         }
+    }
+
+    #[test]
+    fn colours_and_scalars_stand_after_the_positions() {
+        let scalars = [("a", [0.5, -1e-300, 3.0]), ("b", [1.0, 2.0, f64::MAX])];
+        let scalars = scalars.map(|(name, values)| Scalars { name: name.into(), values: values.into() });
+        let colours = [[1, 2, 3], [4, 5, 6], [7, 8, 255]];
+        let mut bytes = Vec::new();
+        write_painted_to(&mut bytes, &triangle(), &colours, &scalars, &[]).unwrap();
+        let mut expected = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty double x\n\
+            property double y\nproperty double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+            property double a\nproperty double b\nelement face 1\n\
+            property list uchar int vertex_indices\nend_header\n"
+            .to_vec();
+        for (v, p) in triangle().positions.iter().enumerate() {
+            expected.extend(p.to_array().map(f64::to_le_bytes).concat());
+            expected.extend(colours[v]);
+            expected.extend(scalars.iter().flat_map(|s| s.values[v].to_le_bytes()));
+        }
+        expected.extend([3, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
+        assert!(bytes == expected);
+        assert_eq!(parse(&bytes).unwrap().mesh, triangle());
     }
 
     #[test]

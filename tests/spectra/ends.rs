@@ -224,6 +224,39 @@ fn a_cluster_of_eight_on_a_sphere_of_quads() {
 }
 
 #[test]
+fn modes_are_eigenvectors_in_clusters_of_the_torus() {
+    // Dense, and by subspace iteration.
+    for (n, m) in [(20, 20), (40, 40), (30, 25)] {
+        for scheme in [Scheme::CatmullClark, Scheme::Loop] {
+            let system = assemble(&torus(scheme, n, m), scheme);
+            let symbols = torus_symbols(scheme, n, m);
+            let found = modes(&system, SymmetricForm::A, End::Lowest, 7).expect("modes");
+            assert!(found.converged && found.modes.len() == 7);
+            for (mode, exact) in found.modes.iter().zip(&symbols) {
+                let (lambda, x) = (mode.eigenvalue.value, &mode.values);
+                assert!((lambda - exact).abs() < 1e-9, "{scheme} {n}x{m}: {lambda} {exact}");
+                let residual = (0..x.len()).map(|i| (system.a.row_times(i, x) - lambda * x[i]).abs());
+                assert!(residual.fold(0.0, f64::max) < 1e-4 * lambda, "{scheme} {n}x{m}: {lambda}");
+                let largest = x.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+                assert!(largest == 1.0 && x.contains(&1.0));
+            }
+            let mut computed = 0;
+            for cluster in &found.clusters {
+                let equal = symbols.iter().filter(|exact| (**exact - cluster.value).abs() < 1e-8).count();
+                assert!(computed < 7);
+                computed += cluster.multiplicity;
+                assert!(cluster.complete || computed == 7, "{scheme} {n}x{m}: {cluster:?}");
+                assert_eq!(
+                    cluster.multiplicity.min(equal),
+                    if cluster.complete { equal } else { cluster.multiplicity }
+                );
+            }
+            assert!(computed >= 7);
+        }
+    }
+}
+
+#[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let system = assemble(&named("irregular-quad:9000"), Scheme::CatmullClark);
     let on = |threads: usize| {

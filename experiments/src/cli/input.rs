@@ -388,6 +388,21 @@ pub fn subdivision_of(scheme: Scheme) -> Subdivision {
     }
 }
 
+/// [`Input::file_mesh`] of its parts.
+pub(super) fn file_mesh(surface: &Surface, frame: &Frame, origin: Option<&Origin>) -> Mesh {
+    let mut points = surface.positions().to_vec();
+    frame.leave(&mut points);
+    match origin {
+        Some(origin) => origin.written(&points),
+        None => Mesh::new(points, surface.faces().clone()),
+    }
+}
+
+/// [`Input::file_values`] of its parts.
+pub(super) fn file_values(origin: Option<&Origin>, values: &[f64]) -> Vec<f64> {
+    origin.map_or_else(|| values.to_vec(), |origin| origin.spread(values))
+}
+
 /// The lines of vertices and faces.
 fn numbers(lines: &Option<io::Lines>) -> Option<(&[u32], &[u32])> {
     lines.as_ref().map(|l| (l.vertices.as_slice(), l.faces.as_slice()))
@@ -451,6 +466,16 @@ impl Input {
             self.frame.leave(points.to_mut());
         }
         points
+    }
+
+    /// The mesh as it was given, with its noise, in mesh units and in the vertices that are written for those of the file.
+    pub fn file_mesh(&self) -> Mesh {
+        file_mesh(&self.surface, &self.frame, self.origin.as_ref())
+    }
+
+    /// Numbers at the vertices of the surface for those of [`file_mesh`](Self::file_mesh).
+    pub fn file_values(&self, values: &[f64]) -> Vec<f64> {
+        file_values(self.origin.as_ref(), values)
     }
 
     /// What is sharp, in the vertices that are written for those of the file: on every face at the edge, and at every vertex

@@ -177,7 +177,7 @@ impl ReplaceFlags {
     /// # Errors
     /// As [`settle`](Self::settle).
     pub fn settle_all<S: AsRef<str>>(&self, folder: &Path, stems: impl IntoIterator<Item = S>) -> Result<()> {
-        const ENDS: [&str; 6] = [".csv", ".md", "-history.csv", ".png", ".svg", ".pdf"];
+        const ENDS: [&str; 8] = [".csv", ".md", "-history.csv", "-vertices.csv", ".ply", ".png", ".svg", ".pdf"];
         let mut stems = stems.into_iter();
         stems.try_for_each(|stem| {
             ENDS.iter().try_for_each(|end| self.settle(&folder.join(stem.as_ref().to_owned() + end)))

@@ -5,9 +5,9 @@ use std::path::Path;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::input::{all_fields, plain};
+use super::input::{all_fields, file_mesh, file_values, plain};
 use super::{CommonFlags, Input, MeshFlags, StopFlags};
-use crate::report::provenance::Source as Origin;
+use crate::report::provenance;
 use limitlab::assemble::matrix_market::{self, is_missing};
 use limitlab::assemble::{GeneralSystem, LimitSystem, Stages};
 use limitlab::error::{Error, Result};
@@ -15,7 +15,8 @@ use limitlab::interpolate::{Watch, interpolate_watched, solve_stored};
 use limitlab::mesh::features::Rule;
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::order::Order;
-use limitlab::mesh::{Surface, diagonal};
+use limitlab::mesh::origin::Origin;
+use limitlab::mesh::{Mesh, Surface, diagonal};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Solution, Stop};
 
@@ -28,7 +29,7 @@ pub struct Subject {
     /// How large it is, in words.
     pub size: String,
     /// As it was given, for the provenance of files about it.
-    pub source: Origin,
+    pub source: provenance::Source,
     /// What errors are measured in.
     pub unit: &'static str,
     /// The end of the names of files.
@@ -120,6 +121,9 @@ pub struct Problem {
     pub order: Vec<u32>,
     /// Lengths in the units of the files are this many times those here.
     pub scale: f64,
+    frame: Frame,
+    /// Where the vertices of the file went, with --weld and --repair.
+    origin: Option<Origin>,
 }
 
 /// Where a system comes from.
@@ -156,6 +160,16 @@ impl Problem {
             Source::Unsymmetric(surface, scheme, ..) => Some((surface, *scheme, None)),
             Source::Folder(_) => None,
         }
+    }
+
+    /// As [`Input::file_mesh`]; `None` of a system without a mesh.
+    pub fn file_mesh(&self) -> Option<Mesh> {
+        self.mesh().map(|(surface, ..)| file_mesh(surface, &self.frame, self.origin.as_ref()))
+    }
+
+    /// As [`Input::file_values`].
+    pub fn file_values(&self, values: &[f64]) -> Vec<f64> {
+        file_values(self.origin.as_ref(), values)
     }
 
     /// The right-hand side, and the start of iterations.
@@ -223,7 +237,7 @@ impl MeshFlags {
         frame.enter(&mut points);
         let (n, entries) = (system.len(), system.a.values().len());
         let size = format!("{n} rows, {entries} entries");
-        let source = Origin { name: name.to_owned(), size: size.clone(), checksum: checksum(path)? };
+        let source = provenance::Source { name: name.to_owned(), size: size.clone(), checksum: checksum(path)? };
         let whole = path.canonicalize().unwrap_or_else(|_| path.into());
         let subject = Subject {
             name: name.to_owned(),
@@ -257,6 +271,8 @@ impl MeshFlags {
             stop: given.stop(stop)?,
             order: numbers,
             scale: given.frame.scale(),
+            frame: given.frame,
+            origin: None,
             subject: given.subject,
             source: Source::Folder(Box::new(given.system)),
             start: given.points.clone(),
@@ -291,6 +307,8 @@ fn of_mesh(input: Input, stop: &StopFlags, order: Order) -> Result<Problem> {
         start,
         order,
         scale: input.frame.scale(),
+        frame: input.frame,
+        origin: input.origin,
         source: match stages.stars().map(|stars| stars.vertices()[0] as usize) {
             Some(vertex) => Source::Unsymmetric(input.surface, input.scheme, Box::new(stages.whole()), vertex),
             None => Source::Mesh(input.surface, input.scheme, Box::new(stages)),

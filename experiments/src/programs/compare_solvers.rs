@@ -15,6 +15,7 @@ use crate::cli::{
 use crate::report::Provenance;
 use crate::report::page::Page;
 use crate::studies::comparison::{self as study, AUTO, Asked};
+use crate::studies::error_maps::{self, ErrorMaps};
 use crate::studies::histories;
 use crate::studies::page::{self, Measured};
 use limitlab::analysis::comparison::{MethodRow, compare_entry, entries, with_least_times};
@@ -54,6 +55,10 @@ pub struct Arguments {
     /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
+    /// Write the errors at every vertex after these iterations of each method that iterates, as far as it goes: a PLY file with a
+    /// property each (error_5) and colours for viewers, and a picture
+    #[arg(long, value_name = "K,…")]
+    errors_at: Option<List<usize>>,
     /// Write an interactive page of one mesh or folder to this file too: curves of convergence, an ω sweep, the spectrum, the
     /// surfaces with the errors of every method; it needs a browser and no network
     #[arg(long, value_name = "FILE")]
@@ -75,6 +80,10 @@ pub fn main(mut arguments: Arguments, provenance: Provenance) -> ExitCode {
     if let (Some(_), several @ 2..) = (&arguments.html, arguments.meshes.len()) {
         let what = format!("--html makes a page of one mesh, and {several} are named: run the program once for each");
         Arguments::command().error(ErrorKind::ArgumentConflict, what).exit();
+    }
+    if let Some(List(at)) = &mut arguments.errors_at {
+        at.sort_unstable();
+        at.dedup();
     }
     cli::exit(|| {
         let provenance = arguments.common.apply(provenance)?;
@@ -98,7 +107,11 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         let stem = problem.subject.stem("compare-solvers");
         arguments.output.settle([&stem])?;
         let made = provenance.about(&problem.subject.source);
-        let Compared { rows, refused, measured } = compare(&problem, &arguments.wanted())?;
+        if arguments.errors_at.is_some() && problem.mesh().is_none() {
+            let what = "--errors-at is about the vertices of a mesh, and this is a system without one: leave it out";
+            return Err(Error::mesh(name, what));
+        }
+        let Compared { rows, refused, measured, error_maps } = compare(&problem, &arguments.wanted())?;
         let about = format!(
             "{}; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:e} ({}).",
             problem.subject.size,
@@ -127,6 +140,11 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         for (object, history) in objects.as_array_mut().into_iter().flatten().zip(histories) {
             object["history"] = histories::json(history);
         }
+        for (object, maps) in objects.as_array_mut().into_iter().flatten().zip(error_maps) {
+            if let Some(maps) = maps {
+                object["error_maps"] = maps.write(&problem, &stem, &arguments.output, &made)?;
+            }
+        }
         results.push(problem.subject.json(json!({ "rows": objects })));
     }
     cli::finish(results, &arguments.output, &arguments.common, provenance)
@@ -144,8 +162,15 @@ pub fn write_page(
     provenance: &Provenance,
 ) -> Result<()> {
     let problem = mesh.problem(name, &StopFlags::default(), Order::File, common)?;
-    let wanted = Wanted { methods: None, order: Order::File, page: true, monitor: &MonitorFlags::default(), common };
-    let Compared { rows, refused, measured } = compare(&problem, &wanted)?;
+    let wanted = Wanted {
+        methods: None,
+        order: Order::File,
+        page: true,
+        errors_at: None,
+        monitor: &MonitorFlags::default(),
+        common,
+    };
+    let Compared { rows, refused, measured, .. } = compare(&problem, &wanted)?;
     let Some(measured) = measured else {
         return Ok(());
     };
@@ -165,6 +190,8 @@ struct Wanted<'a> {
     methods: Option<&'a [Asked]>,
     order: Order,
     page: bool,
+    /// Iterations, ascending, whose errors at the vertices are kept.
+    errors_at: Option<&'a [usize]>,
     monitor: &'a MonitorFlags,
     common: &'a CommonFlags,
 }
@@ -175,6 +202,7 @@ impl Arguments {
             methods: self.method.as_ref().map(|list| &list.0[..]),
             order: self.order,
             page: self.html.is_some(),
+            errors_at: self.errors_at.as_ref().map(|list| &list.0[..]),
             monitor: &self.monitor,
             common: &self.common,
         }
@@ -189,6 +217,8 @@ struct Compared<'a> {
     refused: Option<String>,
     /// For the page, if one was asked for.
     measured: Option<Measured>,
+    /// One a row, if they were asked for.
+    error_maps: Vec<Option<ErrorMaps>>,
 }
 
 fn compare<'a>(problem: &'a Problem, wanted: &Wanted) -> Result<Compared<'a>> {
@@ -200,7 +230,7 @@ fn compare<'a>(problem: &'a Problem, wanted: &Wanted) -> Result<Compared<'a>> {
     let methods: Vec<Method> = asked.iter().filter_map(method).collect();
     let auto = asked.contains(&Asked::Auto);
     let mut refused = None;
-    let (mut rows, measured) = match problem.matrix() {
+    let (mut rows, measured, error_maps) = match problem.matrix() {
         Matrix::Symmetric(system) => {
             let eigenvalues = |_: &_| {
                 let all = (system.len() <= dense::LARGEST).then(|| dense::eigenvalues(system)).transpose()?;
@@ -233,7 +263,7 @@ fn compare<'a>(problem: &'a Problem, wanted: &Wanted) -> Result<Compared<'a>> {
     for recorded in rows.iter_mut().flat_map(|row| &mut row.solution.report.history) {
         recorded.errors = recorded.errors * problem.scale;
     }
-    Ok(Compared { rows, refused, measured })
+    Ok(Compared { rows, refused, measured, error_maps })
 }
 
 /// The rows of methods by name, and of `auto` if it is asked for; what the page needs beside them, with all `eigenvalues` of A
@@ -245,7 +275,7 @@ fn by_methods<'a, S: System, K: Spectra + Clone + Sync>(
     eigenvalues: impl FnOnce(&K) -> Result<Option<[Vec<Complex<f64>>; 2]>>,
     (methods, auto): (&[Method<'a>], bool),
     wanted: &Wanted,
-) -> Result<(Vec<MethodRow<'a>>, Option<Measured>)> {
+) -> Result<(Vec<MethodRow<'a>>, Option<Measured>, Vec<Option<ErrorMaps>>)> {
     let order_name = wanted.order.to_string();
     let lines = entries(system, spectra, methods, Some(&problem.order), &order_name)?;
     let subject = &problem.subject.name;
@@ -270,10 +300,46 @@ fn by_methods<'a, S: System, K: Spectra + Clone + Sync>(
         of_rows.step();
     }
     drop(of_rows);
+    let error_maps = match wanted.errors_at {
+        Some(at) => error_maps(problem, system, &rows, at, wanted.common)?,
+        None => Vec::new(),
+    };
     if !wanted.page {
-        return Ok((rows, None));
+        return Ok((rows, None, error_maps));
     }
     let of_page = Progress::new(subject, page::steps(&rows), wanted.common.quiet);
     let measured = page::measure(problem, system, spectra, eigenvalues(spectra)?, &rows, &of_page)?;
-    Ok((rows, Some(measured)))
+    Ok((rows, Some(measured), error_maps))
+}
+
+/// The errors at the vertices after the iterations `at`, one a row; says which rows have none, or not all.
+fn error_maps(
+    problem: &Problem,
+    system: &impl System,
+    rows: &[MethodRow],
+    at: &[usize],
+    common: &CommonFlags,
+) -> Result<Vec<Option<ErrorMaps>>> {
+    let subject = &problem.subject.name;
+    let maps: Vec<_> = rows.iter().map(|row| error_maps::measure(problem, system, row, at)).collect();
+    let without = rows.iter().zip(&maps).filter(|(_, maps)| maps.is_none());
+    let without: Vec<&str> = without.map(|(row, _)| row.method.name()).collect();
+    let what = "no errors at the vertices after these iterations, as it solves at once, by corrections, or ends before";
+    if without.len() == rows.len() {
+        let what = format!("{} has {what}: name a method that iterates, such as --method pia", without.join(", "));
+        return Err(Error::mesh(subject, what));
+    }
+    if !without.is_empty() {
+        common.remark(format_args!("{subject}: {} has {what}", without.join(", ")));
+    }
+    for (row, maps) in rows.iter().zip(&maps) {
+        let last = row.solution.report.iterations;
+        if maps.is_some() && at.iter().any(|&k| k > last) {
+            common.remark(format_args!(
+                "{subject}: {} ended after {last} iterations: no errors beyond",
+                row.method.name()
+            ));
+        }
+    }
+    Ok(maps)
 }

@@ -10,11 +10,12 @@ use crate::cli::{self, CommonFlags, Given, Input, MeshFlags, OutputFlags, Progre
 use crate::report::series::Bars;
 use crate::report::{Column, Columns, Figure, LinePlot, Provenance, Rule, Table};
 use crate::studies::complex_spectrum::{ComplexFindings, radii_of_sweeps};
+use crate::studies::modes as mode_study;
 use limitlab::Result;
 use limitlab::analysis::a_priori::{IterationCounts, Promise};
 use limitlab::analysis::dense;
 use limitlab::analysis::inertia::{Certificate, certify};
-use limitlab::analysis::singularity::{Singularity, SlowMode, modes};
+use limitlab::analysis::singularity::{Singularity, SlowModes, modes};
 use limitlab::analysis::spectral_radius::SpectralRadius;
 use limitlab::analysis::spectrum::{Estimate, Extremes, Spectrum, SpectrumEnds, ends, excited, mesh_ends};
 use limitlab::analysis::subspace_iteration::End;
@@ -44,7 +45,9 @@ pub struct Arguments {
     /// Compute all eigenvalues (up to 4000 vertices), with a histogram
     #[arg(long)]
     full: bool,
-    /// Compute this many modes at the lower end of A, with multiplicity
+    /// Compute the K slowest modes, of the least eigenvalues of A, with multiplicities: a table, the modes at the vertices as CSV,
+    /// and of a mesh as PLY, with a property and colours for viewers, and as a picture. On an open or creased mesh they
+    /// are those of the smooth vertices, and 0 elsewhere
     #[arg(long, value_name = "K", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=56))]
     modes: u16,
     /// Prove the ends by Cholesky factorizations of M − σH⁻¹ and the like (memory: the factor)
@@ -95,7 +98,8 @@ struct Findings {
     /// `None` where all points coincide.
     counts: Option<IterationCounts>,
     data: [Option<Extremes>; 2],
-    modes: Vec<SlowMode>,
+    /// At the vertices of a mesh file, at the rows of a system without one; `None` unless asked for.
+    modes: Option<SlowModes>,
     certificates: [Option<Certificate>; 4],
     /// On an open or creased mesh the rest is about the smooth vertices. The eigenvalues of its curves, and its corners.
     curves: Vec<f64>,
@@ -189,11 +193,11 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     arguments.output.prepare()?;
     let mut results = Vec::new();
     for name in &arguments.meshes {
-        let (subject, findings, n) = match arguments.mesh.given(name)? {
+        let (subject, findings, n, mesh) = match arguments.mesh.given(name)? {
             Some(given) => {
                 arguments.output.settle(STEMS.map(|stem| given.subject.stem(stem)))?;
                 let findings = analyse_given(&given, arguments)?;
-                (given.subject, findings, given.points.len())
+                (given.subject, findings, given.points.len(), None)
             }
             None => {
                 let input = arguments.mesh.input(name, &arguments.common)?;
@@ -202,25 +206,30 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
                     results.push(complex(&input, arguments, provenance)?);
                     continue;
                 }
-                (input.subject(), analyse(&input, arguments)?, input.surface.len())
+                let mut findings = analyse(&input, arguments)?;
+                for mode in findings.modes.iter_mut().flat_map(|modes| &mut modes.modes) {
+                    mode.values = input.file_values(&mode.values);
+                }
+                let mesh = findings.modes.is_some().then(|| input.file_mesh());
+                (input.subject(), findings, input.surface.len(), mesh)
             }
         };
         let out = &arguments.output.out;
         let made = &provenance.about(&subject.source);
-        let tables = [eigenvalue_table(&subject, &findings, n), radius_table(&subject, &findings)];
-        for table in &tables {
+        let print = |table: &Table| if arguments.output.json { Ok(()) } else { cli::print_table(table) };
+        for table in &[eigenvalue_table(&subject, &findings, n), radius_table(&subject, &findings)] {
             table.write(out, made)?;
-            if !arguments.output.json {
-                cli::print_table(table)?;
-            }
+            print(table)?;
         }
         if let Some(full) = &findings.full {
             full_table(&subject, full).write(out, made)?;
             let figure = histogram(&subject, full, &findings.promise);
             arguments.output.figure(&subject.stem("spectrum-histogram"), &figure, made)?;
         }
-        if !findings.modes.is_empty() {
-            mode_table(&subject, &findings.modes).write(out, made)?;
+        if let Some(modes) = &findings.modes {
+            let table = mode_study::table(&subject, modes);
+            mode_study::write(&table, &subject, modes, mesh.as_ref(), &arguments.output, made)?;
+            print(&table)?;
         }
         results.push(json(&subject, &findings, n));
     }
@@ -314,7 +323,6 @@ fn analyse_any(
         }
     }
     progress.step();
-    let modes = modes.unwrap_or_default();
     let (curves, corners) = (Vec::new(), 0);
     Ok(Findings { bounds, ends, full, sweeps, verdict, promise, counts, data, modes, certificates, curves, corners })
 }
@@ -346,6 +354,9 @@ fn analyse_stages(input: &Input, arguments: &Arguments) -> Result<Findings> {
     let mut found = found.map_err(|e| input.named(e))?;
     found.curves = stages.curves().eigenvalues();
     found.corners = input.surface.len() - stages.curves().len() - block.len();
+    for mode in found.modes.iter_mut().flat_map(|modes| &mut modes.modes) {
+        mode.values = stages.joined(vec![0.0; stages.len()], std::mem::take(&mut mode.values));
+    }
     if let Some(full) = &mut found.full {
         // The other stages have 1 and the eigenvalues of the curves, over their diagonals too.
         let diagonal = 1.0 - 2.0 * stages.curves().weight();
@@ -516,19 +527,6 @@ fn full_table(subject: &Subject, full: &dense::Eigenvalues) -> Table {
     columns.table(subject.stem("spectrum-full"), title, &Vec::from_iter(0..full.a.len()))
 }
 
-fn mode_table(subject: &Subject, modes: &[SlowMode]) -> Table {
-    let mut columns = Columns::<usize>::new().col(Column::key("vertex"), |v| v.to_string());
-    for (k, mode) in modes.iter().enumerate() {
-        columns = columns.col(Column::number(format!("mode_{k}"), 1e-3, 6).floor(1e-3), |&v| mode.values[v]);
-    }
-    let title = format!("Slowest modes of {}", subject.title);
-    let vertices = Vec::from_iter(0..modes[0].values.len());
-    let mut table = columns.table(subject.stem("spectrum-modes"), title, &vertices);
-    let values: Vec<String> = modes.iter().map(|m| format!("{:.10}", m.eigenvalue.value)).collect();
-    table.note(format!("Eigenvectors of A, largest entry 1, of the eigenvalues {}.", values.join(", ")));
-    table
-}
-
 fn histogram(subject: &Subject, full: &dense::Eigenvalues, promise: &Promise) -> Figure {
     let panel = |values: &[f64], name: &str, label: &str, bounds: Extremes| LinePlot {
         x_label: format!("eigenvalue of {label}"),
@@ -603,19 +601,8 @@ fn json(subject: &Subject, found: &Findings, n: usize) -> Value {
         if let Some(full) = &found.full {
             map.insert("eigenvalues".into(), json!({ "a": full.a, "jacobi": full.jacobi }));
         }
-        if !found.modes.is_empty() {
-            let values: Vec<Value> = found
-                .modes
-                .iter()
-                .map(|m| {
-                    json!({
-                        "value": number(m.eigenvalue.value),
-                        "residual": number(m.eigenvalue.residual),
-                        "participation": number(m.participation),
-                    })
-                })
-                .collect();
-            map.insert("modes".into(), Value::Array(values));
+        if let Some(modes) = &found.modes {
+            map.extend(mode_study::json(modes).map(|(field, value)| (field.to_owned(), value)));
         }
     }
     subject.json(object)

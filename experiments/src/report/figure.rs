@@ -124,6 +124,16 @@ impl Format {
             Format::Pdf => "pdf",
         }
     }
+
+    /// The format that the ending of a name tells.
+    ///
+    /// # Errors
+    /// [`Error::Parse`] for another ending.
+    pub fn of(path: &Path) -> Result<Self> {
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let known = Format::ALL.into_iter().find(|format| format.name() == ending);
+        known.ok_or_else(|| Error::parse(path, None, "the name of a picture ends in .png, .svg or .pdf"))
+    }
 }
 
 impl FromStr for Format {
@@ -216,12 +226,19 @@ impl Figure {
         let drawing = self.drawing()?;
         formats.iter().try_for_each(|&format| {
             let path = folder.join(format!("{stem}.{}", format.name()));
-            match format {
-                Format::Png => drawing.to_image()?.save(&path, provenance),
-                Format::Svg => write_bytes(&path, drawing.to_svg(provenance)?.as_bytes()),
-                Format::Pdf => write_bytes(&path, &drawing.to_pdf(provenance)),
-            }
+            write_drawing(&drawing, &path, format, provenance)
         })
+    }
+
+    /// Writes one file in the format that the ending of its name tells.
+    ///
+    /// # Errors
+    /// As [`Format::of`] and [`write`](Self::write).
+    ///
+    /// # Panics
+    /// As [`render`](Self::render).
+    pub fn save(&self, path: &Path, provenance: &Provenance) -> Result<()> {
+        write_drawing(&self.drawing()?, path, Format::of(path)?, provenance)
     }
 
     fn drawing(&self) -> Result<Canvas> {
@@ -306,6 +323,14 @@ impl Figure {
             }
         };
         Ok((0..self.panels.len()).map(slot).collect())
+    }
+}
+
+fn write_drawing(drawing: &Canvas, path: &Path, format: Format, provenance: &Provenance) -> Result<()> {
+    match format {
+        Format::Png => drawing.to_image()?.save(path, provenance),
+        Format::Svg => write_bytes(path, drawing.to_svg(provenance)?.as_bytes()),
+        Format::Pdf => write_bytes(path, &drawing.to_pdf(provenance)),
     }
 }
 

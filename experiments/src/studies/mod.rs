@@ -2,8 +2,11 @@
 
 pub mod comparison;
 pub mod complex_spectrum;
+pub mod error_maps;
 pub mod histories;
+pub mod modes;
 pub mod page;
+pub mod pictures;
 pub mod splitting;
 pub mod style;
 pub mod sweep;

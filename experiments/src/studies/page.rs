@@ -7,6 +7,7 @@ use glam::DVec3;
 use nalgebra::Complex;
 
 use super::comparison::{is_over_iterations, json, label};
+use super::error_maps::{method_over_iterations, watch};
 use super::style;
 use super::sweep::{default_grid, show};
 use crate::cli::{Problem, Progress};
@@ -14,7 +15,6 @@ use crate::report::page::{Curve, Eigenvalues, Frames, Packed, Page, Place, Run, 
 use crate::report::readable;
 use limitlab::Result;
 use limitlab::analysis::comparison::MethodRow;
-use limitlab::analysis::custom_methods::Named;
 use limitlab::analysis::dense;
 use limitlab::analysis::spectrum::{Extremes, Spectra};
 use limitlab::analysis::sweep::{OmegaSweep, SweepEvent, rounding_floor, sweep};
@@ -23,7 +23,7 @@ use limitlab::interpolate::surface::{SurfaceMesh, SurfaceOptions, surface};
 use limitlab::mesh::{Surface, bounding_box};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::method::SOR_OMEGA;
-use limitlab::solvers::{Method, Outcome, Step, System, run_from};
+use limitlab::solvers::{Method, Outcome, System};
 
 /// Vertices that are shown at most: a larger mesh is thinned out.
 const MOST_SHOWN: usize = 20_000;
@@ -136,12 +136,7 @@ fn spread(last: usize, count: usize) -> Vec<usize> {
 
 /// Runs the method of a row once more, and keeps the errors at the vertices of some iterates.
 fn frames(problem: &Problem, system: &impl System, row: &MethodRow, shown: &Shown, most: usize) -> Option<Frames> {
-    let Named::Ours(method) = row.method else { return None };
-    let (_, _, vertices) = problem.mesh()?;
-    if !is_over_iterations(row) {
-        return None;
-    }
-    let (points, start) = problem.data();
+    let method = method_over_iterations(row)?;
     let at = spread(row.solution.report.iterations, most);
     let [least, greatest] = shown.range.map(f64::ln);
     let byte = |error: f64| {
@@ -150,20 +145,15 @@ fn frames(problem: &Problem, system: &impl System, row: &MethodRow, shown: &Show
         (255.0 * part).round() as u8 // saturates
     };
     let mut errors = Vec::with_capacity(at.len() * shown.mesh.first.len());
-    let watch = &mut |step: &Step| {
-        if at.binary_search(&step.iteration).is_ok() {
-            // Of vertices in one place the greatest.
-            let mut frame = vec![0u8; shown.mesh.first.len()];
-            for (i, &p) in points.iter().enumerate() {
-                let vertex = vertices.map_or(i, |vertices| vertices[i] as usize);
-                let slot = &mut frame[shown.mesh.place[vertex] as usize];
-                *slot = byte(problem.scale * (p - system.row(i, step.points)).length()).max(*slot);
-            }
-            errors.extend(frame);
+    watch(problem, system, method, &at, &mut |_, at_vertices| {
+        // Of vertices in one place the greatest.
+        let mut frame = vec![0u8; shown.mesh.first.len()];
+        for (&error, &place) in at_vertices.iter().zip(&shown.mesh.place) {
+            let slot = &mut frame[place as usize];
+            *slot = byte(problem.scale * error).max(*slot);
         }
-        ControlFlow::Continue(())
-    };
-    run_from(system, points, start, method, &problem.stop, watch);
+        errors.extend(frame);
+    });
     // A method that could not be set up has no iterate.
     (!errors.is_empty()).then(|| Frames {
         at: Packed::new(at.iter().map(|&k| (k as u32).to_le_bytes())),
@@ -316,6 +306,7 @@ mod tests {
     use limitlab::analysis::comparison::{Entry, compare_entry};
     use limitlab::analysis::spectrum::spectrum;
     use limitlab::mesh::order::Order;
+    use limitlab::solvers::Step;
 
     use super::*;
     use crate::cli::{CommonFlags, Matrix, MeshFlags, STAND_IN_NOISE, StopFlags};

@@ -40,9 +40,16 @@ fn commands_of_the_guide_show_what_it_says() {
         }
         commands += 1;
     }
-    assert_eq!(commands, 4);
+    assert_eq!(commands, 7);
     let picture = fs::read(folder.path().join("out/sweep-omega-house-catmull-clark.png")).unwrap();
     assert!(picture.starts_with(b"\x89PNG"));
+    for picture in [
+        "out/spectrum-modes-house-catmull-clark.png",
+        "out/compare-solvers-house-catmull-clark-errors-pia.png",
+        "cage.png",
+    ] {
+        assert!(folder.path().join(picture).is_file(), "{picture}");
+    }
     let first = guide.split(".png`").next().unwrap();
     assert!(first.lines().count() <= 40, "forty lines to the first picture");
 }

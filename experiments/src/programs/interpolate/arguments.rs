@@ -38,6 +38,9 @@ pub struct Arguments {
     /// Write .ply as text; the other formats always are
     #[arg(long)]
     pub ascii: bool,
+    /// Draw the mesh, its control mesh and the limit surface with the points, side by side: a file .png, .svg or .pdf
+    #[arg(long, value_name = "FILE", conflicts_with = "alpha")]
+    pub picture: Option<PathBuf>,
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
     /// pcg-ssor, pcg-ic0, anderson, heavy-ball; two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); halstead (the fairest
     /// surface, with --scheme catmull-clark: a control mesh two refinements down); butterfly and labsik-greiner (with

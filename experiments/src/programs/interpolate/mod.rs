@@ -12,7 +12,8 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use crate::cli::{self, Input, STANDARD_STREAM, subdivision_of};
-use crate::report::Provenance;
+use crate::report::{self, Provenance};
+use crate::studies::pictures;
 
 use limitlab::Result;
 use limitlab::error::Error;
@@ -72,6 +73,11 @@ pub fn main(mut arguments: Arguments, provenance: Provenance) -> ExitCode {
         }
         // Its topology is that of the scheme which is named where none is.
         arguments.mesh.scheme = Some(Scheme::Loop);
+    }
+    if arguments.picture.is_some() && matches!(arguments.method, Choice::Halstead | Choice::Keeping(_)) {
+        conflict(
+            "--picture shows the control mesh of a system: leave it out with halstead, butterfly and labsik-greiner",
+        );
     }
     if arguments.output.as_os_str() == STANDARD_STREAM {
         if arguments.json {
@@ -158,6 +164,10 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
             check_target(file)?;
         }
     }
+    if let Some(path) = &arguments.picture {
+        report::Format::of(path)?;
+        check_target(path)?;
+    }
     let input = arguments.mesh.input(&arguments.input, &arguments.common)?;
     let refinement = match arguments.method {
         Choice::Keeping(scheme) => scheme,
@@ -169,6 +179,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         Error::Io { .. } | Error::Parse { .. } | Error::Memory { .. } => e,
         other => input.named(other),
     };
+    let mut picture = None;
     let mut result = match (&per_vertex.alpha, arguments.method) {
         (Some(alpha), _) => unified(arguments, &input, alpha).map_err(named)?,
         (None, Choice::Halstead) => fairest(arguments, &input, &per_vertex).map_err(named)?,
@@ -177,6 +188,12 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
             let request = request(arguments, &per_vertex);
             check(&input.surface, input.scheme, &request).map_err(named)?;
             let control = control_mesh(arguments, &input, &per_vertex)?;
+            if let Some(path) = &arguments.picture {
+                let (given, cage) = (&input.surface, input.surface.with_positions(control.points.clone()));
+                let title = input.subject().caption();
+                let figure = pictures::interpolation(title, given, cage, input.scheme, &request).map_err(named)?;
+                picture = Some((path, figure));
+            }
             refine(&input, &request, control).map_err(named)?
         }
     };
@@ -219,5 +236,8 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         arguments.common.remark_on_replaced();
     }
     result.seconds.write = start.elapsed().as_secs_f64();
+    if let Some((path, figure)) = picture {
+        figure.save(path, provenance)?;
+    }
     print_summary(arguments, &input, &per_vertex, &result, provenance)
 }

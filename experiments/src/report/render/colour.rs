@@ -114,6 +114,28 @@ impl ColourScale {
         ColourScale { map: ColourMap::Diverging, ..ColourScale::linear(label, (-size, size)) }
     }
 
+    /// Where numbers lie on the scale, from 0 to 1. What has no place on a logarithmic axis is below all that has.
+    ///
+    /// # Errors
+    /// A range that is empty, not finite, or reaches 0 on a logarithmic scale.
+    pub(super) fn place(&self) -> Result<impl Fn(f64) -> f64> {
+        let axis = self.axis()?;
+        Ok(move |value| axis.position(value).unwrap_or(0.0).clamp(0.0, 1.0))
+    }
+
+    /// The colours of numbers, red, green and blue each, as a picture shows them without light.
+    ///
+    /// # Errors
+    /// As a picture with this scale.
+    pub fn colours(&self, values: &[f64]) -> Result<Vec<[u8; 3]>> {
+        let place = self.place()?;
+        let colour = |&value: &f64| {
+            let Colour(r, g, b) = self.map.colour(place(value));
+            [r, g, b]
+        };
+        Ok(values.iter().map(colour).collect())
+    }
+
     /// The axis of the colour bar.
     ///
     /// # Errors
@@ -183,6 +205,17 @@ mod tests {
             assert_eq!(map.colour(-3.0), map.colour(0.0));
             assert_eq!(map.colour(7.0), map.colour(1.0));
         }
+    }
+
+    #[test]
+    fn colours_of_numbers_are_those_of_their_places() {
+        let [low, middle, high] = [0.0, 0.5, 1.0].map(|t| {
+            let Colour(r, g, b) = ColourMap::Sequential.colour(t);
+            [r, g, b]
+        });
+        let scale = ColourScale::logarithmic("a", (1e-4, 1.0));
+        assert_eq!(scale.colours(&[0.0, 1e-9, 1e-4, 1e-2, 1.0, 7.0]).unwrap(), [low, low, low, middle, high, high]);
+        assert_eq!(ColourScale::signed("a", 2.0).colours(&[0.0]).unwrap(), [[221; 3]]);
     }
 
     #[test]

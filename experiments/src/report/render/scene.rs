@@ -183,11 +183,9 @@ impl Scene {
                 dye = Dye::Faces;
             }
             Paint::Scalars { values, scale } => {
-                let axis = scale.axis()?;
+                let place = scale.place()?;
                 self.places.resize(first_vertex as usize, 0.0);
-                // What has no place on a logarithmic axis is below all that has.
-                let place = |v: &f64| axis.position(*v).unwrap_or(0.0).clamp(0.0, 1.0) as f32;
-                self.places.extend(values.iter().map(place));
+                self.places.extend(values.iter().map(|&value| place(value) as f32));
                 dye = Dye::Table(scale.map.table());
             }
         }

@@ -12,14 +12,14 @@ use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, System};
 
 use super::stand_ins::StandIn;
-use super::{Album, FINE_EDGE, FINEST_EDGE, Line, control, plain, power, sheet, view};
+use super::{Album, FINE_EDGE, FINEST_EDGE, Line, control, maps, plain, power, view};
 use crate::programs::reproduce::corpus;
 
 /// Iterates of the maps.
 const SHOWN: [usize; 6] = [0, 1, 2, 5, 10, 20];
 
 /// ‖p_i − (A v)_i‖ on the mesh while PIA goes on.
-pub fn maps(album: &mut Album) -> Result<()> {
+pub fn error_maps(album: &mut Album) -> Result<()> {
     let subject = album.subject(&corpus::HORSE, StandIn::Knot("tri-torus:39x6"))?;
     let system = subject.system(Scheme::Loop)?;
     let size = subject.surface.diagonal();
@@ -27,7 +27,7 @@ pub fn maps(album: &mut Album) -> Result<()> {
     let view = view(DVec3::Y, 30.0, 12.0);
     let mut panels = Vec::new();
     let mut last = 0.0;
-    for (i, k) in SHOWN.into_iter().enumerate() {
+    for k in SHOWN {
         let (iterate, error) = control(&subject, &system, Method::Pia, k);
         last = error;
         let errors = (0..system.len())
@@ -35,11 +35,7 @@ pub fn maps(album: &mut Album) -> Result<()> {
             .collect();
         let surface =
             ShadedMesh::smooth(subject.surface.mesh().clone()).scalars(errors, scale.clone()).edges(FINEST_EDGE);
-        let mut picture = Picture::new(format!("k = {k}: at most {}", power(error / size)), view).surface(surface);
-        if i % 3 == 2 {
-            picture = picture.colour_bar(scale.clone());
-        }
-        panels.push(picture);
+        panels.push(Picture::new(format!("k = {k}: at most {}", power(error / size)), view).surface(surface));
     }
     let line = Line {
         name: "error-maps",
@@ -49,7 +45,7 @@ pub fn maps(album: &mut Album) -> Result<()> {
         iterations: SHOWN.last().copied(),
         error: Some(last),
     };
-    album.add(&line, sheet(3, (150, 140), panels))
+    album.add(&line, maps(3, (150, 140), &scale, panels))
 }
 
 /// The eigenvectors of Catmull-Clark's matrix that PIA is slowest to remove.
@@ -59,7 +55,7 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
     subjects.push(album.subject(&corpus::SPOT_COARSE, StandIn::Plain("quad-sphere:2"))?);
     let scale = ColourScale::signed("eigenvector / largest", 1.0);
     let mut panels = Vec::new();
-    for (i, subject) in subjects.iter().enumerate() {
+    for subject in &subjects {
         let system = subject.system(Scheme::CatmullClark)?;
         let (lambda, mode) = slowest(&system, &subject.name)?;
         let view = view(DVec3::Y, 30.0, 25.0);
@@ -70,9 +66,6 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
         let mut picture = Picture::new(caption, view)
             .surface(ShadedMesh::flat(subject.surface.mesh().clone()).scalars(mode, scale.clone()).edges(FINE_EDGE));
         picture.framed = Some(framed);
-        if i % 2 == 1 {
-            picture = picture.colour_bar(scale.clone());
-        }
         panels.push(picture);
     }
     let line = Line {
@@ -83,7 +76,7 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, sheet(2, (180, 150), panels))
+    album.add(&line, maps(2, (180, 150), &scale, panels))
 }
 
 /// Steps of the power iteration; it ends before where it has converged.

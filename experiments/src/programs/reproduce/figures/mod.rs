@@ -12,7 +12,8 @@ mod normals;
 mod sqrt3;
 mod stand_ins;
 
-use crate::report::{Colour, Column, Columns, Figure, Picture, ShadedMesh, Table, View};
+use crate::report::{Column, Columns, Figure, ShadedMesh, Table};
+use crate::studies::pictures::{CONTROL, FINE_EDGE, FINEST_EDGE, GIVEN, POINT, cage, maps, power, sheet, view};
 use glam::DVec3;
 use limitlab::Result;
 use limitlab::assemble::LimitSystem;
@@ -35,15 +36,6 @@ pub const ALL: Item = Item {
     run,
 };
 
-/// Colours of meshes as they were given, of control meshes, of surfaces.
-const GIVEN: Colour = Colour(236, 224, 200);
-const CONTROL: Colour = Colour(206, 220, 206);
-/// Given points on a surface.
-const POINT: Colour = Colour(200, 60, 30);
-/// Widths of edges in points.
-const EDGE: f64 = 0.35;
-const FINE_EDGE: f64 = 0.2;
-const FINEST_EDGE: f64 = 0.12;
 /// Faces that a surface is refined to, at most.
 const FACES: usize = 400_000;
 
@@ -55,7 +47,7 @@ fn run(context: &mut Context) -> Result<()> {
         limits::pia(&mut album)?;
         normals::bones(&mut album)?;
         normals::end_cap(&mut album)?;
-        errors::maps(&mut album)?;
+        errors::error_maps(&mut album)?;
         errors::slow_modes(&mut album)?;
         doo_sabin::approximation(&mut album)?;
         doo_sabin::against_nasri(&mut album)?;
@@ -173,15 +165,6 @@ fn plain(name: &str, mesh: Mesh) -> Result<Subject> {
     Ok(Subject { name: name.to_owned(), surface: Surface::new(mesh)? })
 }
 
-/// `3.8×10⁻²`, as the report's texts are marked up.
-fn power(x: f64) -> String {
-    let text = format!("{x:.1e}");
-    match text.split_once('e') {
-        Some((digits, exponent)) => format!("{digits}×10^{{{}}}", exponent.replace('-', "−")),
-        None => text,
-    }
-}
-
 /// The control points after so many steps from V = P, and the largest error that they leave.
 fn control(subject: &Subject, system: &LimitSystem, method: Method, iterations: usize) -> (Surface, f64) {
     let stop = Stop { tolerance: 0.0, max_iterations: iterations };
@@ -201,25 +184,4 @@ fn limit_surface(scheme: Refinement, control: &Surface) -> Result<ShadedMesh> {
     let points = scheme.limit_positions(&refined)?;
     let normals = scheme.limit_normals(&refined)?;
     Ok(ShadedMesh::with_normals(Mesh::new(points, refined.into_mesh().faces), normals))
-}
-
-/// A mesh with flat faces and its edges.
-fn cage(mesh: &Mesh, colour: Colour) -> ShadedMesh {
-    let width = match mesh.len() {
-        0..600 => EDGE,
-        600..3000 => FINE_EDGE,
-        _ => FINEST_EDGE,
-    };
-    ShadedMesh::flat(mesh.clone()).colour(colour).edges(width)
-}
-
-/// Panels in rows of `columns`, each `width`×`height` points.
-fn sheet(columns: usize, (width, height): (u32, u32), panels: Vec<Picture>) -> Figure {
-    let rows = panels.len().div_ceil(columns);
-    Figure { width: width * columns as u32, height: height * rows as u32, columns, ..Figure::row(panels) }
-}
-
-/// The view of a model, whose axes differ.
-fn view(up: DVec3, azimuth: f64, elevation: f64) -> View {
-    View::around(up, azimuth, elevation).perspective(20.0)
 }

@@ -1,0 +1,210 @@
+//! Pictures of a mesh: as it was given, its cage and its limit surface; maps of numbers at its vertices, on sheets and as
+//! PLY files for viewers.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use crate::report::{Colour, ColourScale, Figure, Picture, Points, Provenance, ShadedMesh, View};
+use limitlab::Result;
+use limitlab::interpolate::surface::{SurfaceMesh, SurfaceOptions, surface};
+use limitlab::mesh::ply::{Scalars, write_painted_to};
+use limitlab::mesh::{Mesh, Surface, diagonal};
+use limitlab::output::write_file;
+use limitlab::schemes::Scheme;
+
+/// Colours of meshes as they were given, of control meshes, of given points on a surface.
+pub const GIVEN: Colour = Colour(236, 224, 200);
+pub const CONTROL: Colour = Colour(206, 220, 206);
+pub const POINT: Colour = Colour(200, 60, 30);
+/// Widths of edges in points.
+pub const FINE_EDGE: f64 = 0.2;
+pub const FINEST_EDGE: f64 = 0.12;
+const EDGE: f64 = 0.35;
+/// Vertices beyond which edges would hide the faces.
+const MOST_WITH_EDGES: usize = 50_000;
+/// Vertices beyond which dots would hide the surface.
+const MOST_DOTS: usize = 2000;
+/// Corners that a surface is refined to, at most, and refinements.
+const MOST_REFINED: usize = 400_000;
+const MOST_LEVELS: usize = 5;
+/// Panels of maps in a row.
+const IN_A_ROW: usize = 3;
+
+/// A mesh with flat faces and its edges.
+pub fn cage(mesh: &Mesh, colour: Colour) -> ShadedMesh {
+    let shaded = ShadedMesh::flat(mesh.clone()).colour(colour);
+    match mesh.len() {
+        0..600 => shaded.edges(EDGE),
+        600..3000 => shaded.edges(FINE_EDGE),
+        3000..MOST_WITH_EDGES => shaded.edges(FINEST_EDGE),
+        _ => shaded,
+    }
+}
+
+/// Panels in rows of `columns`, each `width`×`height` points.
+pub fn sheet(columns: usize, (width, height): (u32, u32), panels: Vec<Picture>) -> Figure {
+    let rows = panels.len().div_ceil(columns);
+    Figure { width: width * columns as u32, height: height * rows as u32, columns, ..Figure::row(panels) }
+}
+
+/// The view of a model, whose axes differ.
+pub fn view(up: DVec3, azimuth: f64, elevation: f64) -> View {
+    View::around(up, azimuth, elevation).perspective(20.0)
+}
+
+/// The view, y upward, from a side that shows the most of numbers at the vertices, as far as faces look there; the one
+/// from the front, right and above unless another shows a fifth more.
+fn view_of(mesh: &Mesh, values: &[f64]) -> View {
+    let area = |face: &[u32]| -> DVec3 {
+        let at = |k: usize| mesh.positions[face[k % face.len()] as usize];
+        (1..face.len()).map(|k| (at(k) - at(0)).cross(at(k + 1) - at(0))).sum()
+    };
+    let shown = |view: &View| -> f64 {
+        let faces = mesh.faces.iter();
+        faces
+            .map(|face| {
+                let weight: f64 = face.iter().map(|&v| values[v as usize].abs()).sum();
+                weight / face.len() as f64 * area(face).dot(view.toward_eye).max(0.0)
+            })
+            .sum()
+    };
+    let sides = [25.0, -25.0]
+        .into_iter()
+        .flat_map(|elevation| [30.0, 120.0, 210.0, 300.0].map(|azimuth| View::around(DVec3::Y, azimuth, elevation)));
+    let mut best = View::around(DVec3::Y, 30.0, 25.0);
+    let mut most = 1.2 * shown(&best);
+    for side in sides {
+        let here = shown(&side);
+        if here > most {
+            (best, most) = (side, here);
+        }
+    }
+    best
+}
+
+/// `3.8×10⁻²`, as the report's texts are marked up.
+pub fn power(x: f64) -> String {
+    let text = format!("{x:.1e}");
+    match text.split_once('e') {
+        Some((digits, exponent)) => format!("{digits}×10^{{{}}}", exponent.replace('-', "−")),
+        None => text,
+    }
+}
+
+/// Pictures of numbers on one scale in rows of `columns`, each `width`×`height` points, with a colour bar at the end of each
+/// full row.
+pub fn maps(columns: usize, size: (u32, u32), scale: &ColourScale, pictures: Vec<Picture>) -> Figure {
+    let ends_row = |i: usize| i % columns == columns - 1;
+    let with_bar = |(i, picture): (usize, Picture)| {
+        if ends_row(i) { picture.colour_bar(scale.clone()) } else { picture }
+    };
+    sheet(columns, size, pictures.into_iter().enumerate().map(with_bar).collect())
+}
+
+/// Numbers at the vertices of a mesh under names.
+pub struct Maps<'a> {
+    pub mesh: &'a Mesh,
+    pub scalars: Vec<Scalars>,
+    /// What is 1 on the scale of colours, for each.
+    pub units: Vec<f64>,
+    pub scale: ColourScale,
+}
+
+/// What of a mesh is framed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Framed {
+    /// All of it, from where the last of the maps has its greatest numbers in view.
+    Whole,
+    /// Where the numbers of each map are, from a side of its own.
+    Near,
+}
+
+impl Maps<'_> {
+    /// In units of the scale.
+    fn painted(&self, map: usize) -> Vec<f64> {
+        self.scalars[map].values.iter().map(|x| x / self.units[map]).collect()
+    }
+
+    /// A sheet of all that have a caption.
+    pub fn figure(&self, title: String, captions: impl Iterator<Item = String>, framed: Framed) -> Figure {
+        let last = view_of(self.mesh, &self.painted(self.scalars.len() - 1)).perspective(20.0);
+        let picture = |(map, caption): (usize, String)| {
+            let values = self.painted(map);
+            let (view, points) = match framed {
+                Framed::Whole => (last, self.mesh.positions.clone()),
+                // Lines of sight are parallel: what is not framed may lie behind an eye.
+                Framed::Near => (view_of(self.mesh, &values), near_peak(&self.mesh.positions, &values)),
+            };
+            let shaded = ShadedMesh::smooth(self.mesh.clone()).scalars(values, self.scale.clone());
+            let shaded = match points.len() {
+                0..600 => shaded.edges(FINE_EDGE),
+                600..3000 => shaded.edges(FINEST_EDGE),
+                _ => shaded,
+            };
+            Picture::new(caption, view).surface(shaded).frame(&points)
+        };
+        let pictures: Vec<Picture> = captions.enumerate().map(picture).collect();
+        let figure = maps(IN_A_ROW.min(pictures.len()), (200, 190), &self.scale, pictures);
+        Figure { height: figure.height + Figure::TITLE_ROOM, ..figure.title(title) }
+    }
+
+    /// A PLY file with all as properties of the vertices, in the colours of `shown` of them.
+    ///
+    /// # Errors
+    /// As a picture with the scale; if the file cannot be written.
+    pub fn write_ply(&self, path: &Path, shown: usize, made: &Provenance) -> Result<()> {
+        let colours = self.scale.colours(&self.painted(shown))?;
+        write_file(path, |out| write_painted_to(out, self.mesh, &colours, &self.scalars, &made.lines()))
+    }
+}
+
+/// The points around that of the greatest number, as far as numbers are a hundredth of it, and no fewer than those within an
+/// eighth of the whole.
+fn near_peak(points: &[DVec3], values: &[f64]) -> Vec<DVec3> {
+    let peak = peak(values);
+    let distance = |v: usize| points[v].distance(points[peak]);
+    let is_seen = |&v: &usize| values[v].abs() > 0.01 * values[peak].abs();
+    let reach = (0..points.len()).filter(is_seen).map(distance).fold(0.125 * diagonal(points), f64::max);
+    (0..points.len()).filter(|&v| distance(v) <= reach).map(|v| points[v]).collect()
+}
+
+/// Where numbers are largest; the first of those that are as large but for rounding.
+pub fn peak(values: &[f64]) -> usize {
+    let larger = |at: usize, v: usize| if values[v].abs() > values[at].abs() * (1.0 + 1e-6) { v } else { at };
+    (0..values.len()).fold(0, larger)
+}
+
+/// The mesh that was given, its control mesh, and the limit surface of that with the points which it meets, side by side on one
+/// scale. The surface is that of `request`, refined as far as is seen.
+///
+/// # Errors
+/// As [`surface`].
+pub fn interpolation(
+    title: String,
+    given: &Surface,
+    control: Surface,
+    scheme: Scheme,
+    request: &SurfaceOptions,
+) -> Result<Figure> {
+    let points = given.positions();
+    let framed: Vec<DVec3> = points.iter().chain(control.positions()).copied().collect();
+    let view = view(DVec3::Y, 30.0, 25.0);
+    let panel = |caption: String, shaded| Picture::new(caption, view).surface(shaded).frame(&framed);
+    let counts = format!("given: {} vertices, {} faces", given.len(), given.faces().len());
+    let mesh = panel(counts, cage(given.mesh(), GIVEN));
+    let cage = panel("control mesh".into(), cage(control.mesh(), CONTROL));
+    let size = given.faces().corners().len();
+    let levels = (0..MOST_LEVELS).find(|k| size << (2 * k) >= MOST_REFINED).unwrap_or(MOST_LEVELS);
+    let request = SurfaceOptions { levels: levels.max(request.levels), limit: true, normals: true, ..*request };
+    let SurfaceMesh { surface, normals, .. } = surface(control, scheme, points, &request)?;
+    let limit = ShadedMesh::with_normals(surface.into_mesh(), normals.unwrap_or_default());
+    let mut limit = panel("limit surface, given points".into(), limit);
+    if points.len() <= MOST_DOTS {
+        let is_met = |v: usize| request.constraints.interpolated.is_none_or(|marks| marks[v]);
+        let positions = (0..points.len()).filter(|&v| is_met(v)).map(|v| points[v]).collect();
+        limit = limit.points(Points { positions, radius: 1.1, colour: POINT });
+    }
+    let figure = sheet(IN_A_ROW, (230, 240), vec![mesh, cage, limit]);
+    Ok(Figure { height: figure.height + Figure::TITLE_ROOM, ..figure.title(title) })
+}
