@@ -84,9 +84,8 @@ impl ErrorMaps {
         let iterations: Vec<usize> = maps.iter().map(|(k, _)| *k).collect();
         // Errors that have diverged beyond all numbers take the last colour.
         let largest = |(_, errors): &(usize, Vec<f64>)| errors.iter().copied().fold(0.0, f64::max).min(f64::MAX);
-        let units: Vec<f64> = maps.iter().map(largest).map(|most| if most > 0.0 { most } else { 1.0 }).collect();
-        let captions = iterations.iter().zip(&units).map(|(k, most)| format!("k = {k}: largest {}", power(*most)));
-        let captions: Vec<String> = captions.collect();
+        let most: Vec<f64> = maps.iter().map(largest).collect();
+        let units = most.iter().map(|&most| if most > 0.0 { most } else { 1.0 }).collect();
         let scalars = maps.into_iter().map(|(k, values)| Scalars { name: format!("error_{k}"), values }).collect();
         let maps =
             Maps { mesh: &mesh, scalars, units, scale: ColourScale::logarithmic("error / largest", (LEAST, 1.0)) };
@@ -95,7 +94,8 @@ impl ErrorMaps {
         let file = output.out.join(format!("{id}.ply"));
         maps.write_ply(&file, iterations.len() - 1, made)?;
         let title = format!("{}: errors of {label} after k iterations", problem.subject.caption());
-        output.figure(&id, &maps.figure(title, captions.into_iter(), Framed::Whole), made)?;
+        let captions = iterations.iter().zip(most).map(|(k, most)| format!("k = {k}: largest {}", power(most)));
+        output.figure(&id, &maps.figure(title, captions, Framed::Whole), made)?;
         Ok(json!({ "file": file.display().to_string(), "iterations": iterations }))
     }
 }

@@ -9,7 +9,7 @@ use crate::report::{Colour, ColourScale, Figure, Picture, Points, Provenance, Sh
 use limitlab::Result;
 use limitlab::interpolate::surface::{SurfaceMesh, SurfaceOptions, surface};
 use limitlab::mesh::ply::{Scalars, write_painted_to};
-use limitlab::mesh::{Mesh, Surface, diagonal};
+use limitlab::mesh::{Mesh, Surface, bounding_box, diagonal};
 use limitlab::output::write_file;
 use limitlab::schemes::Scheme;
 
@@ -60,14 +60,17 @@ fn view_of(mesh: &Mesh, values: &[f64]) -> View {
         let at = |k: usize| mesh.positions[face[k % face.len()] as usize];
         (1..face.len()).map(|k| (at(k) - at(0)).cross(at(k + 1) - at(0))).sum()
     };
+    // Faces may be turned inward.
+    let (least, greatest) = bounding_box(&mesh.positions).unwrap_or_default();
+    let middle = 0.5 * (least + greatest);
+    let volume = |face: &[u32]| area(face).dot(mesh.positions[face[0] as usize] - middle);
+    let outward = mesh.faces.iter().map(volume).sum::<f64>().signum();
     let shown = |view: &View| -> f64 {
-        let faces = mesh.faces.iter();
-        faces
-            .map(|face| {
-                let weight: f64 = face.iter().map(|&v| values[v as usize].abs()).sum();
-                weight / face.len() as f64 * area(face).dot(view.toward_eye).max(0.0)
-            })
-            .sum()
+        let on_face = |face: &[u32]| {
+            let weight: f64 = face.iter().map(|&v| values[v as usize].abs()).sum();
+            weight / face.len() as f64 * (outward * area(face).dot(view.toward_eye)).max(0.0)
+        };
+        mesh.faces.iter().map(on_face).sum()
     };
     let sides = [25.0, -25.0]
         .into_iter()
@@ -207,4 +210,40 @@ pub fn interpolation(
     }
     let figure = sheet(IN_A_ROW, (230, 240), vec![mesh, cage, limit]);
     Ok(Figure { height: figure.height + Figure::TITLE_ROOM, ..figure.title(title) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use limitlab::mesh::{Faces, builtin::builtin};
+
+    #[test]
+    fn the_view_shows_where_numbers_are_on_faces_turned_either_way() {
+        let mesh = builtin("icosphere:2").unwrap();
+        let turned = mesh.faces.iter().map(|face| face.iter().rev().copied().collect::<Vec<u32>>());
+        let turned = Mesh::new(mesh.positions.clone(), Faces::from_lists(turned));
+        for side in [DVec3::NEG_Z, DVec3::NEG_X, DVec3::new(1.0, -1.0, 1.0).normalize()] {
+            let values: Vec<f64> = mesh.positions.iter().map(|p| if p.dot(side) > 0.9 { -1.0 } else { 0.0 }).collect();
+            for mesh in [&mesh, &turned] {
+                assert!(view_of(mesh, &values).toward_eye.dot(side) > 0.6, "{side}");
+            }
+        }
+        let even = vec![1.0; mesh.len()];
+        assert_eq!(view_of(&mesh, &even), View::around(DVec3::Y, 30.0, 25.0));
+    }
+
+    #[test]
+    fn a_mode_is_framed_with_what_is_around_it() {
+        let mesh = builtin("icosphere:3").unwrap();
+        let mut values = vec![0.0; mesh.len()];
+        values[17] = -2.0;
+        let peak = mesh.positions[17];
+        // An eighth of the diagonal √12 of the bounding box.
+        let near = near_peak(&mesh.positions, &values);
+        let within = |reach: f64| mesh.positions.iter().filter(|p| p.distance(peak) <= reach).count();
+        assert_eq!(near.len(), within(12f64.sqrt() / 8.0));
+        assert!(near.len() > 1 && near.len() < mesh.len() / 4);
+        values.fill(1.0);
+        assert_eq!(near_peak(&mesh.positions, &values).len(), mesh.len());
+    }
 }
