@@ -152,6 +152,8 @@ pcg-ssor in order           7
 rates.csv has these columns too: seconds
 ";
         assert_eq!(fitted(&rates(), 40), expected);
+        let narrow = fitted(&rates(), 30);
+        assert!(narrow.ends_with("order           7\n\nrates.csv has these columns\ntoo: rate, seconds\n"), "{narrow}");
     }
 
     #[test]

@@ -339,7 +339,19 @@ mod tests {
         let shown = Shown { mesh, range: range(&problem, &rows) };
         let found = frames(&problem, system, &rows[0], &shown, 2).unwrap();
         assert_eq!(found.at, Packed::new([0, rows[0].solution.report.iterations as u32].map(u32::to_le_bytes)));
-        assert!(found.errors.as_str().len() == (2 * left).div_ceil(3) * 4);
+        // At the start and at the end the greatest error of the vertices in each place.
+        let [least, greatest] = shown.range.map(f64::ln);
+        let mut bytes = Vec::new();
+        for points in [problem.data().1, &rows[0].solution.points] {
+            let mut worst = vec![0.0f64; left];
+            for (v, p) in surface.positions().iter().enumerate() {
+                let place = &mut worst[shown.mesh.place[v] as usize];
+                *place = place.max(problem.scale * p.distance(system.row(v, points)));
+            }
+            let byte = |error: f64| (255.0 * (error.ln() - least) / (greatest - least)).round() as u8;
+            bytes.extend(worst.into_iter().map(|error| [byte(error)]));
+        }
+        assert_eq!(found.errors, Packed::new(bytes));
         let view = view(&problem, surface, scheme, shown).unwrap();
         assert!(view.about.starts_with(&format!("Thinned out: {left} of 20800 vertices")), "{}", view.about);
         assert!(view.limit.is_none() && view.about.contains("limit surface is left out"));

@@ -124,6 +124,43 @@ mod tests {
         }
     }
 
+    /// Two sheets of 4 × 4 squares, one close above the other, in two cells a side: one square of each has a corner in
+    /// all four.
+    #[test]
+    fn cells_reach_to_the_end_of_the_box_and_faces_that_fall_together_are_one() {
+        let (mut positions, mut faces) = (Vec::new(), Faces::default());
+        for k in 0..2 {
+            let first = 25 * k;
+            for i in 0..25 {
+                positions.push(DVec3::new(f64::from(i % 5), f64::from(i / 5), 0.1 * f64::from(k)));
+            }
+            for i in (0..20).filter(|i| i % 5 < 4) {
+                faces.push(&[0, 1, 6, 5].map(|step| first + i + step));
+            }
+        }
+        let thinned = Thinned::by_grid(&Mesh::new(positions, faces), 2);
+        let mut first = thinned.first.clone();
+        first.sort_unstable();
+        assert_eq!(first, [0, 2, 10, 12]);
+        assert_eq!((thinned.faces.len(), thinned.faces.face(0).len()), (1, 4));
+    }
+
+    #[test]
+    fn corners_that_fall_together_are_one() {
+        assert_eq!(kept(&[0, 1, 2, 3], &[5, 4, 3, 5]), Some(vec![3, 5, 4]));
+        assert_eq!(kept(&[0, 1, 2, 3], &[5, 4, 4, 3]), Some(vec![3, 5, 4]));
+        assert_eq!(kept(&[0, 1, 2, 3], &[5, 5, 3, 3]), None);
+    }
+
+    #[test]
+    fn few_vertices_with_too_many_corners_are_fewer() {
+        let mut mesh = builtin("tri-torus:5x5").unwrap();
+        let turned: Vec<Vec<u32>> = mesh.faces.iter().map(|face| face.iter().rev().copied().collect()).collect();
+        turned.iter().for_each(|face| mesh.faces.push(face));
+        let thinned = Thinned::new(&mesh, mesh.len());
+        assert!(thinned.first.len() < mesh.len() && thinned.faces.corners().len() <= CORNERS * mesh.len());
+    }
+
     #[test]
     fn all_in_one_point_is_one_vertex() {
         let mut mesh = builtin("torus:5x4").unwrap();
