@@ -150,3 +150,24 @@ impl Spectra for ComplexSpectrum {
         Ok(None)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// |1 − ωλ|² = 1 − 0.2ω + 0.17ω² for λ = 0.1 ± 0.4i: more than (1 − ω)² up to ω = 180/83.
+    #[test]
+    fn a_complex_pair_sets_the_best_and_the_critical_omega() {
+        // That which is 0 but for rounding sets none.
+        let real = [1.0, -1e-17].map(Complex::from);
+        let all: Vec<_> = real.into_iter().chain([0.4, -0.4].map(|im| Complex::new(0.1, im))).collect();
+        let ends = Extremes { min: 0.0, max: 1.0 };
+        let spectrum = ComplexSpectrum { eigenvalues: Some([all.clone(), all]), ends: [ends; 2] };
+        for form in [SymmetricForm::A, SymmetricForm::Jacobi] {
+            // Where the parabola is least, and where it is 1 again.
+            let [best, critical] = [spectrum.optimal_omega(form), spectrum.critical_omega(form)];
+            assert!((best - 0.1 / 0.17).abs() < 1e-6, "{best}");
+            assert!((critical - 0.2 / 0.17).abs() < 1e-15, "{critical}");
+        }
+    }
+}
