@@ -55,6 +55,11 @@ fn creases_carry_changes_along_and_are_walls_across() {
             assert!((next / here + ratio).abs() < 1e-3 * ratio, "{scheme}, {k}: {}", next / here);
         }
         assert!((found[at(4, 0)] / found[at(3, 0)] + ratio).abs() < 1e-8);
+        // The same both ways round, past the vertex at which the curve is begun.
+        for k in 1..SIZE / 2 {
+            let [a, b] = [found[at(3 + k, 0)], found[at(3 + SIZE - k, 0)]];
+            assert!((a - b).abs() < 1e-14, "{scheme}, {k}: {a} and {b}");
+        }
         // The other crease knows nothing of it.
         assert!((0..SIZE).all(|i| found[at(i, SIZE / 2)] == 0.0));
         // Under Catmull-Clark a product: along the crease, and away from it.

@@ -48,6 +48,14 @@ fn eigenvalues_and_masks_are_the_closed_forms() {
     }
 }
 
+/// The largest eigenvalue of a mode that turns by `angle` from edge to edge.
+fn mode(scheme: LocalScheme, angle: f64) -> f64 {
+    match scheme {
+        LocalScheme::Loop => 0.375 + 0.25 * angle.cos(),
+        _ => (5.0 + angle.cos() + (0.5 * angle).cos() * (2.0 * (9.0 + angle.cos())).sqrt()) / 16.0,
+    }
+}
+
 /// The largest modes inside a sector: cos(0) would be that of the curve itself.
 #[test]
 fn a_sector_has_a_tangent_plane_up_to_three_quads_and_five_triangles() {
@@ -55,19 +63,21 @@ fn a_sector_has_a_tangent_plane_up_to_three_quads_and_five_triangles() {
         for m in 1..=10 {
             let sector = &row(scheme, SharpVertex::Boundary, m).sectors[0];
             assert_eq!(sector.tangent_plane, m <= most, "{scheme}, {m}");
-            let mode = |j: usize| {
-                let angle = PI * j as f64 / m as f64;
-                match scheme {
-                    LocalScheme::Loop => 0.375 + 0.25 * angle.cos(),
-                    _ => (5.0 + angle.cos() + (0.5 * angle).cos() * (2.0 * (9.0 + angle.cos())).sqrt()) / 16.0,
-                }
-            };
             for j in 1..m.min(3) {
-                assert!((sector.modes[j - 1] - mode(j)).abs() < EIGEN, "{scheme}, {m}, {j}");
+                let expected = mode(scheme, PI * j as f64 / m as f64);
+                assert!((sector.modes[j - 1] - expected).abs() < EIGEN, "{scheme}, {m}, {j}");
             }
             let corner = row(scheme, SharpVertex::Corner, m);
             assert_eq!(corner.sectors[0].tangent_plane, m == 1);
             assert_eq!(corner.masks.len(), if m == 1 { 3 } else { 1 });
+            if m == 1 {
+                let along = |ends: [f64; 2]| {
+                    let others = vec![0.0; corner.positions.len() - 3];
+                    [&[-1.0], &ends[..], &others].concat()
+                };
+                close(named(&corner, "along_first"), &along([1.0, 0.0]));
+                close(named(&corner, "along_second"), &along([0.0, 1.0]));
+            }
         }
         // Where the second mode is ½, to rounding, there is none.
         let equal = row(scheme, SharpVertex::Boundary, most + 1);
@@ -114,6 +124,24 @@ fn darts_have_their_exact_masks() {
     let leading: Vec<f64> = five.masks[1..].iter().map(|mask| mask.eigenvalue).collect();
     assert!((leading[0] - 0.55).abs() < 5e-5 && (leading[1] - 0.5264).abs() < 5e-5, "{leading:?}");
     assert!(five.sectors[0].tangent_plane);
+}
+
+/// The sines about a smooth vertex vanish on an edge, so that it may as well be sharp: one of the two leading modes of a dart is
+/// theirs, of eigenvalues that may be equal. The other is even about that edge.
+#[test]
+fn a_dart_has_a_tangent_plane_by_an_odd_and_an_even_mode() {
+    for scheme in SCHEMES {
+        for n in (3..=12).chain([40]) {
+            let dart = row(scheme, SharpVertex::Dart, n);
+            let [_, first, second] = &dart.masks[..] else { panic!("{scheme}, {n}: {} masks", dart.masks.len()) };
+            let smooth = mode(scheme, 2.0 * PI / n as f64);
+            let off = [first, second].map(|mask| (mask.eigenvalue - smooth).abs());
+            assert!(off[0].min(off[1]) < EIGEN, "{scheme}, {n}: {off:?}");
+            let product: f64 = first.weights.iter().zip(&second.weights).map(|(a, b)| a * b).sum();
+            assert!(product.abs() < EIGEN, "{scheme}, {n}: {product:e}");
+            assert!(dart.sectors[0].tangent_plane, "{scheme}, {n}");
+        }
+    }
 }
 
 #[test]
