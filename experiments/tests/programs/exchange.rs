@@ -147,7 +147,7 @@ fn repair_is_advised_exactly_where_it_helps() {
 fn a_repaired_mesh_comes_back_in_the_numbers_of_its_file() {
     let folder = tempdir().unwrap();
     // Vertex 4 has no face, face 1 is turned, face 4 a double, and two more faces stand on the edge 0–1.
-    let faces = "f 1 3 2\nf 4 2 1\nf 2 3 4\nf 3 1 4\nf 2 3 1\nf 1 2 6\nf 1 6 7\n";
+    let faces = "f 1 3 2\nf 4 2 1\nf 2 3 4\nf 3 1 4\nf 2 3 1\ng fin\nf 1 2 6\nf 1 6 7\n";
     let tags = "t crease 2/1/0 0 1 10\nt corner 1/1/0 0 10\n";
     let given = format!("{TETRAHEDRON}v 5 5 5\nv 1 -1 0\nv 0 -1 -1\n{faces}{tags}");
     fs::write(folder.path().join("a.obj"), given).unwrap();
@@ -174,6 +174,10 @@ fn a_repaired_mesh_comes_back_in_the_numbers_of_its_file() {
     let ends: Vec<_> = cage.tags.creases.iter().map(|c| c.ends).collect();
     assert!(ends.contains(&[0, 1]) && ends.iter().any(|e| e[0] >= 7), "{ends:?}");
     assert!(cage.tags.corners.iter().any(|c| c.vertex >= 7));
+    // Its group begins with its face, the number of which is one less now.
+    let written = fs::read_to_string(folder.path().join("cage.obj")).unwrap();
+    let of_group = written.split("g fin\n").nth(1).and_then(|rest| rest.lines().next());
+    assert!(of_group.is_some_and(|face| face.ends_with(" 6")), "{written}");
     // A mesh without defects is as it was.
     assert_done(&run(INTERPOLATE, folder.path(), ["torus:8x6", "-o", "one.ply", "--quiet"]), "plain");
     assert_done(&run(INTERPOLATE, folder.path(), ["torus:8x6", "-o", "two.ply", "--repair", "--quiet"]), "valid");
