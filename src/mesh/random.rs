@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn creased_meshes_have_no_darts_and_semi_sharp_ones_have() {
-        let mut darts = 0;
+        let (mut darts, mut semi_sharp) = (0, 0);
         for seed in 0..200 {
             let closed = random_polygons(seed);
             let Some((creased, tags)) = random_creased(&closed, seed) else { continue };
@@ -148,7 +148,8 @@ mod tests {
             let (more, _) = random_semi_sharp(&closed, seed).unwrap();
             assert_eq!(more.mesh(), creased.mesh(), "seed {seed}");
             darts += more.features().map_or(0, |f| f.count(Rule::Dart));
+            semi_sharp += more.features().map_or(0, |f| f.semi_sharp_edges().len());
         }
-        assert!(darts > 100, "{darts}");
+        assert!(darts > 100 && semi_sharp > 100, "{darts}, {semi_sharp}");
     }
 }
