@@ -230,7 +230,7 @@ fn compare<'a>(problem: &'a Problem, wanted: &Wanted) -> Result<Compared<'a>> {
     let methods: Vec<Method> = asked.iter().filter_map(method).collect();
     let auto = asked.contains(&Asked::Auto);
     let mut refused = None;
-    let (mut rows, measured, error_maps) = match problem.matrix() {
+    let mut compared = match problem.matrix() {
         Matrix::Symmetric(system) => {
             let eigenvalues = |_: &_| {
                 let all = (system.len() <= dense::LARGEST).then(|| dense::eigenvalues(system)).transpose()?;
@@ -260,10 +260,10 @@ fn compare<'a>(problem: &'a Problem, wanted: &Wanted) -> Result<Compared<'a>> {
             by_methods(problem, system, &ComplexSpectrum::new(system)?, eigenvalues, (&methods, auto), wanted)?
         }
     };
-    for recorded in rows.iter_mut().flat_map(|row| &mut row.solution.report.history) {
+    for recorded in compared.rows.iter_mut().flat_map(|row| &mut row.solution.report.history) {
         recorded.errors = recorded.errors * problem.scale;
     }
-    Ok(Compared { rows, refused, measured, error_maps })
+    Ok(Compared { refused, ..compared })
 }
 
 /// The rows of methods by name, and of `auto` if it is asked for; what the page needs beside them, with all `eigenvalues` of A
@@ -275,7 +275,7 @@ fn by_methods<'a, S: System, K: Spectra + Clone + Sync>(
     eigenvalues: impl FnOnce(&K) -> Result<Option<[Vec<Complex<f64>>; 2]>>,
     (methods, auto): (&[Method<'a>], bool),
     wanted: &Wanted,
-) -> Result<(Vec<MethodRow<'a>>, Option<Measured>, Vec<Option<ErrorMaps>>)> {
+) -> Result<Compared<'a>> {
     let order_name = wanted.order.to_string();
     let lines = entries(system, spectra, methods, Some(&problem.order), &order_name)?;
     let subject = &problem.subject.name;
@@ -305,11 +305,11 @@ fn by_methods<'a, S: System, K: Spectra + Clone + Sync>(
         None => Vec::new(),
     };
     if !wanted.page {
-        return Ok((rows, None, error_maps));
+        return Ok(Compared { rows, refused: None, measured: None, error_maps });
     }
     let of_page = Progress::new(subject, page::steps(&rows), wanted.common.quiet);
     let measured = page::measure(problem, system, spectra, eigenvalues(spectra)?, &rows, &of_page)?;
-    Ok((rows, Some(measured), error_maps))
+    Ok(Compared { rows, refused: None, measured: Some(measured), error_maps })
 }
 
 /// The errors at the vertices after the iterations `at`, one a row; says which rows have none, or not all.

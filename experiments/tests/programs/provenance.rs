@@ -58,7 +58,7 @@ fn every_file_says_what_made_it() {
                 window[4] == b'-' && window[10] == b'T' && window[19] == b'Z' && digits(0..4) && digits(17..19)
             };
             assert!(contains(&bytes, &command), "{name}: {command}");
-            assert!(contains(&bytes, concat!("limitlab ")) && contains(&bytes, env!("CARGO_PKG_VERSION")), "{name}");
+            assert!(contains(&bytes, "limitlab ") && contains(&bytes, env!("CARGO_PKG_VERSION")), "{name}");
             assert!(contains(&bytes, "threads") && contains(&bytes, "quiet=true"), "{name}");
             assert!(bytes.windows(20).any(date), "{name}");
             if *program != SPLITTING {

@@ -347,7 +347,7 @@ mod tests {
         let row = |k: usize| {
             let ended = names.iter().enumerate().filter(|(c, _)| !(k < 2 && *c == 11)).map(|(c, name)| {
                 let n = (7 * k + 5 * c * c + k * c) % 23 + 1;
-                (name.clone(), if n % 7 == 0 { Err(Outcome::MaxIterations) } else { Ok(n) })
+                (name.clone(), if n.is_multiple_of(7) { Err(Outcome::MaxIterations) } else { Ok(n) })
             });
             let scheme = [Scheme::Loop, Scheme::Sqrt3][k % 2];
             Row { subject: &subject, scheme, tolerance: 1e-6, ended: ended.collect() }
