@@ -39,7 +39,7 @@ fn vertex_columns(path: &Path) -> BTreeMap<String, Vec<f64>> {
 fn is_picture(path: &Path) -> bool {
     let head: &[u8] = match path.extension().unwrap().to_str().unwrap() {
         "png" => b"\x89PNG",
-        "svg" => b"<svg",
+        "svg" => b"<?xml",
         _ => b"%PDF",
     };
     fs::read(path).is_ok_and(|bytes| bytes.starts_with(head))
@@ -95,8 +95,8 @@ fn write_creased(folder: &Path) -> Vec<[u32; 2]> {
         lines += &format!("{} {}\n", face.len(), corners.join(" "));
     }
     fs::write(folder.join("m.off"), lines).unwrap();
-    let face = torus.faces.face(0).to_vec();
-    let creases = vec![[face[0], face[1]], [face[1], face[2]]];
+    // One way around, of 7 vertices: a curve without ends.
+    let creases: Vec<[u32; 2]> = (0..7).map(|k| [k, (k + 1) % 7]).collect();
     let text: String = creases.iter().map(|[a, b]| format!("{} {} 10\n", a + 1, b + 1)).collect();
     fs::write(folder.join("c.txt"), text).unwrap();
     creases
