@@ -16,10 +16,11 @@ use limitlab::output::{Batch, check_target, create_dir};
 const EXAMPLES: [&str; 2] =
     ["assemble model.ply --out system", "assemble torus:8x6 --scheme nasri --out system --json"];
 
-/// Writes A, M, H and P of the limit system A V = P, A = H·M, as Matrix Market files with 17 significant digits,
-/// in the vertex order of the mesh. On an open or creased mesh A is no such product: A.mtx and P.mtx are those of all
-/// vertices, and the folder `smooth` has the five files of the system of the smooth vertices, in ascending order, once
-/// curves and corners are known; with darts and semi-sharp edges there is no such system.
+/// Writes A, M, H and P of the limit system A V = P, A = H·M, as Matrix Market files.
+///
+/// Numbers have 17 significant digits, rows the vertex order of the mesh. On an open or creased mesh A is no such product:
+/// A.mtx and P.mtx are those of all vertices, and the folder `smooth` has the five files of the system of the smooth vertices,
+/// in ascending order, once curves and corners are known; with darts and semi-sharp edges there is no such system.
 ///
 /// A.mtx is general, M.mtx symmetric (lower triangle), H.mtx an N×1 array (the diagonal), P.mtx an N×3 array of the
 /// given points, and R.mtx = H⁻¹P, the right-hand side of M V = R. With --scheme zheng-cai, M and R are the paper's

@@ -35,9 +35,10 @@ const EXAMPLES: [&str; 3] = [
     "compare-solvers system/",
 ];
 
-/// Runs every method on the same system from the same start V = P, and prints iterations, errors, observed and
-/// predicted rate, and the seconds of set-up and solve apart, the least of several runs where a run is short. Beside the
-/// picture stands a CSV file with the errors of every iterate.
+/// Runs every method on the same system from the same start V = P.
+///
+/// It prints iterations, errors, observed and predicted rate, and the seconds of set-up and solve apart, the least of several
+/// runs where a run is short. Beside the picture stands a CSV file with the errors of every iterate.
 ///
 /// A folder is taken for a system of anybody: M.mtx (symmetric positive definite), H.mtx (the positive diagonal of H; the
 /// identity if it is missing) and P.mtx (N×3, N×2 or N×1) of A V = P, A = H·M, as `assemble` writes them.

@@ -29,9 +29,10 @@ use limitlab::solvers::{Method, Stop, System};
 /// In its help.
 const EXAMPLES: [&str; 2] = ["spectrum model.off --modes 6", "spectrum icosphere:2 --scheme loop --full --json"];
 
-/// The ends of the spectra of A and D⁻¹A and the spectral radius of each method's error matrix, with proven bounds
-/// beside them, and whether the system is singular. A folder is taken for a system of anybody, as `compare-solvers` does:
-/// then the bounds are those of its entries, and singular is what rounding cannot tell from it.
+/// Extreme eigenvalues of A and D⁻¹A, rates of all methods, proven bounds, and whether the system is singular.
+///
+/// Rates are the spectral radii of the methods' error matrices. A folder is taken for a system of anybody, as
+/// `compare-solvers` does: then the bounds are those of its entries, and singular is what rounding cannot tell from it.
 ///
 /// Where a mesh has darts or semi-sharp vertices, no diagonal makes A symmetric: all eigenvalues, which may be complex, are
 /// computed (up to 2000 vertices), without bounds, which are proven for symmetric matrices.

@@ -18,8 +18,9 @@ use limitlab::{Error, Result, names};
 /// In its help.
 const EXAMPLES: [&str; 2] = ["splitting --valence 3..12 --scheme loop", "splitting --at crease --scheme catmull-clark"];
 
-/// Local splitting matrices, read off from the refinement rules: eigenvalues, limit and tangent masks with closed
-/// forms beside them, characteristic maps. For catmull-clark also what Thall prints, for sqrt3 also Lin and Luo's
+/// Local splitting matrices: eigenvalues, limit and tangent masks with closed forms beside them, characteristic maps.
+///
+/// They are read off from the refinement rules. For catmull-clark also what Thall prints, for sqrt3 also Lin and Luo's
 /// eigenvalue condition over α. With --at, the same at vertices that are not smooth, under catmull-clark and loop: on a
 /// boundary, on a crease with half of the faces on each side, at a corner of a boundary, at a dart.
 #[derive(Parser)]

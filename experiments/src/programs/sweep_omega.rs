@@ -27,9 +27,10 @@ const EXAMPLES: [&str; 2] = [
     "sweep-omega torus:32x32 --noise 0.1 --figure png,svg",
 ];
 
-/// Sweeps the damping ω of Jacobi, PIA and SOR: iterations to the tolerance and the measured rate, with the
-/// predicted spectral radius ρ(ω), the critical and the optimal ω beside them. A folder is taken for a system of anybody,
-/// as `compare-solvers` does.
+/// Sweeps the damping ω of Jacobi, PIA and SOR: iterations, measured and predicted rate.
+///
+/// Iterations are those to the tolerance; beside the measured rate stands the predicted spectral radius ρ(ω), with the critical
+/// and the optimal ω. A folder is taken for a system of anybody, as `compare-solvers` does.
 #[derive(Parser)]
 #[command(name = "sweep-omega", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE_ANYHOW, None))]
 pub struct Arguments {

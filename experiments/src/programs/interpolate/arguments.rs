@@ -18,8 +18,9 @@ const EXAMPLES: [&str; 3] = [
     "interpolate - -o - --format off --quiet",
 ];
 
-/// Computes the control mesh V with A V = P: the vertices P of the mesh become points of the limit surface. Unless
-/// refined by --subdivide, the faces stay, vertex for vertex, so that the result can replace the mesh in a tool that
+/// Computes the control mesh V with A V = P: the vertices P of the mesh become points of the limit surface.
+///
+/// Unless refined by --subdivide, the faces stay, vertex for vertex, so that the result can replace the mesh in a tool that
 /// subdivides by the same scheme; another scheme's surface misses the points.
 ///
 /// Blender, Maya and Rhino subdivide by Catmull-Clark: for these say --scheme catmull-clark, also of a triangle mesh,

@@ -17,7 +17,7 @@ pub const ITERATIONS: Item = Item {
     question: Some(Question {
         asks: "How good are the first of Thall's iterations, and what would another ω gain?",
         answer: "Each of the first three shrinks the largest error on every mesh (T10). His ω = ½ is always safe (T6) \
-                 and never above the best, which takes fewer iterations by the factors in T5.",
+                 and never above the ω of the least spectral radius, whose gain for each mesh's points is in T5.",
     }),
     run,
 };

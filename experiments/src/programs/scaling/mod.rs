@@ -37,8 +37,9 @@ use limitlab::solvers::{Method, Report, Stop, run};
 /// In its help.
 const EXAMPLES: [&str; 1] = ["scaling --sizes 1000,10000,100000 --profile 0 --gains 0 --steps 0"];
 
-/// Measures time, memory and iterations of the methods over growing meshes, from faces in memory to control points,
-/// everything counted.
+/// Measures time, memory and iterations of the methods over growing meshes.
+///
+/// Runs go from faces in memory to control points, and everything is counted.
 ///
 /// As it stands this takes about twenty minutes on two cores, most of them for Cholesky and incomplete Cholesky of a million
 /// vertices, and 5 GB of memory; --sizes 1000,10000,100000 --profile 0 --gains 0 --steps 0 takes one. Each row is said on standard
