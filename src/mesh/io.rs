@@ -13,6 +13,7 @@ use glam::DVec3;
 use super::attributes::Attributes;
 use super::features::Tags;
 use super::file_tags::{FileTags, Subdivision};
+use super::usd::StageMetadata;
 use super::validate::Boundary;
 use super::{Faces, Mesh, obj, obj_normals, off, ply, usd};
 use crate::memory::require;
@@ -38,6 +39,8 @@ pub struct Loaded {
     pub attributes: Attributes,
     /// The scheme that the file is made for, if it says that. USD only.
     pub subdivision: Option<Subdivision>,
+    /// What holds for all coordinates of the file. USD only.
+    pub stage: StageMetadata,
     /// CRC-32 of the bytes of the file, as zlib has it; `None` from the readers of one format.
     pub checksum: Option<u32>,
     /// What a user should know, a sentence each: above all what the file holds and the mesh does not keep.
@@ -80,6 +83,8 @@ pub struct WriteOptions<'a> {
     pub tags: Option<&'a Tags>,
     /// What the file of the mesh, whose faces these are, said of them. OBJ only.
     pub attributes: Option<&'a Attributes>,
+    /// What holds for all coordinates of the file. USD only.
+    pub stage: StageMetadata,
     /// PLY as text; the other formats always are.
     pub ascii: bool,
     /// Lines without line ends that stand near the top of the file, for people.
@@ -440,6 +445,7 @@ impl Builder {
             tags: FileTags::default(),
             attributes: Attributes::default(),
             subdivision: None,
+            stage: StageMetadata::default(),
             checksum: None,
             remarks,
         }

@@ -25,13 +25,22 @@ const ARCHIVE: &[u8] = b"PK";
 /// Numbers of a line, where they are not one vertex or face each.
 const PER_LINE: usize = 16;
 
+/// What the head of a USD file says of all coordinates in it. What is `None` is not said, and USD's default holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageMetadata {
+    /// `upAxis`: whether z is upward, not y as USD has it unless told.
+    pub is_z_up: Option<bool>,
+    /// `metersPerUnit`, positive.
+    pub meters_per_unit: Option<f64>,
+}
+
 /// Reads the bytes of a `.usda` file; `path` is for messages.
 ///
 /// The file has one mesh, a prim `def Mesh "name"`, at any depth; in `over`, `class` and variants none is looked for, and
 /// references are not followed. Of it are read `points`, `faceVertexCounts`, `faceVertexIndices`, `normals` (one a vertex),
 /// `subdivisionScheme`, `interpolateBoundary`, and as [tags](super::file_tags::FileTags) `creaseIndices`, `creaseLengths`,
-/// `creaseSharpnesses` (one a crease, or one an edge), `cornerIndices` and `cornerSharpnesses`. The rest of the scene is
-/// passed over as text; what of the mesh is not kept is remarked: transforms, so that the points are in the mesh's own
+/// `creaseSharpnesses` (one a crease, or one an edge), `cornerIndices` and `cornerSharpnesses`; of the head `upAxis` and
+/// `metersPerUnit`. The rest of the scene is passed over as text; what of the mesh is not kept is remarked: transforms, so that the points are in the mesh's own
 /// coordinates, primvars, normals of corners, holes, a left-handed orientation. O(bytes); nothing is allocated for a token.
 ///
 /// # Errors
@@ -91,7 +100,7 @@ pub fn write_to(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> 
 }
 
 /// Writes `mesh` as a mesh prim that is refined by the subdivision of `options`, with its sharp edges (a crease each), sharp vertices and
-/// the rule of its boundary; a boundary that is treated as interior is USD's `none`.
+/// the rule of its boundary; a boundary that is treated as interior is USD's `none`. The head has what they say of the stage.
 ///
 /// USD has points in single precision (`point3f`), and nine significant digits are written, which hold it: read here, a
 /// coordinate is off by 5·10⁻⁹ of itself at most; read elsewhere, by 6·10⁻⁸, and beyond 3.4·10³⁸ it is infinite.
@@ -103,7 +112,14 @@ pub fn write_control_to(out: &mut dyn Write, mesh: &Mesh, options: &WriteOptions
     check_normals(mesh, normals);
     out.write_all(b"#usda 1.0\n")?;
     options.write_comments(out, "#")?;
-    out.write_all(b"(\n    defaultPrim = \"mesh\"\n)\n\ndef Mesh \"mesh\"\n{\n")?;
+    out.write_all(b"(\n    defaultPrim = \"mesh\"\n")?;
+    if let Some(meters) = options.stage.meters_per_unit {
+        writeln!(out, "    metersPerUnit = {meters}")?;
+    }
+    if let Some(is_z_up) = options.stage.is_z_up {
+        writeln!(out, "    upAxis = \"{}\"", if is_z_up { 'Z' } else { 'Y' })?;
+    }
+    out.write_all(b")\n\ndef Mesh \"mesh\"\n{\n")?;
     writeln!(out, "    uniform token subdivisionScheme = \"{subdivision}\"")?;
     if let Some(rule) = tags.and_then(|tags| boundary_token(tags.boundary)) {
         writeln!(out, "    uniform token interpolateBoundary = \"{rule}\"")?;

@@ -22,6 +22,7 @@ use limitlab::mesh::io::{self, Format, Loaded, has_mesh_ending};
 use limitlab::mesh::noise::{Noise, move_vertices};
 use limitlab::mesh::origin::Origin;
 use limitlab::mesh::repair::{Repair, Repaired, repair};
+use limitlab::mesh::usd::StageMetadata;
 use limitlab::mesh::validate::{Boundary, validate};
 use limitlab::mesh::weld::{seams, weld};
 use limitlab::mesh::{Mesh, Surface, bounding_box, builtin, vertex_data};
@@ -84,6 +85,8 @@ pub struct Input {
     pub tags: Tags,
     /// What the file says of its faces beyond what is computed with.
     pub attributes: Attributes,
+    /// What the file says of all coordinates in it.
+    pub stage: StageMetadata,
     /// Where the vertices of the file went, with --weld and --repair.
     pub origin: Option<Origin>,
     /// What was mended, with --repair.
@@ -153,6 +156,7 @@ impl MeshFlags {
             tags: FileTags::default(),
             attributes: Attributes::default(),
             subdivision: None,
+            stage: StageMetadata::default(),
             checksum: None,
             remarks: Vec::new(),
         })
@@ -201,7 +205,7 @@ impl MeshFlags {
         let loaded = self.loaded(name, common)?;
         let read_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let Loaded { name, mesh, mut lines, tags, mut attributes, subdivision, checksum, .. } = loaded;
+        let Loaded { name, mesh, mut lines, tags, mut attributes, subdivision, stage, checksum, .. } = loaded;
         let name = &name[..];
         let rule = self.rule(&tags);
         let (mesh, origin, repairs) = self.mended(name, mesh, &mut lines, &mut attributes, rule, common);
@@ -241,6 +245,7 @@ impl MeshFlags {
             scheme,
             tags,
             attributes,
+            stage,
             origin,
             repairs,
             read_seconds,

@@ -9,6 +9,7 @@ use super::super::file_tags::{CornerTag, CreaseTag, FileTags, Subdivision, check
 use super::super::io::{Lines, Loaded, few_corners};
 use super::super::validate::Boundary;
 use super::super::{Faces, Mesh};
+use super::StageMetadata;
 use super::tokens::{List, Tokens};
 use crate::error::one_of;
 use crate::text::{Scanner, quoted};
@@ -71,8 +72,9 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Loaded> {
     let mut found: Option<Parts> = None;
     let mut prims: Vec<Prim> = Vec::new();
     tokens.skip_space()?;
+    let mut stage = StageMetadata::default();
     if tokens.peek() == Some(b'(') {
-        tokens.skip_brackets()?;
+        stage = metadata(&mut tokens)?;
     }
     loop {
         tokens.skip_space()?;
@@ -131,7 +133,19 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Loaded> {
             "no mesh in it (a prim `def Mesh`): variants are not looked into, and files that it refers to are not read";
         Error::parse(path, None, what)
     };
-    found.ok_or_else(none)?.load(path)
+    found.ok_or_else(none)?.load(path, stage)
+}
+
+/// Reads the head of the file, which is in brackets. What USD does not know there is no fault of the mesh.
+fn metadata(tokens: &mut Tokens) -> Result<StageMetadata> {
+    let [axis, unit] = tokens.metadata([b"upAxis", b"metersPerUnit"])?;
+    let meters = unit.and_then(|number| std::str::from_utf8(number).ok()?.parse::<f64>().ok());
+    let is_z_up = match axis {
+        Some(b"Z") => Some(true),
+        Some(b"Y") => Some(false),
+        _ => None,
+    };
+    Ok(StageMetadata { is_z_up, meters_per_unit: meters.filter(|&meters| meters > 0.0 && meters.is_finite()) })
 }
 
 /// Reads the head of a prim, up to its body.
@@ -247,7 +261,7 @@ impl<'a> Parts<'a> {
         let mut place = tokens.clone();
         tokens.skip_value()?;
         tokens.skip_space()?;
-        let interpolation = if tokens.peek() == Some(b'(') { tokens.metadata(b"interpolation")? } else { None };
+        let [interpolation] = if tokens.peek() == Some(b'(') { tokens.metadata([b"interpolation"])? } else { [None] };
         match interpolation {
             None | Some(b"vertex" | b"varying") => once(&mut self.normals, &mut place, "normals", point),
             Some(_) => {
@@ -257,7 +271,7 @@ impl<'a> Parts<'a> {
         }
     }
 
-    fn load(mut self, path: &Path) -> Result<Loaded> {
+    fn load(mut self, path: &Path, stage: StageMetadata) -> Result<Loaded> {
         let at = |line, what| Error::parse(path, Some(line), what);
         let line = self.line;
         let lacks = |what: &str| at(line, format!("the mesh {} has no {what}", quoted(self.name)));
@@ -303,6 +317,7 @@ impl<'a> Parts<'a> {
             lines: Some(lines),
             normals: normals.map(|list| list.values),
             attributes: Attributes::default(),
+            stage,
             tags,
             subdivision: self.subdivision,
             checksum: None,

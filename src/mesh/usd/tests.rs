@@ -408,3 +408,26 @@ proptest! {
         prop_assert_eq!(written(&back.mesh, back.normals.as_deref()), bytes);
     }
 }
+
+#[test]
+fn what_holds_for_all_coordinates_goes_from_file_to_file() {
+    let mesh = Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], Faces::from_lists([[0, 1, 2]]));
+    let body = scene("").split_once('\n').unwrap().1.to_owned();
+    for (head, expected) in [
+        ("", (None, None)),
+        ("(upAxis = \"Z\")", (Some(true), None)),
+        ("(\n    \"of the scene\"\n    metersPerUnit = 0.01\n    upAxis = 'Y'\n)", (Some(false), Some(0.01))),
+        (
+            "( customLayerData = { string upAxis = \"Z\" } subLayers = [ @upAxis@ ] metersPerUnit = 1e-3 )",
+            (None, Some(1e-3)),
+        ),
+        ("(metersPerUnit = 0; upAxis = \"X\")", (None, None)),
+        ("(metersPerUnit = -1, upAxis = \"\"\"Z\"\"\")", (Some(true), None)),
+    ] {
+        let stage = parse(&format!("#usda 1.0\n{head}\n{body}")).unwrap().stage;
+        assert_eq!((stage.is_z_up, stage.meters_per_unit), expected, "{head}");
+        let mut text = Vec::new();
+        write_control_to(&mut text, &mesh, &WriteOptions { stage, ..WriteOptions::default() }).unwrap();
+        assert_eq!(parse(std::str::from_utf8(&text).unwrap()).unwrap().stage, stage, "{head}");
+    }
+}

@@ -173,6 +173,16 @@ impl<'a> Tokens<'a> {
         }
     }
 
+    /// The value here as it is written, of a string what is in the quotes.
+    fn value(&mut self) -> Result<&'a [u8]> {
+        if let Some(b'"' | b'\'') = self.peek() {
+            return self.string("a string");
+        }
+        let rest = self.s.rest();
+        self.skip_value()?;
+        Ok(&rest[..rest.len() - self.s.rest().len()])
+    }
+
     fn skip_word(&mut self, wanted: &str) -> Result<()> {
         match word_in_list(self.s.rest()) {
             0 => Err(self.unexpected(wanted)),
@@ -238,10 +248,10 @@ impl<'a> Tokens<'a> {
         }
     }
 
-    /// Passes metadata `(…)`, and gives the string that it has for `key`.
-    pub fn metadata(&mut self, key: &[u8]) -> Result<Option<&'a [u8]>> {
+    /// Passes metadata `(…)`, and gives what it has for each of `keys`: of a string what is in the quotes.
+    pub fn metadata<const N: usize>(&mut self, keys: [&[u8]; N]) -> Result<[Option<&'a [u8]>; N]> {
         self.expect(b'(', "metadata, in brackets")?;
-        let mut found = None;
+        let mut found = [None; N];
         loop {
             self.skip_space()?;
             match self.peek() {
@@ -254,11 +264,13 @@ impl<'a> Tokens<'a> {
                 _ => {
                     let rest = self.s.rest();
                     self.skip_word("the ) that closes metadata")?;
-                    let is_key = &rest[..rest.len() - self.s.rest().len()] == key;
+                    let word = &rest[..rest.len() - self.s.rest().len()];
                     self.skip_space()?;
-                    if is_key && self.take(b'=') {
+                    if let Some(key) = keys.iter().position(|&key| key == word)
+                        && self.take(b'=')
+                    {
                         self.skip_space()?;
-                        found = Some(self.string(format_args!("the {} in quotes", String::from_utf8_lossy(key)))?);
+                        found[key] = Some(self.value()?);
                     }
                 }
             }

@@ -219,6 +219,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         subdivision: if is_control { subdivision_of(input.scheme) } else { Subdivision::None },
         tags: Some(&tags),
         attributes: keeps_faces.then_some(&input.attributes),
+        stage: input.stage,
         ascii: arguments.ascii,
         comments: &comments,
     };
