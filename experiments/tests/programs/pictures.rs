@@ -64,8 +64,7 @@ fn modes_of_the_icosahedron_have_the_multiplicities_of_its_graph() {
     assert!(["png", "svg"].iter().all(|ending| is_picture(&stem.with_extension(ending))));
     let table = fs::read_to_string(stem.with_extension("md")).unwrap();
     assert!(table.lines().any(|line| line.starts_with("| 1–3 ") && line.contains("| 3 ")), "{table}");
-    let mut reader =
-        csv::Reader::from_path(folder.path().join("out/spectrum-modes-icosahedron-loop-vertices.csv")).unwrap();
+    let mut reader = csv(&folder.path().join("out/spectrum-modes-icosahedron-loop-vertices.csv"));
     assert_eq!(reader.headers().unwrap(), ["vertex", "mode_1", "mode_2", "mode_3", "mode_4"].as_slice());
     let rows: Vec<csv::StringRecord> = reader.records().map(|row| row.unwrap()).collect();
     assert_eq!((rows.len(), &rows[0][0], &rows[1][0], &rows[12][0]), (13, "eigenvalue", "0", "11"));
