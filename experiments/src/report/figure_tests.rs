@@ -199,7 +199,11 @@ fn vector_graphics_are_valid_and_of_the_figures_size() {
         let (width, height) = (figure.width, figure.height);
         let size = format!("width=\"{width}pt\" height=\"{height}pt\" viewBox=\"0 0 {width} {height}\"");
         assert!(svg.contains(&size));
-        assert!(!svg.contains("NaN") && !svg.contains("inf"));
+        // Images are letters without sense.
+        let without_images =
+            |(k, part): (usize, &str)| part[if k == 0 { 0 } else { part.find('"').unwrap() }..].to_owned();
+        let drawn: String = svg.split(";base64,").enumerate().map(without_images).collect();
+        assert!(!drawn.contains("NaN") && !drawn.contains("inf"));
         // Every letter that is placed is defined, and defined once.
         let after = |mark: &'static str| svg.split(mark).skip(1).map(|rest| rest.split('"').next().unwrap());
         let defined: Vec<&str> = after("id=\"letter-").collect();
