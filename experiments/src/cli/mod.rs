@@ -312,7 +312,7 @@ pub fn write_standard(fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) 
 /// Prints a table to standard output: in the width of a terminal, else as Markdown.
 ///
 /// # Errors
-/// As [`print`].
+/// As [`print()`].
 pub fn print_table(table: &Table) -> Result<()> {
     match console::Term::stdout().size_checked() {
         Some((_, columns)) => print(&fitted(table, columns.into())),
