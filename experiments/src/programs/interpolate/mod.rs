@@ -119,6 +119,12 @@ impl<'a> Target<'a> {
         })
     }
 
+    /// Whether the mesh goes to another program or a device, which gets nothing else: no file is there to say later what
+    /// made it.
+    fn is_stream(&self) -> bool {
+        self.file.is_none_or(|path| path.exists() && !path.is_file())
+    }
+
     fn write(&self, mesh: &Mesh, options: &WriteOptions) -> Result<()> {
         match self.file {
             Some(path) => io::write_control(path, mesh, options),
@@ -213,7 +219,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         (true, false) => Cow::Owned(made.surface.tags()),
         (false, _) => Cow::Owned(Tags::default()),
     };
-    let comments = provenance.about(&input.source()).lines();
+    let comments = if target.is_stream() { Vec::new() } else { provenance.about(&input.source()).lines() };
     let options = WriteOptions {
         normals: made.normals.as_deref(),
         subdivision: if is_control { subdivision_of(input.scheme) } else { Subdivision::None },
