@@ -137,7 +137,8 @@ fn rows<const K: usize>(path: &Path, vertices: usize, form: &str) -> Result<Vec<
     Ok(rows)
 }
 
-/// Calls `visit(line, vertices, numbers)` for the lines of a text file of V vertices and K numbers each.
+/// Calls `visit(line, vertices, numbers)` for the lines of a text file of V vertices and K numbers each, of which there has to
+/// be one: who names a file means that it says something.
 fn lines<const V: usize, const K: usize>(
     path: &Path,
     vertices: usize,
@@ -146,11 +147,11 @@ fn lines<const V: usize, const K: usize>(
 ) -> Result<()> {
     let bytes = read(path)?;
     let mut s = Scanner::new(&bytes, path);
-    loop {
-        s.skip_space();
-        if s.at_end() {
-            return Ok(());
-        }
+    s.skip_space();
+    if s.at_end() {
+        return Err(Error::parse(path, None, format!("has no line `{form}`: leave the file out where none is meant")));
+    }
+    while !s.at_end() {
         let line = s.line();
         let mut ends = [0; V];
         for (k, end) in ends.iter_mut().enumerate() {
@@ -175,7 +176,9 @@ fn lines<const V: usize, const K: usize>(
             return Err(s.error(not_there(vertex, vertices)));
         }
         visit(line, ends, row)?;
+        s.skip_space();
     }
+    Ok(())
 }
 
 fn read(path: &Path) -> Result<Vec<u8>> {

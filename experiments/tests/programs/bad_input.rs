@@ -134,6 +134,8 @@ fn sharp_edges_and_vertices_that_are_none_are_told_at_their_line() {
         ("--creases", "0 1 -3\n", "line 1: edge 0–1 has the sharpness -3"),
         ("--creases", "0 1 nan\n", "\"nan\" is not a finite number of a line `a b sharpness`"),
         ("--creases", "0 9 10\n", "line 1: vertex 9 is not in the mesh"),
+        ("--creases", "# none\n", "has no line `a b sharpness`: leave the file out"),
+        ("--corners", "", "has no line `vertex sharpness`: leave the file out"),
         ("--corners", "8 10\n", "line 1: vertex 8 is not in the mesh"),
         ("--corners", "1 10 10\n", "\"10\" is not the end of a line `vertex sharpness`"),
     ] {
