@@ -19,8 +19,6 @@ pub(super) struct RowSource<'a> {
     incidence: &'a Incidence,
     /// The sides without an opposite, where there are such.
     open: Option<&'a Topology>,
-    /// By vertex: those whose rows are not fixed, where some are.
-    free: Option<&'a [bool]>,
     /// Which row is that of which vertex; the k-th of the k-th unless told.
     numbering: Option<&'a Numbering>,
     scheme: Scheme,
@@ -47,7 +45,7 @@ impl<'a> RowSource<'a> {
             None => incidence.face_count(vertex(k)) as u32,
             Some(topology) => topology.edge_valence(faces, vertex(k)) as u32,
         });
-        RowSource { faces, incidence, open, free, numbering, scheme, valences }
+        RowSource { faces, incidence, open, numbering, scheme, valences }
     }
 
     /// The vertex of a row.
@@ -70,7 +68,6 @@ impl<'a> RowSource<'a> {
 
     /// The kind of every row; a fixed one is a vertex without edges.
     pub(super) fn kinds(&self) -> Vec<RowKind> {
-        let n = self.valences.len();
         let edges_only = self.scheme.edges_only();
         let of_size = |size: usize| match size {
             _ if edges_only => RowKind::Edges,
@@ -78,8 +75,10 @@ impl<'a> RowSource<'a> {
             4 => RowKind::Quads,
             _ => RowKind::Polygons,
         };
-        if let (Some(size), None) = (self.faces.uniform_size(), self.free) {
-            return vec![of_size(size); n];
+        let n = self.valences.len();
+        // Where all faces are of one size, they need not be looked at.
+        if let Some(kind) = self.faces.uniform_size().map(of_size) {
+            return parallel::collect(n, |k| if self.valences[k] == 0 { RowKind::Edges } else { kind });
         }
         let incidence = self.incidence;
         parallel::collect(n, |k| {
