@@ -21,15 +21,16 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::LEVELS;
-use crate::Result;
 use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
+use crate::memory::require;
 use crate::mesh::features::{Features, Rule};
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::topology::NONE;
 use crate::mesh::{Surface, Topology};
 use crate::schemes::Refinement;
 use crate::schemes::star::require_curves;
+use crate::{Error, Result};
 
 /// How much of each energy the fairness holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,49 +75,45 @@ pub struct Fairness {
 }
 
 impl Fairness {
-    /// Refines a mesh and assembles the forms. Time and memory O(16·corners), times the 256 entries of a patch.
+    /// Refines a mesh and assembles the forms. Time and memory O(16·corners), times the 256 entries of a patch; O(n³) beside
+    /// for each vertex of a great valence n.
     ///
     /// # Errors
-    /// A boundary that is treated as interior, a dart, a semi-sharp edge or vertex; a mesh that is too large.
+    /// A boundary that is treated as interior, a dart, a semi-sharp edge or vertex; a mesh that is too large for memory or for
+    /// 32-bit numbers.
     pub fn new(surface: &Surface) -> Result<Self> {
         require_curves(surface, "fair interpolation")?;
         let fine = Refinement::CatmullClark.refined_n(surface, LEVELS)?;
         let finer = Refinement::CatmullClark.refined(&fine)?;
         let masks = StepMasks::new(&fine);
         let grams: Vec<[Gram; 2]> = (0..16).map(patch_grams).collect();
-        let mut triplets = Vec::new();
-        let mut local = Vec::new();
-        for f in 0..fine.faces().len() {
-            if let Some(patch) = regular_patch(&fine, f) {
-                let [thin_plate, membrane] = &grams[patch.sharp];
+        let mut triplets = Vec::with_capacity(entries(surface, &fine, &finer, &masks)?);
+        for_each_patch(&fine, &finer, &masks, |part| {
+            match part {
                 // Halving the parameters' sides: second derivatives ×4, their squares ×16, areas ×¼.
-                for (i, row) in patch.points() {
-                    for (j, column) in patch.points() {
-                        let values = [4.0 * thin_plate[i][j], membrane[i][j]];
-                        triplets.push((row, column, values));
+                Part::Whole(patch) => {
+                    let [thin_plate, membrane] = &grams[patch.sharp];
+                    for (i, row) in patch.points() {
+                        for (j, column) in patch.points() {
+                            triplets.push((row, column, [4.0 * thin_plate[i][j], membrane[i][j]]));
+                        }
                     }
                 }
-                continue;
-            }
-            // A quarter of a fine face has the number of the corner that it lies at.
-            for quarter in fine.faces().range(f) {
-                let Some(patch) = regular_patch(&finer, quarter) else {
-                    continue;
-                };
-                let [thin_plate, membrane] = &grams[patch.sharp];
-                masks.pull_back(&patch, &mut local);
-                for &(row, ref own) in &local {
-                    for &(column, ref other) in &local {
-                        let form = |gram: &Gram| -> f64 {
-                            let rows = own.iter().zip(gram);
-                            rows.map(|(a, g)| a * other.iter().zip(g).map(|(b, g)| b * g).sum::<f64>()).sum()
-                        };
-                        let values = [16.0 * form(thin_plate), form(membrane)];
-                        triplets.push((row, column, values));
+                Part::Quarter(patch, local) => {
+                    let [thin_plate, membrane] = &grams[patch.sharp];
+                    for &(row, ref own) in local {
+                        for &(column, ref other) in local {
+                            let form = |gram: &Gram| -> f64 {
+                                let rows = own.iter().zip(gram);
+                                rows.map(|(a, g)| a * other.iter().zip(g).map(|(b, g)| b * g).sum::<f64>()).sum()
+                            };
+                            triplets.push((row, column, [16.0 * form(thin_plate), form(membrane)]));
+                        }
                     }
                 }
             }
-        }
+            Ok(())
+        })?;
         let [thin_plate, membrane] = sum_triplets(fine.len(), &triplets);
         Ok(Fairness { fine, thin_plate, membrane })
     }
@@ -145,6 +142,61 @@ impl Fairness {
         let fine = Refinement::CatmullClark.refine_n(control, LEVELS)?;
         Ok(self.energies(&fine.positions))
     }
+}
+
+/// A part of the surface that is a bicubic spline.
+enum Part<'a> {
+    /// Over a fine face.
+    Whole(&'a Patch),
+    /// Over a quarter of one, in terms of the fine vertices that matter: each with its weights in the control points.
+    Quarter(&'a Patch, &'a [(u32, [f64; 16])]),
+}
+
+/// Visits the patches over the fine faces, and where a face has none those over its quarters.
+fn for_each_patch(
+    fine: &Surface,
+    finer: &Surface,
+    masks: &StepMasks,
+    mut visit: impl FnMut(Part) -> Result<()>,
+) -> Result<()> {
+    let mut local = Vec::new();
+    for f in 0..fine.faces().len() {
+        if let Some(patch) = regular_patch(fine, f) {
+            visit(Part::Whole(&patch))?;
+            continue;
+        }
+        // A quarter of a fine face has the number of the corner that it lies at.
+        for quarter in fine.faces().range(f) {
+            let Some(patch) = regular_patch(finer, quarter) else {
+                continue;
+            };
+            masks.pull_back(&patch, &mut local);
+            visit(Part::Quarter(&patch, &local))?;
+        }
+    }
+    Ok(())
+}
+
+/// The number of entries of all patches: few enough for 32-bit numbers, and memory has room for them.
+fn entries(surface: &Surface, fine: &Surface, finer: &Surface, masks: &StepMasks) -> Result<usize> {
+    /// A triplet, its place among those of a row, and its part of a sum.
+    const BYTES: u64 = 24 + 8 + 8;
+    const ADVICE: &str = "use a coarser mesh, or one of smaller valences";
+    let what = || format!("the energy of the surface of {} vertices", surface.len());
+    let mut entries = 0u64;
+    for_each_patch(fine, finer, masks, |part| {
+        let points = match part {
+            Part::Whole(patch) => patch.points().count(),
+            Part::Quarter(_, local) => local.len(),
+        };
+        entries += points.pow(2) as u64;
+        if entries <= u64::from(u32::MAX) {
+            return Ok(());
+        }
+        Err(Error::TooLarge { what: format!("{} has more than 2³² − 1 entries", what()), advice: ADVICE })
+    })?;
+    require(BYTES * entries, what, ADVICE)?;
+    Ok(entries as usize)
 }
 
 type Gram = [[f64; 16]; 16];
