@@ -7,7 +7,7 @@
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::mem;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -271,9 +271,25 @@ impl Temporary {
     }
 }
 
-/// Whether two files hold the same bytes.
+/// Whether two files hold the same bytes; no more of them is in memory than a buffer of each.
 fn is_same(a: &Path, b: &Path) -> io::Result<bool> {
-    Ok(fs::metadata(a)?.len() == fs::metadata(b)?.len() && fs::read(a)? == fs::read(b)?)
+    let files = [File::open(a)?, File::open(b)?];
+    if files[0].metadata()?.len() != files[1].metadata()?.len() {
+        return Ok(false);
+    }
+    let mut parts = [Vec::new(), Vec::new()];
+    loop {
+        for (file, part) in files.iter().zip(&mut parts) {
+            part.clear();
+            file.take(BUFFER as u64).read_to_end(part)?;
+        }
+        if parts[0] != parts[1] {
+            return Ok(false);
+        }
+        if parts[0].is_empty() {
+            return Ok(true);
+        }
+    }
 }
 
 impl Ledger {
@@ -322,15 +338,18 @@ mod tests {
     #[test]
     fn what_is_replaced_is_known_if_it_was_another_file() {
         let folder = tempfile::tempdir().unwrap();
-        let [other, same, new] = ["other", "same", "new"].map(|name| folder.path().join(name));
+        let [other, late, same, new] = ["other", "late", "same", "new"].map(|name| folder.path().join(name));
+        // Longer than is read at once.
+        let ours = "ours".repeat(BUFFER);
         fs::write(&other, "theirs").unwrap();
-        fs::write(&same, "ours").unwrap();
-        for path in [&other, &same, &new] {
-            write(path, "ours").unwrap();
+        fs::write(&late, ours.clone() + "!").unwrap();
+        fs::write(&same, ours.clone() + "?").unwrap();
+        for path in [&other, &late, &same, &new] {
+            write(path, &(ours.clone() + "?")).unwrap();
             write(path, "ours, later").unwrap();
         }
         let here: Vec<PathBuf> = replaced().into_iter().filter(|path| path.starts_with(folder.path())).collect();
-        assert_eq!(here, [other]);
+        assert_eq!(here, [other, late]);
     }
 
     #[test]
