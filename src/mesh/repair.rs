@@ -218,10 +218,10 @@ fn cycle(face: &[u32]) -> Vec<u32> {
 fn without_doubles(mesh: &Mesh, work: Work, repairs: &mut Vec<Repair>) -> Work {
     let topology = Topology::new(&work.faces, mesh.len());
     let mut first: BTreeMap<Vec<u32>, u32> = BTreeMap::new();
+    // Two faces on one cycle have all edges in common: where no other face is at any of these they are twins on each.
     let is_double = |f: usize| {
-        let leader = *first.entry(cycle(work.faces.face(f))).or_insert(f as u32) as usize;
-        let meets_leader = |c: usize| topology.twin(c as u32).is_some_and(|d| topology.incidence.face_of(d) == leader);
-        leader != f && !work.faces.range(f).all(meets_leader)
+        let has_twins = work.faces.range(f).all(|c| topology.twin(c as u32).is_some());
+        !has_twins && *first.entry(cycle(work.faces.face(f))).or_insert(f as u32) != f as u32
     };
     let is_doubled: Vec<bool> = (0..work.faces.len()).map(is_double).collect();
     let doubled: Vec<u32> = (0..work.faces.len()).filter(|&f| is_doubled[f]).map(|f| work.from[f]).collect();
