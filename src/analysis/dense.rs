@@ -63,7 +63,11 @@ pub fn complex_eigenvalues(a: &Csr) -> Result<Vec<Complex<f64>>> {
     unsymmetric_values(&to_dense(a))
 }
 
-fn unsymmetric_values(matrix: &Mat<f64>) -> Result<Vec<Complex<f64>>> {
+/// The eigenvalues of a full matrix, unsorted.
+///
+/// # Errors
+/// If the computation does not converge.
+pub(super) fn unsymmetric_values(matrix: &Mat<f64>) -> Result<Vec<Complex<f64>>> {
     matrix.eigenvalues().map_err(|e| Error::Computation(format!("dense eigenvalues: {e:?}")))
 }
 

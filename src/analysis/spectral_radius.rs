@@ -1,12 +1,13 @@
 //! Spectral radii of iterations whose error matrix is not symmetric: Gauss-Seidel, SOR, SSOR.
 
 use chacha20::ChaCha8Rng;
+use faer::Mat;
 use glam::DVec3;
 use nalgebra::{Complex, DMatrix, DVector, Schur};
 use rand::{RngExt, SeedableRng};
 
 use super::dense;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::solvers::System;
 
 /// Steps of the power method before the first Arnoldi process.
@@ -141,8 +142,8 @@ fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut impl FnMut(&mut [DVec3]
     let m = basis.len();
     let square = hessenberg.view((0, 0), (m, m)).into_owned();
     let ritz = ritz_values(&square)?
-        .iter()
-        .fold(Complex::new(0.0, 0.0), |best, &z| if z.norm() > best.norm() { z } else { best });
+        .into_iter()
+        .fold(Complex::new(0.0, 0.0), |best, z| if z.norm() > best.norm() { z } else { best });
     let y = eigenvector(&square, ritz);
     let residual = next * y[m - 1].norm();
     let mut restart = vec![DVec3::ZERO; basis[0].len()];
@@ -163,19 +164,14 @@ fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut impl FnMut(&mut [DVec3]
     Ok(Cycle { ritz, residual, steps: m, restart })
 }
 
-/// The eigenvalues of a projected matrix. Where it is a multiple of the identity but for rounding, as at a tiny ω, QR
-/// iterations may go on for ever: then those of the rest, which is of a size of its own.
-fn ritz_values(square: &DMatrix<f64>) -> Result<DVector<Complex<f64>>> {
+/// The eigenvalues of a projected matrix. Where many are equal but for rounding, as at a tiny ω or on a mesh of like
+/// components, the QR iterations of `nalgebra` may go on for ever: then by `faer`.
+fn ritz_values(square: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     const ITERATIONS: usize = 1000;
-    let m = square.nrows();
-    let eigenvalues = |matrix| Some(Schur::try_new(matrix, f64::EPSILON, ITERATIONS)?.complex_eigenvalues());
-    if let Some(found) = eigenvalues(square.clone()) {
-        return Ok(found);
+    match Schur::try_new(square.clone(), f64::EPSILON, ITERATIONS) {
+        Some(schur) => Ok(schur.complex_eigenvalues().iter().copied().collect()),
+        None => dense::unsymmetric_values(&Mat::from_fn(square.nrows(), square.ncols(), |i, j| square[(i, j)])),
     }
-    let mean = square.trace() / m as f64;
-    eigenvalues(square - DMatrix::identity(m, m) * mean)
-        .map(|rest| rest.map(|z| z + mean))
-        .ok_or_else(|| Error::Computation("the eigenvalues of an Arnoldi process were not found".into()))
 }
 
 /// A unit eigenvector of the computed eigenvalue `z` by inverse iteration.

@@ -36,6 +36,26 @@ fn spectral_radii_of_sweeps_agree_with_dense_ones() {
     }
 }
 
+/// The Arnoldi process has few directions to go: the others are rounding.
+#[test]
+fn radii_are_found_where_eigenvalues_are_few() {
+    for (name, scheme) in [
+        ("cubes:40", Scheme::CatmullClark),
+        ("cubes:60", Scheme::CatmullClark),
+        ("cubes:60", Scheme::Nasri),
+        ("torus:20x20", Scheme::CatmullClark),
+    ] {
+        let system = assemble(&named(name), scheme);
+        let zero = vec![DVec3::ZERO; system.len()];
+        for omega in [1e-12, 1e-6, 0.8, 1.0, 1.3] {
+            let plain = |x: &mut [DVec3]| sweep(&system, &zero, omega, 0..zero.len(), x);
+            let exact = dense::spectral_radius(&system, plain).expect("small");
+            let found = spectral_radius(&system, plain).expect("a value");
+            assert!((found.value - exact).abs() < 1e-5 * exact, "{name}, {scheme}, ω = {omega}: {found:?} {exact}");
+        }
+    }
+}
+
 #[test]
 fn greedy_and_ordered_sweeps_solve_the_same_system() {
     let mut mesh = named("irregular-quad:400");
