@@ -464,26 +464,30 @@ impl Interpolator {
         let inner = Stop { tolerance: PART * stop.tolerance, ..*stop };
         let mut history = Vec::new();
         let mut iterations = 0;
-        let count = points.len() as f64;
+        let smooth = self.free.as_ref().map_or(points.len(), |free| free.iter().filter(|free| **free).count());
+        let count = (smooth + wanted.len()) as f64;
         let mut round = 0;
         loop {
             let (method, found) = self.solve_block(&held, control, &inner, &mut unwatched);
             iterations += found.iterations;
             let residual: Vec<DVec3> = wanted.iter().zip(stars.product(control)).map(|(&p, ax)| p - ax).collect();
             let mut errors = found.last();
-            errors.mean += residual.iter().map(|r| r.length()).sum::<f64>() / count;
+            errors.mean = (smooth as f64 * errors.mean + residual.iter().map(|r| r.length()).sum::<f64>()) / count;
             errors.max =
                 residual.iter().map(|r| r.length()).fold(errors.max, |a, b| if b > a || b.is_nan() { b } else { a });
             history.push(Recorded { iteration: iterations, errors });
             let told = watch(method, &Step { iteration: iterations, errors, points: control });
             let met = errors.max <= stop.tolerance;
             if met || no_progress(found.outcome) || told.is_break() || round == ROUNDS {
+                // Short of the part of the tolerance that the block was asked for, it may be met.
                 let outcome = match found.outcome {
-                    Outcome::Converged if !met && told.is_break() => Outcome::Stopped,
-                    Outcome::Converged if !met => Outcome::Stagnated,
+                    _ if met => Outcome::Converged,
+                    Outcome::Converged if told.is_break() => Outcome::Stopped,
+                    Outcome::Converged => Outcome::Stagnated,
                     other => other,
                 };
-                return (method, Report { outcome, iterations, history, detail: found.detail });
+                let detail = found.detail.filter(|_| !met);
+                return (method, Report { outcome, iterations, history, detail });
             }
             let mut moved = Vec::new();
             let solved = gmres(

@@ -10,9 +10,10 @@ use limitlab::analysis::singularity::Singularity;
 use limitlab::analysis::spectrum::Spectra;
 use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::assemble::{GeneralSystem, Stages};
-use limitlab::interpolate::{Options, Tolerance, interpolate};
+use limitlab::interpolate::{Options, Tolerance, interpolate, limit_points};
 use limitlab::mesh::Surface;
 use limitlab::mesh::features::{Rule, Tags};
+use limitlab::mesh::noise::add_noise;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Accelerated, Method, Outcome, Stop, run};
 use nalgebra::{DMatrix, DVector, Schur};
@@ -200,6 +201,35 @@ fn some_vertices_with_darts_are_interpolated_by_sweeps() {
             assert!(marks[v] || b == surface.positions()[v], "{method}, vertex {v}");
         }
     }
+}
+
+/// By limit points, of the vertices in question, the ends of the sharp edges among them; and whatever ends a run, it has
+/// converged if the tolerance is met.
+#[test]
+fn the_errors_of_auto_with_darts_are_those_of_limit_points() {
+    let mut mesh = built_in("torus:6x5");
+    add_noise(&mut mesh, 0.1, 1);
+    let tags = Tags { creases: vec![([0, 1], 10.0), ([7, 8], 1.5)], ..Tags::default() };
+    let surface = Surface::new(mesh).unwrap().tagged(&tags).unwrap();
+    let some: Vec<bool> = (0..surface.len()).map(|v| v % 3 != 0).collect();
+    let mut converged = 0;
+    for marks in [None, Some(&some[..])] {
+        for max_iterations in [3, 6, 12, 24, 48, 1000] {
+            let tolerance = Tolerance::Absolute(1e-5);
+            let options = Options { interpolated: marks, tolerance, max_iterations, ..Options::default() };
+            let found = interpolate(&surface, Scheme::CatmullClark, &options).unwrap();
+            let limits = limit_points(&surface.with_positions(found.points), Scheme::CatmullClark).unwrap();
+            let asked = (0..surface.len()).filter(|&v| marks.is_none_or(|marks| marks[v]));
+            let off: Vec<f64> = asked.map(|v| surface.positions()[v].distance(limits[v])).collect();
+            let (max, mean) = (off.iter().copied().fold(0.0, f64::max), off.iter().sum::<f64>() / off.len() as f64);
+            let (told, outcome) = (found.report.last(), found.report.outcome);
+            let what = format!("at most {max_iterations}, {}, {outcome:?}: {told:?}, {max:e}, {mean:e}", found.method);
+            assert!((told.max - max).abs() < 1e-14 && (told.mean - mean).abs() < 1e-14, "{what}");
+            assert_eq!(outcome == Outcome::Converged, max <= 1e-5, "{what}");
+            converged += usize::from(outcome == Outcome::Converged && found.method == "chebyshev");
+        }
+    }
+    assert!(converged > 4, "{converged}");
 }
 
 fn least_real_part(surface: &Surface) -> f64 {
