@@ -169,7 +169,7 @@ impl Request<'_> {
 
     /// N and M of a grid with so many corners a vertex.
     fn grid(&self, corners: u64) -> Result<(usize, usize)> {
-        let (n, m) = self.text()?.split_once('x').ok_or_else(|| self.refuse("it needs two parameters"))?;
+        let (n, m) = self.text()?.split_once(['x', 'X']).ok_or_else(|| self.refuse("it needs two parameters"))?;
         let max = MAX_CORNERS / corners;
         let n = self.in_range(n, "N", 3, max / 3)?;
         let m = self.in_range(m, "M", 3, max / 3)?;

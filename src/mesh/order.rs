@@ -45,7 +45,7 @@ impl FromStr for Order {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        const NAMES: [(&str, Order); 8] = [
+        const NAMES: [(&str, Order); 9] = [
             ("file", Order::File),
             ("reverse", Order::Reverse),
             ("bfs", Order::Bfs),
@@ -54,6 +54,8 @@ impl FromStr for Order {
             ("valence", Order::Valence),
             ("multicolour", Order::Multicolour),
             ("random", Order::Random(1)),
+            // For messages: what starts so is read before.
+            ("random:SEED", Order::Random(1)),
         ];
         match text.split_once(':') {
             Some((name, seed)) if names::same(name, "random") => seed
@@ -290,9 +292,10 @@ mod tests {
         }
         assert_eq!("random".parse::<Order>().unwrap(), Order::Random(1));
         assert_eq!("RCM".parse::<Order>().unwrap(), Order::Rcm);
-        for bad in ["", "random:", "random:x", "random:1:2", "bfs:3"] {
+        for bad in ["", "random:", "random:x", "random:SEED", "random:1:2", "bfs:3"] {
             assert!(bad.parse::<Order>().is_err(), "{bad}");
         }
+        assert!("randmo:3".parse::<Order>().unwrap_err().to_string().ends_with("multicolour, random or random:SEED"));
     }
 
     /// Levels of the vertices by distance from the first in its component, by brute force over face sharing.

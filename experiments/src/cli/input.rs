@@ -334,7 +334,8 @@ impl MeshFlags {
         Err(Error::mesh(
             name,
             format!(
-                "{of} boundary edges lie on each other (first: vertices {a} and {b}): a seam of duplicate vertices                  at the same positions, no opening; {which}use --boundary edge-and-corner to keep it open"
+                "{of} boundary edges lie on each other (first: vertices {a} and {b}): a seam of duplicate vertices \
+                 at the same positions, no opening; {which}use --boundary edge-and-corner to keep it open"
             ),
         ))
     }
