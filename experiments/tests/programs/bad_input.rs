@@ -94,6 +94,7 @@ fn a_seam_is_refused_and_can_be_welded() {
     // A third of the boundary: a remark.
     let output = run_on(INTERPOLATE, folder.path(), "seam.obj", &[]);
     assert_done(&output, INTERPOLATE);
+    assert!(!super::text(&output.stderr).contains("join them"), "{}", super::text(&output.stderr));
     // A tetrahedron of four triangles with vertices of their own.
     let points = ["0 0 0", "1 0 0", "0 1 0", "0 0 1"];
     let mut text = String::new();
@@ -121,6 +122,9 @@ fn a_seam_is_refused_and_can_be_welded() {
     let cage = io::read(&folder.path().join(welded["output"].as_str().unwrap())).unwrap().mesh;
     assert_eq!((cage.len(), cage.faces.face(1)), (6, &[3, 4, 5][..]));
     assert_eq!((cage.positions[1], cage.positions[2]), (cage.positions[3], cage.positions[5]));
+    // Tools join them if they are told to.
+    let output = run_on(INTERPOLATE, folder.path(), "seam.obj", &["--weld"]);
+    assert!(super::text(&output.stderr).contains("join them first"), "{}", super::text(&output.stderr));
 }
 
 /// Tags that are none, each with its place.

@@ -50,6 +50,15 @@ pub fn print_summary(
     ));
     if is_control(arguments) {
         common.remark(format_args!("its surface: {}", advice::of_tools(input.scheme)));
+        // Of the vertices that are written, those of faces.
+        let placed = input.origin.as_ref().map_or(0, |origin| origin.places().flatten().count());
+        if placed > input.surface.len() {
+            common.remark(format_args!(
+                "{}: vertices that --weld made one lie on each other, as in the file: where it is subdivided join them first \
+                 (Blender: Merge by Distance), or the surface has seams and misses the points there",
+                arguments.output_name()
+            ));
+        }
     }
     common.remark(format_args!(
         "seconds: read {:.3}, assemble {:.3}, solve {:.3}, subdivide {:.3}, write {:.3}",
