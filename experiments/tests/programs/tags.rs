@@ -6,7 +6,7 @@ use limitlab::mesh::io;
 use limitlab::mesh::validate::Boundary;
 use tempfile::tempdir;
 
-use super::{INTERPOLATE, assert_done, assert_refused, json, run, run_on, text};
+use super::{COMPARE, INTERPOLATE, SPECTRUM, SWEEP, assert_done, assert_refused, json, run, run_on, text};
 
 /// The edges at the top of the built-in cube, as lines `a b sharpness`.
 fn top_of_cube() -> String {
@@ -301,4 +301,26 @@ fn surfaces_of_sharp_meshes_are_written_or_refused_before_the_work() {
     fs::write(folder.path().join("n.txt"), "1 0 0 1\n").unwrap();
     let line = refused("t.obj", &["--scheme", "zheng-cai", "--normals", "n.txt", "--subdivide", "1"]);
     assert!(line.contains("vertex 1 is sharp"), "{line}");
+}
+
+/// A single quad: its corners are all known, and nothing is left to solve.
+#[test]
+fn a_mesh_without_smooth_vertices_is_one_of_which_all_is_known() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("quad.off"), "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n").unwrap();
+    for (program, arguments) in [
+        (COMPARE, &["quad.off", "--html", "page.html"][..]),
+        (SWEEP, &["quad.off", "--history", "1"]),
+        (SPECTRUM, &["quad.off", "--full", "--modes", "2"]),
+        (INTERPOLATE, &["quad.off", "-o", "a.obj", "--method", "heavy-ball"]),
+    ] {
+        let output = run(program, folder.path(), [arguments, &["--quiet"]].concat());
+        assert_done(&output, program);
+        assert!(!text(&output.stdout).contains("NaN"), "{program}: {}", text(&output.stdout));
+    }
+    let found = json(&run(SPECTRUM, folder.path(), ["quad.off", "--json", "--quiet"]));
+    assert_eq!(
+        (&found["lambda_min"], &found["lambda_max"], &found["rho"]["pia"]),
+        (&1.0.into(), &1.0.into(), &0.0.into())
+    );
 }
