@@ -172,6 +172,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     }
     if let Some(path) = &arguments.picture {
         report::Format::of(path)?;
+        arguments.replace.settle(path)?;
         check_target(path)?;
     }
     let input = arguments.mesh.input(&arguments.input, &arguments.common)?;
@@ -239,12 +240,12 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         }
     }
     remark_on_output(arguments, &input, &target, &options);
-    if !in_place {
-        arguments.common.remark_on_replaced();
-    }
     result.seconds.write = start.elapsed().as_secs_f64();
     if let Some((path, figure)) = picture {
-        figure.save(path, provenance)?;
+        figure.save(path, &provenance.about(&input.source()))?;
+    }
+    if !in_place {
+        arguments.common.remark_on_replaced();
     }
     print_summary(arguments, &input, &per_vertex, &result, provenance)
 }
