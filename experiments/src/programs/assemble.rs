@@ -8,9 +8,9 @@ use serde_json::json;
 
 use crate::cli::{self, CommonFlags, MeshFlags, ReplaceFlags};
 use crate::report::Provenance;
-use limitlab::Result;
 use limitlab::assemble::matrix_market;
 use limitlab::output::{Batch, check_target, create_dir};
+use limitlab::{Error, Result};
 
 /// In its help.
 const EXAMPLES: [&str; 2] =
@@ -97,6 +97,14 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         batch.write(&of_block[3], |out| matrix_market::write_points(&right, &comments, out))?;
         batch.write(&of_block[4], |out| matrix_market::write_points(&symmetric, &comments, out))?;
         files.extend(of_block);
+    }
+    // What an earlier run left there would pass for a part of this system.
+    let folders = [arguments.out.clone(), arguments.out.join(OF_BLOCK)];
+    let others = folders.iter().flat_map(|folder| FILES.map(|name| folder.join(name)));
+    if let Some(stale) = others.filter(|path| !files.contains(path)).find(|path| path.exists()) {
+        let what =
+            "it is of another system, and would stand among the files of this one: remove it, or name another folder";
+        return Err(Error::mesh(stale.display().to_string(), what));
     }
     batch.commit()?;
     let names = input.scheme.paper_names();

@@ -140,6 +140,24 @@ fn a_laplacian_is_solved_by_all_methods_that_can() {
 }
 
 #[test]
+fn a_folder_holds_the_files_of_one_system() {
+    let folder = tempdir().unwrap();
+    fs::write(folder.path().join("ring"), "0 1 10\n1 2 10\n2 3 10\n3 4 10\n4 5 10\n5 0 10\n").unwrap();
+    let assemble = |more: &[&str]| run(ASSEMBLE, folder.path(), [&["torus:8x6", "--quiet"], more].concat());
+    let plain = |out| vec!["--out", out];
+    let creased = |out| vec!["--creases", "ring", "--out", out];
+    for (first, second, stale) in [(plain("d"), creased("d"), "d/M.mtx"), (creased("e"), plain("e"), "e/smooth/A.mtx")]
+    {
+        assert_done(&assemble(&first), stale);
+        let before = fs::read(folder.path().join(stale)).unwrap();
+        let error = assert_refused(&assemble(&second), stale);
+        assert!(error.starts_with(&format!("error: {stale}: it is of another system")), "{error}");
+        assert!(fs::read(folder.path().join(stale)).unwrap() == before, "{stale}");
+        assert_done(&assemble(&first), "the same again");
+    }
+}
+
+#[test]
 fn spectra_are_those_of_the_mesh_and_of_the_formula() {
     let folder = tempdir().unwrap();
     let spectrum = |arguments: &[&str]| {
