@@ -373,6 +373,30 @@ fn pia_table_1_is_reproduced_on_the_paper_s_models() {
 }
 
 #[test]
+fn an_item_or_a_claim_that_is_named_twice_is_made_once() {
+    let folder = tempdir().unwrap();
+    let arguments = ["--only", "pia-table1", "--only", "PIA-Table1", "--only", "T8", "--only", "t8", "--json"];
+    let output = run(REPRODUCE, folder.path(), arguments.iter().chain(&["--quick", "--quiet", "--out", "r"]));
+    assert_done(&output, "reproduce");
+    let object = json(&output);
+    assert_eq!((object["tables"].as_array().unwrap().len(), object["claims"].as_array().unwrap().len()), (1, 1));
+}
+
+#[test]
+fn pages_show_pictures_of_the_formats_that_are_written() {
+    let folder = tempdir().unwrap();
+    for (formats, shown) in [("svg,pdf", Some("sparsity.svg")), ("svg,png", Some("sparsity.png")), ("pdf", None)] {
+        let arguments = ["--only", "sparsity", "--quick", "--quiet", "--figure", formats, "--out", formats];
+        assert_done(&run(REPRODUCE, folder.path(), arguments), formats);
+        for page in ["sparsity.md", "README.md"] {
+            let page = fs::read_to_string(folder.path().join(formats).join("built-in").join(page)).unwrap();
+            let sources: Vec<&str> = page.split("src=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+            assert_eq!(sources, Vec::from_iter(shown), "{formats}: {page}");
+        }
+    }
+}
+
+#[test]
 fn stand_ins_never_overwrite_results_on_the_real_models() {
     let folder = tempdir().unwrap();
     let kept = folder.path().join("r/pia-table1.csv");

@@ -60,7 +60,7 @@ pub struct Context {
     pub made: Made,
     /// The ID of the item at work.
     item: Option<&'static str>,
-    /// Tables that the item at work has made, and the stems of its pictures.
+    /// Tables that the item at work has made, and the files of its pictures that pages can show.
     tables: Vec<Table>,
     pictures: Vec<String>,
 }
@@ -393,7 +393,8 @@ impl Context {
     /// # Errors
     /// If it cannot be drawn or written.
     pub fn figure(&mut self, stem: &str, figure: &Figure) -> Result<()> {
-        self.picture(stem);
+        let shown = [Format::Png, Format::Svg].into_iter().find(|format| self.formats.contains(format));
+        self.picture(stem, shown);
         figure.write(&self.folder(), stem, &self.formats, &self.provenance())
     }
 
@@ -415,16 +416,16 @@ impl Context {
     /// # Errors
     /// If one cannot be drawn, or the file not written.
     pub fn animation(&mut self, stem: &str, figures: &[Figure]) -> Result<()> {
-        self.picture(stem);
+        self.picture(stem, Some(Format::Png));
         let animation =
             Animation { frames: figures.iter().map(Figure::render).collect::<Result<_>>()?, milliseconds: 700 };
         animation.save(&self.folder().join(format!("{stem}.png")), &self.provenance())
     }
 
-    /// Counts a picture, and remembers it for the page of its table.
-    fn picture(&mut self, stem: &str) {
+    /// Counts a picture, and remembers it for the page of its table if there is a file that pages can show.
+    fn picture(&mut self, stem: &str, shown: Option<Format>) {
         self.made.figures += 1;
-        self.pictures.push(stem.to_owned());
+        self.pictures.extend(shown.map(|format| format!("{stem}.{}", format.name())));
     }
 
     /// The page that leads to all results.

@@ -141,9 +141,13 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     }
     for id in &arguments.only {
         if let Some(item) = ITEMS.iter().find(|i| names::same(i.id, id)) {
-            chosen.push(item);
+            if !chosen.iter().any(|known| known.id == item.id) {
+                chosen.push(item);
+            }
         } else if let Some(claim) = claims::find(id) {
-            claims.push(claim);
+            if !claims.iter().any(|known| known.id == claim.id) {
+                claims.push(claim);
+            }
         } else {
             let ids = ITEMS.iter().map(|i| i.id).chain(claims::all().map(|c| c.id));
             let perhaps = names::perhaps(id, ids);

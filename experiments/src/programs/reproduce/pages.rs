@@ -45,7 +45,7 @@ pub fn write_tables(
         let mut page = table.clone();
         page.notes.insert(0, way_back(&[("as CSV", format!("{}.csv", table.id))]));
         let own = pictures_of(&table.id, tables, pictures);
-        let shown = gallery(&own.map(|stem| picture(item, stem)).collect::<Vec<_>>());
+        let shown = gallery(&own.map(|file| picture(item, file)).collect::<Vec<_>>());
         if !shown.is_empty() {
             page.note(shown);
         }
@@ -56,18 +56,19 @@ pub fn write_tables(
 
 /// The pictures that the page of a table shows: those named after it; if there are none, those named after no table.
 fn pictures_of<'a>(id: &str, tables: &[Table], pictures: &'a [String]) -> impl Iterator<Item = &'a String> {
-    let named_after = |stem: &str, id: &str| stem.strip_prefix(id).is_some_and(|r| r.is_empty() || r.starts_with('-'));
-    let has_own = pictures.iter().any(|stem| named_after(stem, id));
-    pictures.iter().filter(move |stem| match has_own {
-        true => named_after(stem, id),
-        false => tables.iter().all(|table| !named_after(stem, &table.id)),
+    let named_after = |file: &str, id: &str| file.strip_prefix(id).is_some_and(|rest| rest.starts_with(['-', '.']));
+    let has_own = pictures.iter().any(|file| named_after(file, id));
+    pictures.iter().filter(move |file| match has_own {
+        true => named_after(file, id),
+        false => tables.iter().all(|table| !named_after(file, &table.id)),
     })
 }
 
-fn picture(item: &Item, stem: &str) -> Link {
+fn picture(item: &Item, file: &str) -> Link {
+    let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
     let rest = stem.strip_prefix(item.id).unwrap_or(stem).trim_start_matches('-').replace('-', " ");
     let text = if rest.is_empty() { item.title.to_owned() } else { format!("{}: {rest}", item.title) };
-    Link { text, file: format!("{stem}.png") }
+    Link { text, file: file.to_owned() }
 }
 
 /// Writes the index of what is in the folder, the results of earlier runs too. `root` is the report folder.
@@ -76,6 +77,7 @@ fn picture(item: &Item, stem: &str) -> Link {
 /// If a file cannot be read or written.
 pub fn write_index(root: &Path, folder: &Path, items: &[Item], provenance: &Provenance) -> Result<()> {
     let files = listing(folder)?;
+    let there = |name: &str| files.iter().any(|file| file == name);
     let mut sections = Vec::new();
     for item in items {
         let own = files.iter().filter(|file| belongs(file, item.id));
@@ -91,8 +93,10 @@ pub fn write_index(root: &Path, folder: &Path, items: &[Item], provenance: &Prov
         for file in own {
             if file.ends_with(".md") {
                 section.tables.push(Link { text: heading(&folder.join(file))?, file: file.clone() });
-            } else if let Some(stem) = file.strip_suffix(".png") {
-                section.pictures.push(picture(item, stem));
+            } else if file.ends_with(".png")
+                || file.strip_suffix("svg").is_some_and(|stem| !there(&format!("{stem}png")))
+            {
+                section.pictures.push(picture(item, file));
             }
         }
         sections.push(section);
@@ -202,9 +206,9 @@ mod tests {
             let pictures: Vec<String> = pictures.iter().map(|&p| p.into()).collect();
             pictures_of(id, &tables[1..], &pictures).cloned().collect::<Vec<_>>()
         };
-        let named = ["item--a", "item--a-map", "item--ab", "item--c"];
-        assert_eq!(shown("item--a", &named), ["item--a", "item--a-map"]);
-        assert_eq!(shown("item--b", &named), ["item--ab", "item--c"]);
+        let named = ["item--a.png", "item--a-map.png", "item--ab.svg", "item--c.png"];
+        assert_eq!(shown("item--a", &named), ["item--a.png", "item--a-map.png"]);
+        assert_eq!(shown("item--b", &named), ["item--ab.svg", "item--c.png"]);
         assert_eq!(shown("item--b", &[]), [""; 0]);
         // A summary shows all.
         assert_eq!(shown("item", &named), named);
