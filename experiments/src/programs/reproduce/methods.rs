@@ -133,26 +133,6 @@ fn iterations(row: &Row, name: &str) -> Option<f64> {
     row.ended.get(name).map(|ended| ended.as_ref().map_or(f64::INFINITY, |&iterations| iterations as f64))
 }
 
-/// Passes over the entries of A in an iteration, that for its error among them, where no inner product tells it; a factor with
-/// A's pattern counts by its entries. None of direct methods.
-fn passes(method: Method) -> Option<usize> {
-    match method {
-        Method::Lu | Method::Cholesky | Method::SecondCholesky | Method::Ldlt => None,
-        Method::Jacobi { .. }
-        | Method::Thall
-        | Method::Pia
-        | Method::WPia { .. }
-        | Method::Chebyshev { .. }
-        | Method::Cg
-        | Method::PlainCg
-        | Method::PcgJacobi
-        | Method::Anderson { .. }
-        | Method::HeavyBall { .. } => Some(1),
-        Method::GaussSeidel { .. } | Method::Sor { .. } | Method::PcgIc0 => Some(2),
-        Method::Ssor { .. } | Method::PcgSsor { .. } => Some(3),
-    }
-}
-
 /// A method that iterates in the summary: the name of its column, and its passes, of which `auto` has no number.
 type Line = (String, Option<usize>);
 
@@ -160,7 +140,7 @@ type Line = (String, Option<usize>);
 fn summary(rows: &[&Row]) -> Table {
     let iterative = |(name, variant)| {
         let method = Method::ALL.into_iter().find(|method| method.name() == name)?;
-        Some((column_name(name, variant), Some(passes(method)?)))
+        Some((column_name(name, variant), Some(method.passes()?)))
     };
     let lines: Vec<Line> = COLUMNS.into_iter().filter_map(iterative).chain([(AUTO.to_owned(), None)]).collect();
     let count = |row: &Row, line: &Line| iterations(row, &line.0);
@@ -331,7 +311,7 @@ mod tests {
             counted.1.into_inner()
         };
         for method in Method::ALL {
-            let Some(passes) = passes(method) else {
+            let Some(passes) = method.passes() else {
                 assert!(method.is_direct(), "{method}");
                 continue;
             };
