@@ -119,8 +119,11 @@ pub fn quoted(word: &str) -> String {
     if !word.is_empty() && word.chars().all(is_plain) {
         word.to_owned()
     } else if word.chars().any(char::is_control) {
-        let escaped =
-            |c: char| if c.is_control() || "'\\".contains(c) { c.escape_default().to_string() } else { c.into() };
+        let escaped = |c: char| match c {
+            '\t' | '\n' | '\r' | '\'' | '\\' => c.escape_default().to_string(),
+            c if c.is_control() => format!("\\u{:04x}", u32::from(c)),
+            c => c.into(),
+        };
         format!("$'{}'", word.chars().map(escaped).collect::<String>())
     } else {
         format!("'{}'", word.replace('\'', r"'\''"))
@@ -142,6 +145,7 @@ mod tests {
             ("#x", "'#x'"),
             ("end\\", "'end\\'"),
             ("a\nb'\\", r"$'a\nb\'\\'"),
+            ("a\u{1b}b\u{85}", r"$'a\u001bb\u0085'"),
             ("~/x", "'~/x'"),
         ] {
             assert_eq!(quoted(word), expected);

@@ -129,6 +129,7 @@ pub(super) fn escaped(text: &str) -> String {
         match c {
             '&' => out.push_str("&amp;"),
             '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
             c if c.is_control() || ('\u{fffe}'..='\u{ffff}').contains(&c) => out.push(' '),
             c => out.push(c),
