@@ -175,7 +175,7 @@ fn local_edits(
 ) -> Result<()> {
     let mut sizes = arguments.sizes.0.clone();
     sizes.retain(|&n| n <= arguments.most_edits);
-    let Some(&last) = sizes.last() else {
+    let Some(&most) = sizes.iter().max() else {
         return Ok(());
     };
     let mut rows = Vec::new();
@@ -188,7 +188,7 @@ fn local_edits(
             let operator = edits::edits(&name, mesh, scheme, arguments.tol, &mut rows)?;
             edits::edits_table(arguments.tol, &rows).write(&arguments.out, provenance)?;
             progress.step();
-            if n == last {
+            if n == most {
                 largest.push((format!("{name}, {scheme}"), operator));
             }
         }
