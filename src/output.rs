@@ -105,6 +105,14 @@ pub fn replaced() -> Vec<PathBuf> {
     ledger().replaced.clone()
 }
 
+/// Whether this process has written the file.
+pub fn is_complete(path: &Path) -> bool {
+    match destination(path) {
+        Ok(Destination::Rename { folder, name }) => ledger().complete.contains(&folder.join(name)),
+        Ok(Destination::Straight) | Err(_) => false,
+    }
+}
+
 /// What this process has put on the disk.
 struct Ledger {
     temporary: Vec<PathBuf>,

@@ -160,13 +160,16 @@ impl ReplaceFlags {
     /// Does before the work what was asked for the file of this name, if there is one.
     ///
     /// # Errors
-    /// A file that would be replaced, with --no-clobber; one that is not ours, with --force.
+    /// A file that this run has written for another mesh; one that would be replaced, with --no-clobber; one that is not
+    /// ours, with --force.
     pub fn settle(&self, path: &Path) -> Result<()> {
+        let refuse = |what| Err(Error::io(path, "write", std::io::Error::new(ErrorKind::AlreadyExists, what)));
         match path.is_file() {
-            true if self.no_clobber => {
-                let what = "it is there already: name another place, or leave out --no-clobber";
-                Err(Error::io(path, "write", std::io::Error::new(ErrorKind::AlreadyExists, what)))
-            }
+            true if limitlab::output::is_complete(path) => refuse(
+                "it holds the results on another mesh of this run whose file is called the same: run the program once for \
+                 each, with folders of their own (--out)",
+            ),
+            true if self.no_clobber => refuse("it is there already: name another place, or leave out --no-clobber"),
             true if self.force => limitlab::output::allow_replacing(path),
             _ => Ok(()),
         }
@@ -283,6 +286,20 @@ where
             .map(|item| item.trim().parse().map_err(|e: T::Err| e.to_string()))
             .collect::<std::result::Result<_, _>>()
             .map(List)
+    }
+}
+
+impl<T: PartialEq> List<T> {
+    /// Without what was named before.
+    #[must_use]
+    pub fn each_once(self) -> Self {
+        let mut first: Vec<T> = Vec::with_capacity(self.0.len());
+        for item in self.0 {
+            if !first.contains(&item) {
+                first.push(item);
+            }
+        }
+        List(first)
     }
 }
 
@@ -450,6 +467,7 @@ mod tests {
     fn a_list_names_the_item_that_is_wrong() {
         let list: List<u32> = "3, 4,5".parse().expect("three numbers");
         assert_eq!(list.0, [3, 4, 5]);
+        assert_eq!("5,3,5,4,3".parse::<List<u32>>().expect("numbers").each_once().0, [5, 3, 4]);
         assert!("3,x".parse::<List<u32>>().is_err());
     }
 

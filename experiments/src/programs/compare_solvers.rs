@@ -82,6 +82,7 @@ pub fn main(mut arguments: Arguments, provenance: Provenance) -> ExitCode {
         let what = format!("--html makes a page of one mesh, and {several} are named: run the program once for each");
         Arguments::command().error(ErrorKind::ArgumentConflict, what).exit();
     }
+    arguments.method = arguments.method.map(List::each_once);
     if let Some(List(at)) = &mut arguments.errors_at {
         at.sort_unstable();
         at.dedup();
@@ -114,7 +115,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         }
         let Compared { rows, refused, measured, error_maps } = compare(&problem, &arguments.wanted())?;
         let about = format!(
-            "{}; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:e} ({}).",
+            "{}; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:.3e} ({}).",
             problem.subject.size,
             problem.stop.tolerance * problem.scale,
             problem.subject.unit
@@ -324,14 +325,14 @@ fn error_maps(
     let subject = &problem.subject.name;
     let maps: Vec<_> = rows.iter().map(|row| error_maps::measure(problem, system, row, at)).collect();
     let without = rows.iter().zip(&maps).filter(|(_, maps)| maps.is_none());
-    let without: Vec<&str> = without.map(|(row, _)| row.method.name()).collect();
-    let what = "no errors at the vertices after these iterations, as it solves at once, by corrections, or ends before";
+    let without: Vec<String> = without.map(|(row, _)| study::label(row)).collect();
+    let what = "no errors at the vertices after these iterations: solved at once or by corrections, or ended before";
     if without.len() == rows.len() {
-        let what = format!("{} has {what}: name a method that iterates, such as --method pia", without.join(", "));
+        let what = format!("{}: {what}; name a method that iterates, such as --method pia", without.join(", "));
         return Err(Error::mesh(subject, what));
     }
     if !without.is_empty() {
-        common.remark(format_args!("{subject}: {} has {what}", without.join(", ")));
+        common.remark(format_args!("{subject}: {}: {what}", without.join(", ")));
     }
     for (row, maps) in rows.iter().zip(&maps) {
         let last = row.solution.report.iterations;

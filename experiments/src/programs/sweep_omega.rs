@@ -65,9 +65,9 @@ pub struct Arguments {
 /// What `sweep-omega` runs on without arguments.
 const BUILT_IN: [&str; 4] = ["torus:32x32", "quad-sphere:4", "icosphere:3", "irregular-quad:1000"];
 
-/// The methods that have an ω to sweep, as a `value_parser`.
+/// The methods that have an ω to sweep, each once, as a `value_parser`.
 fn methods(text: &str) -> std::result::Result<List<Method<'static>>, String> {
-    let list: List<Method<'static>> = text.parse()?;
+    let list = text.parse::<List<Method<'static>>>()?.each_once();
     match list.0.iter().find(|m| !matches!(m, Method::Jacobi { .. } | Method::Pia | Method::Sor { .. })) {
         None => Ok(list),
         Some(method) => Err(format!("{method} has no ω to sweep; choose among jacobi, pia and sor")),

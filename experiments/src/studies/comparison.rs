@@ -79,7 +79,7 @@ pub(super) fn is_over_iterations(row: &MethodRow) -> bool {
 }
 
 /// The method with its parameter.
-pub(super) fn label(row: &MethodRow) -> String {
+pub fn label(row: &MethodRow) -> String {
     with_parameter(row.method.name(), &row.parameter)
 }
 

@@ -89,6 +89,18 @@ fn monitors_say_the_histories_and_change_nothing() {
 }
 
 #[test]
+fn a_method_that_is_named_twice_runs_once() {
+    let folder = tempdir().unwrap();
+    for (program, more) in [(COMPARE, &[][..]), (SWEEP, &["--omega", "1:1:1", "--history", "1"])] {
+        let arguments = [&["torus:8x6", "--method", "pia,PIA,pia", "--json", "--quiet"], more].concat();
+        let object = json(&run(program, folder.path(), arguments));
+        let [row] = &object["rows"].as_array().unwrap()[..] else { panic!("{program}: {object}") };
+        let iterations = row["history"].as_array().unwrap().iter().map(|entry| entry["iteration"].as_u64().unwrap());
+        assert!(iterations.eq(0..=row["iterations"].as_u64().unwrap()), "{program}: {row}");
+    }
+}
+
+#[test]
 fn three_programs_tell_one_history() {
     let folder = tempdir().unwrap();
     let folder = folder.path();

@@ -240,3 +240,42 @@ fn force_replaces_what_is_read_only() {
     assert!(error.contains("read-only"), "{error}");
     assert!(remarks(INTERPOLATE, folder.path(), &["cube", "-o", "x.off", "--force"]).contains("replaced: x.off"));
 }
+
+#[test]
+fn a_picture_is_a_file_as_the_mesh_is() {
+    let folder = tempdir().unwrap();
+    let picture = folder.path().join("x.svg");
+    fs::write(&picture, "mine").unwrap();
+    let drawn = ["cube", "-o", "x.off", "--picture", "x.svg"];
+    let refused = run(INTERPOLATE, folder.path(), [&drawn[..], &["--no-clobber", "--quiet"]].concat());
+    assert!(assert_refused(&refused, "there").starts_with("error: x.svg: cannot write: it is there already"));
+    assert_eq!((below(folder.path()).len(), fs::read_to_string(&picture).unwrap().as_str()), (1, "mine"));
+    let mut permissions = fs::metadata(&picture).unwrap().permissions();
+    permissions.set_readonly(true);
+    fs::set_permissions(&picture, permissions).unwrap();
+    assert!(remarks(INTERPOLATE, folder.path(), &[&drawn[..], &["--force"]].concat()).contains("replaced: x.svg"));
+    // It says of which mesh it is.
+    let written = fs::read_to_string(&picture).unwrap();
+    assert!(written.contains("\ninput: cube, 8 vertices, 6 faces, crc32:"), "{}", &written[..1000]);
+}
+
+#[test]
+fn a_run_does_not_write_over_its_own_results() {
+    let folder = tempdir().unwrap();
+    for (name, mesh) in [("a", "tri-torus:5x4"), ("b", "icosahedron")] {
+        fs::create_dir(folder.path().join(name)).unwrap();
+        let target = format!("{name}/m.off");
+        assert_done(&run(INTERPOLATE, folder.path(), [mesh, "-o", &target, "--quiet"]), mesh);
+    }
+    for (program, file) in [
+        (COMPARE, "out/compare-solvers-m-loop.csv"),
+        (SWEEP, "out/sweep-omega-m-loop.csv"),
+        (SPECTRUM, "out/spectrum-m-loop.csv"),
+    ] {
+        let output = run(program, folder.path(), ["a/m.off", "b/m.off", "--json", "--quiet"]);
+        let error = assert_refused(&output, program);
+        assert!(error.starts_with(&format!("error: {file}: ")) && error.contains("called the same"), "{error}");
+        let kept = fs::read_to_string(folder.path().join(file)).unwrap();
+        assert!(kept.contains("\n# input: a/m.off, 20 vertices"), "{kept}");
+    }
+}
