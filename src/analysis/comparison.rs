@@ -208,8 +208,11 @@ fn parameter(variant: &str, method: Method, order_name: &str) -> String {
     words.join(", ")
 }
 
-/// Four significant digits without trailing zeros.
+/// Four significant digits without trailing zeros, as a power of ten where many zeros would stand before or after them.
 fn four_digits(x: f64) -> String {
+    if !(1e-9..1e9).contains(&x.abs()) {
+        return format!("{x:.3e}");
+    }
     let text = format!("{x:.*}", (3 - x.abs().log10().floor() as i32).clamp(0, 12) as usize);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }

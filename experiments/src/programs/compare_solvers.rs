@@ -57,7 +57,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
     /// Write the errors at every vertex after these iterations of each method that iterates, as far as it goes: a PLY file with a
-    /// property each (error_5) and colours for viewers, and a picture
+    /// property each (error_5) and colours for viewers, and a picture of the first twelve
     #[arg(long, value_name = "K,…")]
     errors_at: Option<List<usize>>,
     /// Write an interactive page of one mesh or folder to this file too: curves of convergence, an ω sweep, the spectrum, the

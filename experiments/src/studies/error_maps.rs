@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use serde_json::{Value, json};
 
 use super::comparison::is_over_iterations;
-use super::pictures::{Framed, Maps, power};
+use super::pictures::{Framed, MOST_MAPS, Maps, power};
 use crate::cli::{OutputFlags, Problem};
 use crate::report::{ColourScale, Provenance};
 use limitlab::Result;
@@ -93,9 +93,11 @@ impl ErrorMaps {
         output.settle([&id])?;
         let file = output.out.join(format!("{id}.ply"));
         maps.write_ply(&file, iterations.len() - 1, made)?;
-        let title = format!("{}: errors of {label} after k iterations", problem.subject.caption());
+        let all = iterations.len();
+        let of = if all > MOST_MAPS { format!(" ({MOST_MAPS} of {all})") } else { String::new() };
+        let title = format!("{}: errors of {label} after k iterations{of}", problem.subject.caption());
         let captions = iterations.iter().zip(most).map(|(k, most)| format!("k = {k}: largest {}", power(most)));
-        output.figure(&id, &maps.figure(title, captions, Framed::Whole), made)?;
+        output.figure(&id, &maps.figure(title, captions.take(MOST_MAPS), Framed::Whole), made)?;
         Ok(json!({ "file": file.display().to_string(), "iterations": iterations }))
     }
 }

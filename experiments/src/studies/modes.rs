@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::pictures::{Framed, Maps, peak};
+use super::pictures::{Framed, MOST_MAPS, Maps, peak};
 use crate::cli::{OutputFlags, Subject, number};
 use crate::report::{ColourScale, Column, Columns, Provenance, Table, readable};
 use limitlab::Result;
@@ -11,8 +11,6 @@ use limitlab::analysis::subspace_iteration::Cluster;
 use limitlab::mesh::Mesh;
 use limitlab::mesh::ply::Scalars;
 
-/// Modes in the picture, at most: the PLY file has all.
-const MOST_SHOWN: usize = 12;
 /// The participation of a mode that has a place on the mesh.
 const LOCAL: f64 = 0.1;
 
@@ -116,7 +114,7 @@ pub fn write(
     let scale = ColourScale::signed("mode, largest 1", 1.0);
     let maps = Maps { mesh, scalars, units: vec![1.0; all], scale };
     maps.write_ply(&file(".ply"), 0, made)?;
-    let of = if all > MOST_SHOWN { format!(" ({MOST_SHOWN} of {all})") } else { String::new() };
+    let of = if all > MOST_MAPS { format!(" ({MOST_MAPS} of {all})") } else { String::new() };
     let captions = lines(found).into_iter().flat_map(|line| {
         let more = if line.multiplicity == 1 { String::new() } else { format!(" ({}-fold)", line.multiplicity()) };
         (line.first..).zip(line.modes).map(move |(k, mode)| {
@@ -128,7 +126,7 @@ pub fn write(
         })
     });
     let title = format!("{}: slowest modes{of}", subject.caption());
-    output.figure(&table.id, &maps.figure(title, captions.take(MOST_SHOWN), Framed::Near), made)
+    output.figure(&table.id, &maps.figure(title, captions.take(MOST_MAPS), Framed::Near), made)
 }
 
 /// The fields `modes`, with an object each, and `mode_clusters`, with one an eigenvalue.

@@ -30,6 +30,8 @@ const MOST_REFINED: usize = 400_000;
 const MOST_LEVELS: usize = 5;
 /// Panels of maps in a row.
 const IN_A_ROW: usize = 3;
+/// Maps in a picture, at most, each of which takes 17 MB of memory: a PLY file has all.
+pub const MOST_MAPS: usize = 12;
 
 /// A mesh with flat faces and its edges.
 pub fn cage(mesh: &Mesh, colour: Colour) -> ShadedMesh {

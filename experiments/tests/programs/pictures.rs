@@ -192,6 +192,20 @@ fn errors_at_vertices_are_those_of_runs_of_so_many_iterations() {
 }
 
 #[test]
+fn many_errors_at_vertices_make_a_picture_of_the_first() {
+    let folder = tempdir().unwrap();
+    let at: Vec<String> = (0..20).map(|k| k.to_string()).collect();
+    let flags = ["torus:5x5", "--noise", "0.1", "--method", "pia", "--quiet", "--figure", "svg", "--errors-at"];
+    assert_done(&run(COMPARE, folder.path(), flags.iter().copied().chain([at.join(",").as_str()])), "20 iterations");
+    let stem = folder.path().join("out/compare-solvers-torus-5x5-catmull-clark-errors-pia");
+    let picture = fs::read_to_string(stem.with_extension("svg")).unwrap();
+    assert_eq!(picture.matches("aria-label=\"k = ").count(), 12);
+    assert!(picture.contains("(12 of 20)"));
+    let columns = vertex_columns(&stem.with_extension("ply"));
+    assert_eq!(columns.keys().filter(|name| name.starts_with("error_")).count(), 20);
+}
+
+#[test]
 fn errors_at_vertices_are_in_the_numbers_of_the_file() {
     let folder = tempdir().unwrap();
     let (surface, stages) = creased(folder.path());

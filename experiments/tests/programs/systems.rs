@@ -139,6 +139,23 @@ fn a_laplacian_is_solved_by_all_methods_that_can() {
     assert!(below(&system.join("o")).contains(&"sweep-omega-my-laplacian.png".to_owned()));
 }
 
+/// Names of methods have the ends of the spectrum in them, and stand in legends.
+#[test]
+fn entries_of_any_size_leave_room_for_the_figure() {
+    let folder = tempdir().unwrap();
+    fs::create_dir(folder.path().join("d")).unwrap();
+    let of = |name: &str, text: &str| fs::write(folder.path().join("d").join(name), text).unwrap();
+    of("P.mtx", "%%MatrixMarket matrix array real general\n3 1\n1\n2\n3\n");
+    for large in ["1e300", "1e-300"] {
+        of("M.mtx", &format!("%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n1 1 2\n2 2 2\n3 3 {large}\n"));
+        let output = run(COMPARE, folder.path(), ["d", "--method", "chebyshev,jacobi,pia", "--json", "--quiet"]);
+        assert_done(&output, large);
+        for row in json(&output)["rows"].as_array().unwrap() {
+            assert!(row["parameter"].as_str().unwrap().len() < 60, "{row}");
+        }
+    }
+}
+
 #[test]
 fn a_folder_holds_the_files_of_one_system() {
     let folder = tempdir().unwrap();
