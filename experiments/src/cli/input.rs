@@ -146,7 +146,8 @@ impl MeshFlags {
         }
         if path.components().count() > 1 {
             // No built-in mesh is called so, and a list of them is no help.
-            return Err(Error::io(path, "read", std::io::ErrorKind::NotFound.into()));
+            let what = "there is no such file";
+            return Err(Error::io(path, "read", std::io::Error::new(std::io::ErrorKind::NotFound, what)));
         }
         Ok(Loaded {
             name: name.to_owned(),
