@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use limitlab::mesh::io::{self, Loaded};
-use limitlab::mesh::{Faces, Mesh, obj, off, ply, usd};
+use limitlab::mesh::{Faces, Mesh, gltf, obj, off, ply, stl, usd, weld};
 use proptest::prelude::*;
 
 type Read = fn(&[u8], &Path) -> limitlab::Result<Loaded>;
@@ -18,6 +18,77 @@ const FORMATS: [(&str, Read, Save); 5] = [
     ("text ply", ply::read_bytes, ply::write_text_to),
     ("usda", usd::read_bytes, usd::write_to),
 ];
+
+/// Those that are read and not written.
+const READ_ONLY: [(&str, Read, Save); 3] = [
+    ("stl", stl::read_bytes, write_stl),
+    ("text stl", stl::read_bytes, write_text_stl),
+    ("glb", gltf::read_bytes, write_glb),
+];
+
+/// The corners of the triangles that fans make of the faces, whose vertices are taken round those there are, as numbers.
+fn triangles(mesh: &Mesh) -> Vec<[u32; 3]> {
+    let there = |v: u32| v % mesh.len() as u32;
+    let fan = |f: &[u32]| -> Vec<[u32; 3]> { (2..f.len()).map(|k| [f[0], f[k - 1], f[k]].map(there)).collect() };
+    mesh.faces.iter().flat_map(fan).collect()
+}
+
+fn write_stl(out: &mut dyn Write, mesh: &Mesh, _: Option<&[DVec3]>) -> std::io::Result<()> {
+    let triangles = triangles(mesh);
+    out.write_all(&[0x20; 80])?;
+    out.write_all(&(triangles.len() as u32).to_le_bytes())?;
+    for t in triangles {
+        out.write_all(&[0; 12])?;
+        for x in t.iter().flat_map(|&v| mesh.positions[v as usize].to_array()) {
+            out.write_all(&(x as f32).to_le_bytes())?;
+        }
+        out.write_all(&[0; 2])?;
+    }
+    Ok(())
+}
+
+fn write_text_stl(out: &mut dyn Write, mesh: &Mesh, _: Option<&[DVec3]>) -> std::io::Result<()> {
+    writeln!(out, "solid")?;
+    for t in triangles(mesh) {
+        writeln!(out, "facet normal 0 0 0\nouter loop")?;
+        for p in t.map(|v| mesh.positions[v as usize]) {
+            writeln!(out, "vertex {:e} {:e} {:e}", p.x, p.y, p.z)?;
+        }
+        writeln!(out, "endloop\nendfacet")?;
+    }
+    writeln!(out, "endsolid")
+}
+
+fn write_glb(out: &mut dyn Write, mesh: &Mesh, _: Option<&[DVec3]>) -> std::io::Result<()> {
+    let indices = triangles(mesh).concat();
+    let coordinates = mesh.positions.iter().flat_map(|p| p.to_array());
+    let mut binary: Vec<u8> = coordinates.flat_map(|x| (x as f32).to_le_bytes()).collect();
+    let before = binary.len();
+    binary.extend(indices.iter().flat_map(|v| v.to_le_bytes()));
+    let mut json = serde_json::json!({
+        "asset": {"version": "2.0"},
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": mesh.len(), "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5125, "count": indices.len(), "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": before},
+            {"buffer": 0, "byteOffset": before, "byteLength": binary.len() - before},
+        ],
+        "buffers": [{"byteLength": binary.len()}],
+    })
+    .to_string();
+    json += &" ".repeat(json.len().next_multiple_of(4) - json.len());
+    out.write_all(b"glTF\x02\0\0\0")?;
+    out.write_all(&(12 + 8 + json.len() as u32 + 8 + binary.len() as u32).to_le_bytes())?;
+    for (kind, chunk) in [(b"JSON", json.as_bytes()), (b"BIN\0", &binary)] {
+        out.write_all(&(chunk.len() as u32).to_le_bytes())?;
+        out.write_all(kind)?;
+        out.write_all(chunk)?;
+    }
+    Ok(())
+}
 
 /// USD holds nine digits: what was read once, reads back equal.
 fn as_kept(name: &str, read: Read, write: Save, mesh: &Mesh) -> Mesh {
@@ -106,9 +177,32 @@ proptest! {
         }
     }
 
+    /// Of positions there is one vertex each, in the order of the first, and triangles stay as they are.
+    #[test]
+    fn triangles_of_formats_that_split_vertices_read_back_welded((mesh, _) in any_mesh()) {
+        let triangles = triangles(&mesh);
+        let corners = triangles.iter().flatten().map(|&v| mesh.positions[v as usize]).collect();
+        let soup = Mesh::new(corners, Faces::from_lists((0..triangles.len() as u32).map(|t| [0, 1, 2].map(|k| 3 * t + k))));
+        let indexed = Mesh::new(mesh.positions.clone(), Faces::from_lists(&triangles));
+        for ((name, read, write), (mut given, single)) in
+            READ_ONLY.into_iter().zip([(soup.clone(), true), (soup, false), (indexed, true)])
+        {
+            if single {
+                given.positions.iter_mut().for_each(|p| *p = p.as_vec3().as_dvec3());
+            }
+            // The bits of a number that is none are not kept in text.
+            given.positions.iter_mut().for_each(|p| *p = p.to_array().map(|x| if x.is_nan() { f64::NAN } else { x }).into());
+            let found = read(&bytes_of(write, &given, None), Path::new(name)).unwrap();
+            let expected = weld::weld(&given).mesh;
+            prop_assert_eq!(bits(&found.mesh.positions), bits(&expected.positions), "{}", name);
+            prop_assert_eq!(&found.mesh.faces, &expected.faces, "{}", name);
+            prop_assert_eq!(found.remarks.len(), usize::from(expected.len() < given.len()), "{}", name);
+        }
+    }
+
     #[test]
     fn no_bytes_make_a_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
-        for (_, read, _) in FORMATS {
+        for (_, read, _) in FORMATS.into_iter().chain(READ_ONLY) {
             refused_or_consistent(read, &bytes);
         }
     }
@@ -116,10 +210,10 @@ proptest! {
     #[test]
     fn no_words_of_the_formats_make_a_reader_panic(
         words in prop::collection::vec(prop::sample::select(WORDS.as_slice()), 0..40),
-        start in prop::sample::select(["", "OFF\n", PLY_ASCII, PLY_BIG, USD_BODY, USD_LIST].as_slice()),
+        start in prop::sample::select(["", "OFF\n", PLY_ASCII, PLY_BIG, USD_BODY, USD_LIST, STL, GLTF].as_slice()),
     ) {
         let text = format!("{start}{}", words.concat());
-        for (_, read, _) in FORMATS {
+        for (_, read, _) in FORMATS.into_iter().chain(READ_ONLY) {
             refused_or_consistent(read, text.as_bytes());
         }
     }
@@ -129,7 +223,7 @@ proptest! {
         (mesh, normals) in any_mesh(),
         damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..4usize), 1..8),
     ) {
-        for (_, read, write) in FORMATS {
+        for (_, read, write) in FORMATS.into_iter().chain(READ_ONLY) {
             let mut bytes = bytes_of(write, &mesh, Some(&normals));
             for &(place, value, kind) in &damage {
                 let at = place.index(bytes.len());
@@ -145,7 +239,19 @@ proptest! {
     }
 }
 
-const WORDS: [&str; 45] = [
+const WORDS: [&str; 57] = [
+    "facet normal 0 0 1 ",
+    "outer loop ",
+    "vertex 1 2 3 ",
+    "endloop ",
+    "endfacet ",
+    "endsolid\n",
+    "\"accessors\": ",
+    "\"POSITION\": ",
+    "\"indices\": ",
+    "\"primitives\": ",
+    "\"nodes\": ",
+    "\"count\": ",
     "v ",
     "f ",
     "vn ",
@@ -197,6 +303,8 @@ const PLY_ASCII: &str = "ply\nformat ascii 1.0\nelement vertex 1\nproperty int x
 const PLY_BIG: &str = "ply\nformat binary_big_endian 1.0\nelement vertex 1\nproperty char x\nproperty char y\n\
                        property char z\nelement face 2\nproperty list char char vertex_index\nend_header\n";
 
+const STL: &str = "solid x\nfacet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop ";
+const GLTF: &str = "{\"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0}}]}], ";
 const USD_BODY: &str = "#usda 1.0\ndef Mesh \"m\" {\n";
 const USD_LIST: &str = "#usda 1.0\ndef Mesh \"m\" {\npoint3f[] points = [(0, 0, 0), (1";
 

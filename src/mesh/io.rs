@@ -15,7 +15,8 @@ use super::features::Tags;
 use super::file_tags::{FileTags, Subdivision};
 use super::usd::StageMetadata;
 use super::validate::Boundary;
-use super::{Faces, Mesh, obj, obj_normals, off, ply, usd};
+use super::weld::{Welded, weld};
+use super::{Faces, Mesh, gltf, obj, obj_normals, off, ply, stl, usd};
 use crate::memory::require;
 use crate::output::write_file;
 use crate::text::{push_point, push_unsigned};
@@ -28,7 +29,7 @@ pub struct Loaded {
     pub name: String,
     /// Positions and faces as in the file, numbered from 0; not validated.
     pub mesh: Mesh,
-    /// Where each vertex and face stands; `None` for binary files.
+    /// Where each vertex and face stands; `None` for binary files and glTF.
     pub lines: Option<Lines>,
     /// One normal a vertex, as in the file: not checked, not normalised. OFF, PLY and USD only; for OBJ see
     /// [`read_normals`].
@@ -39,9 +40,10 @@ pub struct Loaded {
     pub attributes: Attributes,
     /// The scheme that the file is made for, if it says that. USD only.
     pub subdivision: Option<Subdivision>,
-    /// What holds for all coordinates of the file. USD only.
+    /// What holds for all coordinates of the file. USD and glTF only.
     pub stage: StageMetadata,
-    /// CRC-32 of the bytes of the file, as zlib has it; `None` from the readers of one format.
+    /// CRC-32 of the bytes of the file, as zlib has it; `None` from the readers of one format. Of a `.gltf` without its
+    /// buffers.
     pub checksum: Option<u32>,
     /// What a user should know, a sentence each: above all what the file holds and the mesh does not keep.
     pub remarks: Vec<String>,
@@ -56,9 +58,6 @@ pub struct Lines {
     pub faces: Vec<u32>,
 }
 
-/// Memory for each byte of a file while it is read, itself included; measured on the densest format, binary PLY.
-const BYTES: u64 = 3;
-
 /// The formats of mesh files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
@@ -70,6 +69,10 @@ pub enum Format {
     Ply,
     /// USD as text, `.usda`.
     Usd,
+    /// Stereolithography, `.stl`: text and binary. Not written.
+    Stl,
+    /// glTF 2.0, `.glb` and `.gltf`. Not written.
+    Gltf,
 }
 
 /// What is written with a mesh beside positions and faces, and how. The default is nothing.
@@ -102,8 +105,15 @@ impl FromStr for Format {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let all = [("off", Format::Off), ("obj", Format::Obj), ("ply", Format::Ply), ("usda", Format::Usd)];
-        names::find("format", text, &all, &[("usd", Format::Usd)])
+        let all = [
+            ("off", Format::Off),
+            ("obj", Format::Obj),
+            ("ply", Format::Ply),
+            ("usda", Format::Usd),
+            ("stl", Format::Stl),
+            ("gltf", Format::Gltf),
+        ];
+        names::find("format", text, &all, &[("usd", Format::Usd), ("glb", Format::Gltf)])
     }
 }
 
@@ -119,14 +129,51 @@ impl Format {
             "off" => Ok(Format::Off),
             "ply" => Ok(Format::Ply),
             "usda" => Ok(Format::Usd),
+            "stl" => Ok(Format::Stl),
+            "glb" | "gltf" => Ok(Format::Gltf),
             "usd" | "usdc" | "usdz" => {
                 Err(Error::parse(path, None, "USD is read and written as text only: let the name end in .usda"))
             }
             // Standard streams, and the pipes that shells make, have names without ending.
             "" if path.starts_with("/dev") => Ok(Format::Obj),
             _ => {
-                Err(Error::parse(path, None, "not a known mesh format: the name must end in .usda, .obj, .off or .ply"))
+                let what = "not a known mesh format: the name must end in .usda, .obj, .off or .ply; .stl, .glb and \
+                            .gltf are read";
+                Err(Error::parse(path, None, what))
             }
+        }
+    }
+
+    /// As [`of`](Self::of), for a mesh that is written.
+    ///
+    /// # Errors
+    /// [`Error::Parse`] for a format that is read only, too.
+    pub fn of_output(path: &Path) -> Result<Self> {
+        Self::of(path)?.written(path)
+    }
+
+    /// This format, for a mesh that is written; `path` is for the message.
+    ///
+    /// # Errors
+    /// [`Error::Parse`] for a format that is read only.
+    pub fn written(self, path: &Path) -> Result<Self> {
+        match self {
+            Format::Obj | Format::Off | Format::Ply | Format::Usd => return Ok(self),
+            Format::Stl | Format::Gltf => {}
+        }
+        // Both have triangles alone, and as many copies of a vertex as it has faces or normals.
+        let what = "STL and glTF are read and not written, for they keep neither quads nor vertices: choose .usda, .obj, \
+                    .off or .ply";
+        Err(Error::parse(path, None, what))
+    }
+
+    /// Memory for each byte of a file while it is read, itself included; measured on the densest files: binary, of
+    /// positions and triangles alone.
+    fn memory_per_byte(self) -> u64 {
+        match self {
+            Format::Obj | Format::Off | Format::Ply | Format::Usd => 3,
+            Format::Stl => 5,
+            Format::Gltf => 8,
         }
     }
 
@@ -144,7 +191,11 @@ impl Format {
         const HEAD: u64 = 1 << 16;
         let refused = |e| Error::io(path, "read", e);
         let has_room = |size: u64| {
-            require(BYTES.saturating_mul(size), || format!("{}: the mesh", path.display()), "use a smaller one")
+            require(
+                self.memory_per_byte().saturating_mul(size),
+                || format!("{}: the mesh", path.display()),
+                "use a smaller one",
+            )
         };
         let mut bytes = Vec::new();
         source.by_ref().take(HEAD).read_to_end(&mut bytes).map_err(refused)?;
@@ -159,6 +210,8 @@ impl Format {
             Format::Off => off::check_head(&bytes[..lines], path),
             Format::Ply => ply::check_head(&bytes[..lines], path),
             Format::Usd => usd::check_head(&bytes[..lines], path),
+            Format::Stl => stl::check_head(&bytes, path),
+            Format::Gltf => gltf::check_head(&bytes, path),
         }?;
         if let Some(size) = size {
             has_room(size)?;
@@ -182,6 +235,8 @@ impl Format {
             Format::Off => off::read_bytes(bytes, path),
             Format::Ply => ply::read_bytes(bytes, path),
             Format::Usd => usd::read_bytes(bytes, path),
+            Format::Stl => stl::read_bytes(bytes, path),
+            Format::Gltf => gltf::read_bytes(bytes, path),
         }?;
         Ok(Loaded { checksum: Some(crc32fast::hash(bytes)), ..loaded })
     }
@@ -195,13 +250,13 @@ pub fn has_mesh_ending(path: &Path) -> bool {
 /// Checks early that a file of this name can be written as a mesh.
 ///
 /// # Errors
-/// [`Error::Parse`] for an unknown extension.
+/// As [`Format::of_output`].
 pub fn check_name(path: &Path) -> Result<()> {
-    Format::of(path).map(|_| ())
+    Format::of_output(path).map(|_| ())
 }
 
-/// Reads a mesh file, whose extension (`.obj`, `.off`, `.ply` or `.usda` in any case) names its format; what lies in `/dev` and
-/// has none is OBJ.
+/// Reads a mesh file, whose extension (`.obj`, `.off`, `.ply`, `.usda`, `.stl`, `.glb` or `.gltf` in any case) names its format;
+/// what lies in `/dev` and has none is OBJ.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read; [`Error::Parse`], with the line where there is one, if it is not what
@@ -248,7 +303,7 @@ pub fn read_normals(path: &Path) -> Result<Option<Vec<DVec3>>> {
 /// all ([`write_file`]).
 ///
 /// # Errors
-/// [`Error::Parse`] for an unknown extension, [`Error::Io`] if the file cannot be written.
+/// As [`Format::of_output`]; [`Error::Io`] if the file cannot be written.
 ///
 /// # Panics
 /// If there are not as many normals as vertices.
@@ -264,7 +319,7 @@ pub fn write(path: &Path, mesh: &Mesh, normals: Option<&[DVec3]>) -> Result<()> 
 /// # Panics
 /// If there are not as many normals as vertices.
 pub fn write_control(path: &Path, mesh: &Mesh, options: &WriteOptions) -> Result<()> {
-    let format = Format::of(path)?;
+    let format = Format::of_output(path)?;
     write_file(path, |out| write_control_to(out, format, mesh, options))
 }
 
@@ -274,13 +329,14 @@ pub fn write_control(path: &Path, mesh: &Mesh, options: &WriteOptions) -> Result
 /// Those of the stream.
 ///
 /// # Panics
-/// If there are not as many normals as vertices.
+/// If there are not as many normals as vertices; if the format is [not written](Format::written).
 pub fn write_control_to(out: &mut dyn Write, format: Format, mesh: &Mesh, options: &WriteOptions) -> io::Result<()> {
     match format {
         Format::Obj => obj::write_control_to(out, mesh, options),
         Format::Off => off::write_control_to(out, mesh, options),
         Format::Ply => ply::write_control_to(out, mesh, options),
         Format::Usd => usd::write_control_to(out, mesh, options),
+        Format::Stl | Format::Gltf => panic!("a format that is written"),
     }
 }
 
@@ -291,7 +347,7 @@ pub fn left_out(format: Format, options: &WriteOptions) -> Vec<String> {
     // Edge-and-corner is what is taken where a file says nothing.
     let has_rule = options.tags.is_some_and(|t| matches!(t.boundary, Boundary::EdgeOnly | Boundary::AsInterior));
     match format {
-        Format::Obj | Format::Usd => {}
+        Format::Obj | Format::Usd | Format::Stl | Format::Gltf => {}
         Format::Off | Format::Ply if has_sharp => {
             left_out.push("creases and corners are not written: use .usda or .obj".into());
         }
@@ -304,7 +360,7 @@ pub fn left_out(format: Format, options: &WriteOptions) -> Vec<String> {
         (Format::Off | Format::Ply | Format::Usd, Some(attributes)) if !attributes.is_empty() => {
             left_out.push(format!("not written: {attributes}: use .obj"));
         }
-        (Format::Obj | Format::Off | Format::Ply | Format::Usd, _) => {}
+        (Format::Obj | Format::Off | Format::Ply | Format::Usd | Format::Stl | Format::Gltf, _) => {}
     }
     left_out
 }
@@ -452,6 +508,29 @@ impl Builder {
     }
 }
 
+/// Makes one vertex of those at one position, for formats that split them, in the order of the first at each; `what` says what
+/// was split, and `why`.
+pub(super) fn joined(loaded: Loaded, what: &str, why: &str) -> Loaded {
+    let before = loaded.mesh.len();
+    let Welded { mesh, place } = weld(&loaded.mesh);
+    if mesh.len() == before {
+        return loaded;
+    }
+    let lines = loaded.lines.map(|mut lines| {
+        let mut next = 0;
+        let mut place = place.iter();
+        lines.vertices.retain(|_| {
+            let is_first = place.next() == Some(&next);
+            next += u32::from(is_first);
+            is_first
+        });
+        lines
+    });
+    let mut remarks = loaded.remarks;
+    remarks.push(format!("{before} {what} lie at {} positions, each of which is one vertex: {why}", mesh.len()));
+    Loaded { mesh, lines, remarks, ..loaded }
+}
+
 fn capped(count: u64, at_most: usize) -> usize {
     usize::try_from(count).unwrap_or(usize::MAX).min(at_most)
 }
@@ -479,12 +558,23 @@ mod tests {
         for name in ["/dev/stdout", "/dev/fd/63"] {
             check_name(Path::new(name)).unwrap();
         }
-        for name in ["a.stl", "obj", ".off", ""] {
+        for name in ["a.3ds", "obj", ".off", ""] {
             let path = folder.path().join(name);
             for error in [write(&path, &mesh, None).err(), read(&path).err()] {
                 let text = error.unwrap().to_string();
-                assert!(text.ends_with("must end in .usda, .obj, .off or .ply"), "{text}");
+                assert!(
+                    text.ends_with("must end in .usda, .obj, .off or .ply; .stl, .glb and .gltf are read"),
+                    "{text}"
+                );
             }
+        }
+        for name in ["a.stl", "a.GLB", "a.gltf"] {
+            let path = folder.path().join(name);
+            for error in [write(&path, &mesh, None).err(), check_name(&path).err()] {
+                let text = error.unwrap().to_string();
+                assert!(text.contains("are read and not written"), "{text}");
+            }
+            assert!(!path.exists() && has_mesh_ending(&path));
         }
         for name in ["a.usd", "a.usdc", "a.USDZ"] {
             let text = check_name(Path::new(name)).unwrap_err().to_string();

@@ -16,14 +16,14 @@ const KNOWN: [(&[u8], &str); 22] = [
     (b"OFF", "it is an OFF file: let its name end in .off"),
     (b"#usda", "it is a USD file: let its name end in .usda"),
     (b"PXR-USDC", "it is binary USD: save it as text, .usda"),
-    (b"solid", "it is an STL file: convert it, and weld its vertices"),
-    (b"glTF", "it is a glTF file: convert it to .usda, .obj, .off or .ply"),
+    (b"solid", "it is an STL file: let its name end in .stl"),
+    (b"glTF", "it is a binary glTF file: let its name end in .glb"),
     (b"Kaydara FBX", "it is an FBX file: convert it to .usda, .obj, .off or .ply"),
     (b"DRACO", "it is a Draco file: convert it to .usda, .obj, .off or .ply"),
     (b"# vtk DataFile", "it is a VTK file: convert it to .usda, .obj, .off or .ply"),
     (b"ISO-10303-21", "it is a STEP file: convert it to .usda, .obj, .off or .ply"),
     (b"<", "it is XML or HTML: if it was downloaded, this is the page and not the file"),
-    (b"{", "it is JSON: convert the mesh in it to .usda, .obj, .off or .ply"),
+    (b"{", "it is JSON: if it is glTF, let its name end in .gltf, else convert the mesh in it"),
 ];
 
 const UTF_16: &str = "it is text in UTF-16 or UTF-32: save it as UTF-8 or ASCII";

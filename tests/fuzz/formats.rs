@@ -1,4 +1,4 @@
-//! The mesh formats, and what all of them keep.
+//! The mesh formats that are read and written, and what all of them keep.
 
 use std::io::Write;
 use std::path::Path;
@@ -8,7 +8,7 @@ use limitlab::Result;
 use limitlab::mesh::io::Loaded;
 use limitlab::mesh::{Mesh, obj, off, ply, usd};
 
-type Read = fn(&[u8], &Path) -> Result<Loaded>;
+pub type Read = fn(&[u8], &Path) -> Result<Loaded>;
 type WriteTo = fn(&mut dyn Write, &Mesh, Option<&[DVec3]>) -> std::io::Result<()>;
 
 /// A mesh format: what reads it, and what writes it.

@@ -1,4 +1,4 @@
-//! Any bytes through the readers: of the four mesh formats, of normals in OBJ files, of lists of vertices, normals and
+//! Any bytes through the readers: of the six mesh formats, of normals in OBJ files, of lists of vertices, normals and
 //! numbers. What is refused is refused in one line; what is read can be written, and reads back equal.
 
 use std::fmt::Debug;
@@ -8,10 +8,10 @@ use std::path::Path;
 use limitlab::Result;
 use limitlab::mesh::io::Loaded;
 use limitlab::mesh::validate::{Boundary, validate};
-use limitlab::mesh::vertex_data;
+use limitlab::mesh::{gltf, stl, vertex_data};
 use tempfile::NamedTempFile;
 
-use super::formats::{FORMATS, Format, writes_and_reads_back};
+use super::formats::{FORMATS, Format, Read, writes_and_reads_back};
 use super::surface::euler_if_closed;
 
 /// Vertices of the mesh that lists are about.
@@ -24,12 +24,14 @@ pub fn check(data: &[u8]) {
     let Some((&kind, bytes)) = data.split_first() else { return };
     // Bytes that the corpus has keep their readers.
     match kind {
-        6 | 192.. => mesh(&FORMATS[3], bytes),
+        6 | 192.. => mesh_of(&FORMATS[3], bytes),
+        7 | 128..144 => mesh(".stl", stl::read_bytes, bytes),
+        8 | 144..160 => mesh(".glb", gltf::read_bytes, bytes),
         _ => match kind % 6 {
             3 => vertices(bytes),
             4 => normals(bytes),
             5 => numbers(bytes),
-            format => mesh(&FORMATS[format as usize], bytes),
+            format => mesh_of(&FORMATS[format as usize], bytes),
         },
     }
 }
@@ -44,9 +46,13 @@ fn one_line(text: &str) {
     assert!(!text.is_empty() && !text.contains(char::is_control), "not one line: {text:?}");
 }
 
-fn mesh(format: &Format, bytes: &[u8]) {
+fn mesh_of(format: &Format, bytes: &[u8]) {
+    mesh(format.ending, format.read, bytes);
+}
+
+fn mesh(ending: &str, read: Read, bytes: &[u8]) {
     let path = Path::new("x.mesh");
-    let Some(Loaded { mesh, lines, normals, remarks, tags, .. }) = accepted((format.read)(bytes, path)) else { return };
+    let Some(Loaded { mesh, lines, normals, remarks, tags, .. }) = accepted(read(bytes, path)) else { return };
     assert!(lines.iter().all(|l| l.vertices.len() == mesh.len() && l.faces.len() == mesh.faces.len()));
     remarks.iter().for_each(|remark| one_line(remark));
     let vertices = tags.creases.iter().flat_map(|c| c.ends).chain(tags.corners.iter().map(|c| c.vertex));
@@ -66,9 +72,9 @@ fn mesh(format: &Format, bytes: &[u8]) {
         }
     }
     // An OBJ file has its normals at the corners.
-    let normals = match format.ending {
+    let normals = match ending {
         ".obj" => {
-            let file = file(bytes, format.ending);
+            let file = file(bytes, ending);
             accepted(limitlab::mesh::io::read_normals(file.path())).flatten()
         }
         _ => normals,

@@ -42,7 +42,8 @@ pub struct MeshFlags {
     /// the file, edge-only (the curve is smooth there), as-interior (boundary vertices as interior ones: loop, sqrt3 and mid-edge only) or refuse
     #[arg(long, value_name = "RULE")]
     pub boundary: Option<Boundary>,
-    /// The format of a mesh on standard input or output, whose name is -: obj, off, ply or usda
+    /// The format of a mesh on standard input or output, whose name is -: obj, off, ply or usda; of input stl or
+    /// gltf (both .glb and .gltf), too
     #[arg(long, value_name = "NAME")]
     pub format: Option<Format>,
     /// Make one vertex of those at the same position: seams are closed; the control mesh keeps the file's vertices
@@ -132,7 +133,7 @@ impl MeshFlags {
     pub fn load(&self, name: &str) -> Result<Loaded> {
         let path = Path::new(name);
         if name == STANDARD_STREAM {
-            let what = "it has no name that tells the format: give --format obj, off, ply or usda";
+            let what = "it has no name that tells the format: give --format obj, off, ply, usda, stl or gltf";
             let format = self.format.ok_or_else(|| Error::mesh("standard input", what))?;
             return io::read_from(std::io::stdin().lock(), format, Path::new("standard input"));
         }

@@ -28,7 +28,7 @@ const EXAMPLES: [&str; 2] =
 #[derive(Parser)]
 #[command(name = "assemble", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE, None))]
 pub struct Arguments {
-    /// A mesh file (.obj, .off, .ply, .usda) or a built-in name
+    /// A mesh file (.obj, .off, .ply, .usda, .stl, .glb, .gltf) or a built-in name
     #[arg(value_name = "MESH", value_hint = ValueHint::FilePath)]
     input: String,
     /// Folder for the five files

@@ -39,7 +39,7 @@ const EXAMPLES: [&str; 2] = ["spectrum model.off --modes 6", "spectrum icosphere
 #[derive(Parser)]
 #[command(name = "spectrum", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE_ANYHOW, None))]
 pub struct Arguments {
-    /// Mesh files (.obj, .off, .ply, .usda), built-in names, or folders with M.mtx, H.mtx and P.mtx; unless told, four
+    /// Mesh files (.obj, .off, .ply, .usda, .stl, .glb, .gltf), built-in names, or folders with M.mtx, H.mtx and P.mtx; unless told, four
     /// built-in ones with --noise 0.1
     #[arg(value_name = "MESH|SYSTEM_DIR", value_hint = ValueHint::AnyPath)]
     meshes: Vec<String>,

@@ -56,6 +56,74 @@ fn a_mesh_comes_and_goes_by_pipes() {
 }
 
 #[test]
+fn stl_and_gltf_are_read_and_their_cages_written_in_other_formats() {
+    let folder = tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("a.obj"), format!("{TETRAHEDRON}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")).unwrap();
+    // The corners of the same faces, in whose order the first of each are those of the vertices 1 3 2 4.
+    let points = ["0 0 0", "0 1 0", "1 0 0", "0 0 1"];
+    let faces = [[0, 1, 2], [0, 2, 3], [2, 1, 3], [1, 0, 3]];
+    let facet = |f: [usize; 3]| {
+        let vertices: String = f.map(|v| format!("vertex {}\n", points[v])).concat();
+        format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
+    };
+    let stl = format!("solid\n{}endsolid\n", faces.map(facet).concat());
+    let coordinates = points.iter().flat_map(|p| p.split(' ').map(|x| x.parse::<f32>().unwrap().to_le_bytes()));
+    let binary =
+        [coordinates.flatten().collect(), faces.concat().iter().map(|&v| v as u8).collect::<Vec<u8>>()].concat();
+    fs::write(path("a.bin"), &binary).unwrap();
+    let gltf = serde_json::json!({
+        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "translation": [0, 0, 5]}, {"name": "camera"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5121, "count": 12, "type": "SCALAR"},
+        ],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 12}],
+        "buffers": [{"byteLength": 60, "uri": "a.bin"}],
+    });
+    fs::write(path("a.stl"), &stl).unwrap();
+    fs::write(path("a.gltf"), gltf.to_string()).unwrap();
+    let cage = |arguments: &[&str], input: &[u8]| {
+        let output = piped(INTERPOLATE, folder.path(), input, &[arguments, &["-o", "cage.usda"]].concat());
+        assert_done(&output, arguments[0]);
+        (io::read(&path("cage.usda")).unwrap(), text(&output.stderr).to_owned())
+    };
+    let (expected, _) = cage(&["a.obj"], b"");
+    for (arguments, input, height, joined) in [
+        (&["a.stl"][..], "", 0.0, true),
+        (&["-", "--format", "stl"], &stl, 0.0, true),
+        (&["a.gltf"], "", 5.0, false),
+        (&["-", "--format", "glb"], &gltf.to_string(), 5.0, false),
+    ] {
+        let (found, said) = cage(arguments, input.as_bytes());
+        assert_eq!(found.mesh.faces.corners(), faces.concat().iter().map(|&v| v as u32).collect::<Vec<_>>());
+        for (v, of_obj) in [0, 2, 1, 3].into_iter().enumerate() {
+            let wanted = expected.mesh.positions[of_obj] + glam::DVec3::new(0.0, 0.0, height);
+            assert!((found.mesh.positions[v] - wanted).length() < 1e-7, "{arguments:?}: {:?}", found.mesh);
+        }
+        assert_eq!(
+            said.contains("12 corners of triangles lie at 4 positions, each of which is one vertex"),
+            joined,
+            "{said}"
+        );
+        assert_eq!(found.stage.is_z_up, if joined { None } else { Some(false) });
+    }
+    for (output, format) in
+        [("x.stl", &[][..]), ("x.GLB", &[]), ("-", &["--format", "stl"]), ("-", &["--format", "gltf"])]
+    {
+        let arguments = [&["a.obj", "-o", output], format].concat();
+        let line = assert_refused(&run(INTERPOLATE, folder.path(), arguments), output);
+        let name = if output == "-" { "standard output" } else { output };
+        assert!(line.starts_with(&format!("error: {name}: STL and glTF are read and not written")), "{line}");
+        assert!(!path(output).exists());
+    }
+    let line = assert_refused(&run(INTERPOLATE, folder.path(), ["a.bin", "-o", "x.obj"]), "of another kind");
+    assert!(line.contains("the name must end in .usda, .obj, .off or .ply; .stl, .glb and .gltf are read"), "{line}");
+}
+
+#[test]
 fn text_ply_is_written_on_request() {
     let folder = tempdir().unwrap();
     assert_done(&run(INTERPOLATE, folder.path(), ["cube", "-o", "a.ply", "--write-normals"]), "binary");

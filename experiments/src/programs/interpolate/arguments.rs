@@ -28,7 +28,7 @@ const EXAMPLES: [&str; 3] = [
 #[derive(Parser)]
 #[command(name = "interpolate", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE, Some(WHICH_METHOD)))]
 pub struct Arguments {
-    /// A mesh file (.obj, .off, .ply, .usda), a built-in name, or - for standard input (with --format)
+    /// A mesh file (.obj, .off, .ply, .usda, .stl, .glb, .gltf), a built-in name, or - for standard input (with --format)
     #[arg(value_name = "MESH", value_hint = ValueHint::FilePath)]
     pub input: String,
     /// The mesh to write (.obj, .off, .ply, .usda; - for standard output, with --format): the control mesh, or the surface
