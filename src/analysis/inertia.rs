@@ -187,13 +187,13 @@ pub fn inertia(s: &Csr, sigma: f64) -> Result<Inertia> {
     Ok(Inertia { below, backward_error })
 }
 
-fn pattern(s: &Csr) -> SymbolicSparseColMatRef<'_, u32> {
+pub(super) fn pattern(s: &Csr) -> SymbolicSparseColMatRef<'_, u32> {
     let (offsets, columns) = (s.pattern().offsets(), s.pattern().columns());
     SymbolicSparseColMatRef::new_checked(s.len(), s.len(), offsets, None, columns)
 }
 
 /// The entries of ±(S − σ).
-fn shifted(s: &Csr, sigma: f64, sign: f64) -> Vec<f64> {
+pub(super) fn shifted(s: &Csr, sigma: f64, sign: f64) -> Vec<f64> {
     let mut values: Vec<f64> = Vec::with_capacity(s.values().len());
     for i in 0..s.len() {
         values.extend(s.row(i).map(|(j, v)| sign * if i == j { v - sigma } else { v }));
@@ -201,7 +201,8 @@ fn shifted(s: &Csr, sigma: f64, sign: f64) -> Vec<f64> {
     values
 }
 
-fn analyse(
+/// The pattern of the factor of a matrix of this pattern, of `most` entries at most.
+pub(super) fn analyse(
     s: &Csr,
     supernodal_flop_ratio_threshold: SupernodalThreshold,
     most: usize,

@@ -15,6 +15,7 @@ pub mod line_preconditioner;
 pub mod order_study;
 pub mod predict;
 pub mod rate;
+mod shift_invert;
 pub mod singularity;
 pub mod spectral_radius;
 pub mod spectrum;

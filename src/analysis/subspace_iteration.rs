@@ -7,20 +7,23 @@
 //! one vector cannot give. The unwanted part reaches from the block's last Ritz value to the far end, for which a
 //! proven bound is used; nothing is tuned to a mesh.
 //!
-//! Memory: two blocks of N × p numbers. Work: products with S (counted in [`Eigenpairs::applications`]), and
-//! 6 N p² operations each time the block is made orthonormal. All sums are taken in chunks of fixed size and in
+//! Where the block's values are so close together that a polynomial of the greatest degree does not part them, as at the lowest
+//! end on a large regular grid, the same filter is put to ±(S − σ)⁻¹, with σ a tenth of their distance beyond the end: there a
+//! degree of six parts them.
+//!
+//! Memory: two blocks of N × p numbers; for the inverse a third one and a Cholesky factor. Work: products with S or its inverse
+//! (counted in [`Eigenpairs::applications`]), and 6 N p² operations each time the block is made orthonormal. All sums are taken in chunks of fixed size and in
 //! their order, so results do not depend on the number of threads.
 
 use chacha20::ChaCha8Rng;
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::{RngExt, SeedableRng};
 
+use super::shift_invert::{LANES, ShiftInvert};
 use crate::assemble::Csr;
 use crate::error::{Error, Result};
 use crate::parallel;
 
-/// Columns that a product handles at once: one cache line of a row.
-const LANES: usize = 8;
 /// Rows of a task.
 const CHUNK: usize = 4096;
 /// Vectors beside the wanted ones: they move the damped part of the spectrum away from those.
@@ -30,6 +33,9 @@ const GUARDS: usize = 8;
 const AMPLIFICATION: f64 = 1e7;
 /// Degrees of a filter.
 const DEGREES: std::ops::RangeInclusive<usize> = 6..=240;
+/// The distance of a shift from the end of the spectrum, in parts of that from there to the damped part: near enough that
+/// filters of the least degree part the block's values, far enough that the end has mostly been found before.
+const SHIFT: f64 = 0.1;
 /// The least distance of the damped part from the end of the spectrum, in parts of the whole, where the block does
 /// not resolve a cluster.
 const LEAST_SPREAD: f64 = 1e-3;
@@ -83,7 +89,7 @@ pub struct Eigenpairs {
     pub vectors: Vec<Vec<f64>>,
     /// Whether all of them have the accuracy asked for.
     pub converged: bool,
-    /// Products of S with one vector.
+    /// Products of S, or of its shifted inverse, with one vector.
     pub applications: usize,
 }
 
@@ -180,6 +186,9 @@ pub fn extreme(s: &Csr, request: &EigenpairRequest) -> Result<Eigenpairs> {
     };
     let scale = lo.abs().max(hi.abs());
     let mut round = 0;
+    let mut inverse = None;
+    // Whether a factor has been found each time that it was needed.
+    let mut is_factored = true;
     loop {
         let ritz = iteration.rayleigh_ritz(request.end, &mut rng)?;
         let cut = ritz[width - 1].0;
@@ -212,8 +221,39 @@ pub fn extreme(s: &Csr, request: &EigenpairRequest) -> Result<Eigenpairs> {
         } else {
             cut
         };
-        iteration.filter(ritz[0].0, cut, far);
+        let wanted = ritz[0].0;
+        if inverse.is_none() && degree(wanted, cut, far) > *DEGREES.end() as f64 && is_factored {
+            inverse = ShiftInvert::new(s, request.end, width, wanted, SHIFT * (cut - wanted).abs());
+            is_factored = inverse.is_some();
+        }
+        // The block's values have come closer to each other than the shift is to them.
+        if let Some(there) = &mut inverse
+            && (wanted - there.sigma).abs() > (cut - wanted).abs()
+            && !there.move_to(wanted, SHIFT * (cut - wanted).abs())
+        {
+            (inverse, is_factored) = (None, false);
+        }
+        match &mut inverse {
+            None => iteration.filter(&mut Operator::Matrix, wanted, cut, far),
+            Some(inverse) => {
+                let (wanted, cut) = (inverse.image(wanted), inverse.image(cut));
+                iteration.filter(&mut Operator::Inverse(inverse), wanted, cut, 0.0);
+            }
+        }
     }
+}
+
+/// What a filter is a polynomial in.
+enum Operator<'a, 'b> {
+    Matrix,
+    Inverse(&'a mut ShiftInvert<'b>),
+}
+
+/// The degree at which the polynomial amplifies `wanted` as it should over [`cut`, `far`].
+fn degree(wanted: f64, cut: f64, far: f64) -> f64 {
+    let (c, e) = (0.5 * (far + cut), 0.5 * (far - cut));
+    let outside = ((wanted - c) / e).abs();
+    if outside > 1.0 { ((2.0 * AMPLIFICATION).ln() / outside.acosh()).ceil() } else { f64::INFINITY }
 }
 
 struct Iteration<'a> {
@@ -222,42 +262,67 @@ struct Iteration<'a> {
     /// Row-major, N × width.
     x: Vec<f64>,
     y: Vec<f64>,
+    /// By columns; empty until the inverse is needed.
+    z: Vec<f64>,
     applications: usize,
 }
 
 impl<'a> Iteration<'a> {
     fn new(s: &'a Csr, width: usize) -> Self {
         let zeros = vec![0.0; s.len() * width];
-        Iteration { s, width, x: zeros.clone(), y: zeros, applications: 0 }
+        Iteration { s, width, x: zeros.clone(), y: zeros, z: Vec::new(), applications: 0 }
     }
 
     fn column(&self, j: usize) -> Vec<f64> {
         self.x.chunks_exact(self.width).map(|row| row[j]).collect()
     }
 
-    /// `x ← T_m((S − c)/e) x`, scaled to stay near 1 at `wanted`; [`cut`, `far`] is mapped to [−1, 1].
-    fn filter(&mut self, wanted: f64, cut: f64, far: f64) {
+    /// `x ← T_m((S − c)/e) x`, or so of the inverse in the place of S, scaled to stay near 1 at `wanted`; [`cut`, `far`] is mapped
+    /// to [−1, 1].
+    fn filter(&mut self, operator: &mut Operator, wanted: f64, cut: f64, far: f64) {
         let (c, e) = (0.5 * (far + cut), 0.5 * (far - cut));
         let outside = ((wanted - c) / e).abs();
-        let degree =
-            if outside > 1.0 { ((2.0 * AMPLIFICATION).ln() / outside.acosh()).ceil() as usize } else { *DEGREES.end() };
-        let degree = degree.clamp(*DEGREES.start(), *DEGREES.end());
+        // Infinity becomes the greatest number.
+        let degree = (degree(wanted, cut, far) as usize).clamp(*DEGREES.start(), *DEGREES.end());
         let first = if outside > 1.0 { e / (wanted - c) } else { -1.0 };
         let mut sigma = first;
         // y = (S x − c x) σ/e, then the recurrence, each step in the place of the older vector.
-        self.step(sigma / e, c, 0.0);
+        self.step(operator, sigma / e, c, 0.0);
         std::mem::swap(&mut self.x, &mut self.y);
         for _ in 1..degree {
             let next = 1.0 / (2.0 / first - sigma);
-            self.step(2.0 * next / e, c, -sigma * next);
+            self.step(operator, 2.0 * next / e, c, -sigma * next);
             std::mem::swap(&mut self.x, &mut self.y);
             sigma = next;
         }
     }
 
-    /// `y ← α (S x − c x) + β y`. Parallel over rows.
-    fn step(&mut self, alpha: f64, c: f64, beta: f64) {
+    /// `y ← α (S x − c x) + β y`, or so of the inverse.
+    fn step(&mut self, operator: &mut Operator, alpha: f64, c: f64, beta: f64) {
         self.applications += self.width;
+        match operator {
+            Operator::Matrix => self.step_of_matrix(alpha, c, beta),
+            Operator::Inverse(inverse) => self.step_of_inverse(inverse, alpha, c, beta),
+        }
+    }
+
+    fn step_of_inverse(&mut self, inverse: &mut ShiftInvert, alpha: f64, c: f64, beta: f64) {
+        let (n, width) = (self.s.len(), self.width);
+        self.z.resize(n * width, 0.0);
+        inverse.solve(&self.x, &mut self.z);
+        let (x, z) = (&self.x, &self.z);
+        parallel::chunks(&mut self.y, CHUNK * width, |first, y| {
+            for (i, y) in (first / width..).zip(y.chunks_exact_mut(width)) {
+                for (j, y) in y.iter_mut().enumerate() {
+                    let old = if beta == 0.0 { 0.0 } else { beta * *y };
+                    *y = alpha * (z[j * n + i] - c * x[i * width + j]) + old;
+                }
+            }
+        });
+    }
+
+    /// Parallel over rows.
+    fn step_of_matrix(&mut self, alpha: f64, c: f64, beta: f64) {
         let (s, x, width) = (self.s, &self.x, self.width);
         parallel::chunks(&mut self.y, CHUNK * width, |first, y| {
             for (i, y) in (first / width..).zip(y.chunks_exact_mut(width)) {
@@ -278,7 +343,7 @@ impl<'a> Iteration<'a> {
     /// Orthonormal vectors of the same span, ordered Ritz pairs of S in it: (value, residual).
     fn rayleigh_ritz(&mut self, end: End, rng: &mut ChaCha8Rng) -> Result<Vec<(f64, f64)>> {
         self.orthonormalize(rng)?;
-        self.step(1.0, 0.0, 0.0);
+        self.step(&mut Operator::Matrix, 1.0, 0.0, 0.0);
         let projected = gram(&self.x, &self.y, self.width);
         let eigen = decompose(symmetrized(projected))?;
         let mut order: Vec<usize> = (0..self.width).collect();
