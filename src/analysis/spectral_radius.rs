@@ -8,6 +8,7 @@ use rand::{RngExt, SeedableRng};
 
 use super::dense;
 use crate::error::Result;
+use crate::parallel;
 use crate::solvers::System;
 
 /// Steps of the power method before the first Arnoldi process.
@@ -111,6 +112,32 @@ struct Cycle {
     restart: Vec<DVec3>,
 }
 
+/// Takes from `w` its part in the span of the orthonormal `basis`, and gives the coefficients of that. Gram-Schmidt twice: once
+/// is not enough where the space is nearly invariant; all coefficients at once, so that a piece of `w` stays at hand while the
+/// basis goes by.
+fn orthogonalize(w: &mut [DVec3], basis: &[Vec<DVec3>]) -> Vec<f64> {
+    const CHUNK: usize = 1024;
+    let mut coefficients = vec![0.0; basis.len()];
+    for _ in 0..2 {
+        let parts = parallel::map(w.len(), CHUNK, |range| -> Vec<f64> {
+            basis.iter().map(|v| inner(&v[range.clone()], &w[range.clone()])).collect()
+        });
+        let mut sums = vec![0.0; basis.len()];
+        for part in parts {
+            sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
+        }
+        parallel::chunks(w, CHUNK, |first, w| {
+            for (v, &c) in basis.iter().zip(&sums) {
+                for (w, v) in w.iter_mut().zip(&v[first..]) {
+                    *w -= c * *v;
+                }
+            }
+        });
+        coefficients.iter_mut().zip(sums).for_each(|(all, sum)| *all += sum);
+    }
+    coefficients
+}
+
 /// One Arnoldi process from the unit vector `start`.
 ///
 /// # Errors
@@ -122,15 +149,8 @@ fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut impl FnMut(&mut [DVec3]
     for k in 0..vectors {
         let mut w = basis[k].clone();
         step(&mut w);
-        // Gram-Schmidt twice: once is not enough where the space is nearly invariant.
-        for _ in 0..2 {
-            for (j, v) in basis.iter().enumerate() {
-                let c = inner(v, &w);
-                hessenberg[(j, k)] += c;
-                for (w, v) in w.iter_mut().zip(v) {
-                    *w -= c * *v;
-                }
-            }
+        for (j, c) in orthogonalize(&mut w, &basis).into_iter().enumerate() {
+            hessenberg[(j, k)] = c;
         }
         next = normalize(&mut w);
         hessenberg[(k + 1, k)] = next;

@@ -47,7 +47,7 @@ const EXAMPLES: [&str; 3] = [
 #[derive(Parser)]
 #[command(name = "compare-solvers", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE_ANYHOW, Some(WHICH_METHOD)))]
 pub struct Arguments {
-    /// Mesh files (.obj, .off, .ply, .usda), built-in names, or folders with M.mtx, H.mtx and P.mtx; torus:32x32 with --noise 0.1 unless told
+    /// Mesh files (.obj, .off, .ply, .usda, .stl, .glb, .gltf), built-in names, or folders with M.mtx, H.mtx and P.mtx; torus:32x32 with --noise 0.1 unless told
     #[arg(value_name = "MESH|SYSTEM_DIR", value_hint = ValueHint::AnyPath)]
     meshes: Vec<String>,
     /// Methods, separated by commas, auto among them; all unless told
@@ -309,7 +309,7 @@ fn by_methods<'a, S: System, K: Spectra + Clone + Sync>(
     if !wanted.page {
         return Ok(Compared { rows, refused: None, measured: None, error_maps });
     }
-    let of_page = Progress::new(subject, page::steps(&rows), wanted.common.quiet);
+    let of_page = Progress::new(subject, page::steps(system, &rows), wanted.common.quiet);
     let measured = page::measure(problem, system, spectra, eigenvalues(spectra)?, &rows, &of_page)?;
     Ok(Compared { rows, refused: None, measured: Some(measured), error_maps })
 }

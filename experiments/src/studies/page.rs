@@ -35,6 +35,8 @@ const FRAME_BYTES: usize = 1_500_000;
 const MOST_FRAMES: usize = 60;
 /// Entries of a history at most.
 const MOST_ENTRIES: usize = 500;
+/// Unknowns up to which the sweep has all ω of the usual grids.
+const MOST_FINE: usize = 5000;
 /// Decades of error that are coloured at most.
 const DECADES: f64 = 12.0;
 /// A λ_min below this part of λ_max is zero as far as rounding tells.
@@ -58,9 +60,17 @@ struct Shown {
     range: [f64; 2],
 }
 
+/// The grids of the sweep on a system of `unknowns`: a large one, on which a run and the spectral radius of a sweep take long,
+/// has every other ω of the usual ones.
+fn grids(unknowns: usize) -> [(Method<'static>, Vec<f64>); 3] {
+    let step = if unknowns > MOST_FINE { 2 } else { 1 };
+    // From the second on: the grids begin at their step.
+    SWEPT.map(|method| (method, default_grid(method).into_iter().skip(step - 1).step_by(step).collect()))
+}
+
 /// The runs of [`measure`].
-pub fn steps(rows: &[MethodRow]) -> usize {
-    rows.len() + SWEPT.iter().map(|&method| default_grid(method).len()).sum::<usize>()
+pub fn steps(system: &impl System, rows: &[MethodRow]) -> usize {
+    rows.len() + grids(system.len()).iter().map(|(_, grid)| grid.len()).sum::<usize>()
 }
 
 /// Sweeps over ω, and runs the methods of `rows` again, now with a watch that writes down the errors at the vertices: the
@@ -91,7 +101,7 @@ pub fn measure(
         frames
     };
     let frames = rows.iter().map(record).collect();
-    let grids = SWEPT.map(|method| (method, default_grid(method)));
+    let grids = grids(system.len());
     let floor = rounding_floor(problem.diagonal());
     let order = Some(&problem.order[..]);
     let show = |event: SweepEvent| show(progress, &event);
