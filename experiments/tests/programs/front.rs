@@ -28,6 +28,8 @@ fn a_subcommand_is_the_program_of_its_name() {
     let version = text(&version.stdout).trim().strip_prefix("limitlab ").unwrap();
     let commit = version.strip_prefix(env!("CARGO_PKG_VERSION")).and_then(|rest| rest.strip_prefix(" (")).unwrap();
     let commit = commit.strip_suffix(')').unwrap();
+    // Where the sources are not those of the commit.
+    let commit = commit.strip_suffix("-dirty").unwrap_or(commit);
     assert!(commit == "unknown" || commit.len() == 10 && commit.chars().all(|c| c.is_ascii_hexdigit()), "{commit}");
 }
 

@@ -34,7 +34,7 @@ fn every_file_says_what_made_it() {
         (SWEEP, &["mine.off", "--out", "w", "--omega", "0.5:1:0.5", "--history", "0.7", "--figure", "png,svg,pdf"]),
         (SPECTRUM, &["mine.off", "--out", "s", "--full", "--modes", "2", "--figure", "png,svg,pdf"]),
         (ASSEMBLE, &["mine.off", "--out", "a"]),
-        (INTERPOLATE, &["mine.off", "-o", "i.obj"]),
+        (INTERPOLATE, &["mine.off", "-o", "i.obj", "--picture", "p.png"]),
         (INTERPOLATE, &["mine.off", "-o", "i.off"]),
         (INTERPOLATE, &["mine.off", "-o", "i.ply"]),
         (INTERPOLATE, &["mine.off", "-o", "t.ply", "--ascii"]),
@@ -109,6 +109,23 @@ fn the_command_in_a_file_makes_it_again() {
     assert!(first.starts_with(b"v "));
 }
 
+/// What git says of the sources.
+fn commit() -> String {
+    let git = |arguments: &[&str]| {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+        let output = std::process::Command::new("git").current_dir(root).args(arguments).output().ok()?;
+        output.status.success().then(|| text(&output.stdout).trim().to_owned())
+    };
+    let Some(head) = git(&["rev-parse", "--short=10", "HEAD"]) else { return "unknown".into() };
+    let sources =
+        ["Cargo.toml", "Cargo.lock", "src", "experiments/Cargo.toml", "experiments/build.rs", "experiments/src"];
+    let differs = git(&["diff", "--quiet", "HEAD", "--"].into_iter().chain(sources).collect::<Vec<_>>()).is_none();
+    let untracked =
+        git(&["ls-files", "--others", "--exclude-standard", "--"].into_iter().chain(sources).collect::<Vec<_>>());
+    let is_dirty = differs || untracked.is_some_and(|files| !files.is_empty());
+    head + if is_dirty { "-dirty" } else { "" }
+}
+
 #[test]
 fn json_says_what_made_it() {
     let folder = tempdir().unwrap();
@@ -126,7 +143,7 @@ fn json_says_what_made_it() {
         let command = object["command"].as_str().unwrap();
         assert!(command.starts_with(name) && command.ends_with("--json --threads 1 --quiet"), "{command}");
         assert_eq!(object["provenance"]["date"].as_str().unwrap().len(), 20);
-        assert!(object["provenance"]["commit"].is_string());
+        assert_eq!(object["provenance"]["commit"], commit());
         object
     };
     let object = check(INTERPOLATE, &["mine.off", "-o", "x.obj"]);
@@ -190,6 +207,9 @@ fn no_file_is_replaced_without_a_word() {
     let cage = |more: &[&str]| remarks(INTERPOLATE, folder.path(), &[&["cube", "-o", "x.off"], more].concat());
     assert!(!cage(&[]).contains("replaced"));
     assert!(cage(&["--tol", "1e-8"]).contains("replaced: x.off\n"));
+    let said = cage(&["--picture", "p.svg"]);
+    assert!(!said.contains("replaced: 2 files"), "{said}");
+    assert!(cage(&["--tol", "1e-7", "--picture", "p.svg"]).contains("replaced: 2 files"), "the picture too");
     // Who names one file twice wants it replaced.
     assert!(!remarks(INTERPOLATE, folder.path(), &["x.off", "-o", "x.off"]).contains("replaced"));
     // The same bytes replace nothing.
@@ -221,6 +241,11 @@ fn no_clobber_refuses_before_the_work() {
         assert!(error.ends_with("it is there already: name another place, or leave out --no-clobber"), "{error}");
         assert!(before == bytes(&all) && below(folder.path()).len() == all.len(), "{program}");
     }
+    // A picture is a file like others.
+    fs::write(folder.path().join("y.png"), "mine").unwrap();
+    let picture = ["cube", "--scheme", "nasri", "-o", "y.off", "--picture", "y.png", "--no-clobber", "--quiet"];
+    let error = assert_refused(&run(INTERPOLATE, folder.path(), picture), "picture");
+    assert!(error.starts_with("error: y.png") && !folder.path().join("y.off").exists(), "{error}");
     // A table of another mesh whose name ends alike is not in the way.
     let other = ["prism:4", "--method", "pia", "--out", "c", "--no-clobber", "--quiet"];
     assert_done(&run(COMPARE, folder.path(), other), "another mesh");

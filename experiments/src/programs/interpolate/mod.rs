@@ -114,8 +114,8 @@ impl<'a> Target<'a> {
     fn of(arguments: &'a Arguments) -> Result<Self> {
         let path = &arguments.output;
         Ok(match arguments.mesh.format.filter(|_| path.as_os_str() == STANDARD_STREAM) {
-            Some(format) => Target { file: None, format },
-            None => Target { file: Some(path), format: Format::of(path)? },
+            Some(format) => Target { file: None, format: format.written(Path::new("standard output"))? },
+            None => Target { file: Some(path), format: Format::of_output(path)? },
         })
     }
 
