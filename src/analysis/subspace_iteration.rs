@@ -187,8 +187,8 @@ pub fn extreme(s: &Csr, request: &EigenpairRequest) -> Result<Eigenpairs> {
     let scale = lo.abs().max(hi.abs());
     let mut round = 0;
     let mut inverse = None;
-    // Whether a factor has been found each time that it was needed.
-    let mut is_factored = true;
+    // Until a factor has no room or is not found.
+    let mut may_factor = true;
     loop {
         let ritz = iteration.rayleigh_ritz(request.end, &mut rng)?;
         let cut = ritz[width - 1].0;
@@ -222,16 +222,16 @@ pub fn extreme(s: &Csr, request: &EigenpairRequest) -> Result<Eigenpairs> {
             cut
         };
         let wanted = ritz[0].0;
-        if inverse.is_none() && degree(wanted, cut, far) > *DEGREES.end() as f64 && is_factored {
+        if inverse.is_none() && degree(wanted, cut, far) > *DEGREES.end() as f64 && may_factor {
             inverse = ShiftInvert::new(s, request.end, width, wanted, SHIFT * (cut - wanted).abs());
-            is_factored = inverse.is_some();
+            may_factor = inverse.is_some();
         }
         // The block's values have come closer to each other than the shift is to them.
         if let Some(there) = &mut inverse
             && (wanted - there.sigma).abs() > (cut - wanted).abs()
             && !there.move_to(wanted, SHIFT * (cut - wanted).abs())
         {
-            (inverse, is_factored) = (None, false);
+            (inverse, may_factor) = (None, false);
         }
         match &mut inverse {
             None => iteration.filter(&mut Operator::Matrix, wanted, cut, far),
