@@ -171,7 +171,8 @@ pcg-ssor in order
 
     #[test]
     fn no_line_is_wider_than_the_terminal() {
-        for width in [28, 40, 80, 200] {
+        // At every width, for the layout changes where a column just fits.
+        for width in 28..=80 {
             let text = fitted(&rates(), width);
             assert!(text.lines().all(|line| length(line) <= width), "{width}:\n{text}");
         }
