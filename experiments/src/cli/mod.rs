@@ -112,6 +112,14 @@ impl Default for StopFlags {
 }
 
 impl StopFlags {
+    /// The tolerance as titles say it.
+    pub fn words(&self) -> String {
+        match self.tol_absolute {
+            Some(tolerance) => format!("to {tolerance:e}"),
+            None => format!("to {:e} of the diagonal", self.tol),
+        }
+    }
+
     /// The rule for points of this extent, in units of `scale`; or what is wrong.
     ///
     /// # Errors
@@ -460,6 +468,8 @@ mod tests {
         // The diagonal of [−1, 1]³ is √12.
         assert!((stop(None).tolerance - 1e-3 * 12f64.sqrt()).abs() < 1e-18);
         assert_eq!(stop(Some(1e-3)).tolerance, 1e-3);
+        let words = |tol_absolute| StopFlags { tol_absolute, ..StopFlags::default() }.words();
+        assert_eq!((words(None), words(Some(0.5))), ("to 1e-10 of the diagonal".into(), "to 5e-1".into()));
         assert_eq!(stop(None).max_iterations, 7);
     }
 

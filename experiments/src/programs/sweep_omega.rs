@@ -115,7 +115,8 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         let (sweep, histories) = sweep_one(&problem, arguments, &write)?;
         write(&sweep)?;
         let table = table(&sweep);
-        let figure = study::plot(problem.subject.caption(), &arguments.method.0, &sweep);
+        let title = format!("{}, {}", problem.subject.caption(), arguments.stop.words());
+        let figure = study::plot(title, &arguments.method.0, &sweep);
         arguments.output.figure(&table.id, &figure, &made)?;
         if arguments.history.is_some() {
             let runs = histories.iter().map(|of| ([of.method.to_string(), short(of.omega)], &of.history[..]));

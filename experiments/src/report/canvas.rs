@@ -55,6 +55,23 @@ impl Rect {
         ((self.left + self.right) / 2.0, (self.top + self.bottom) / 2.0)
     }
 
+    /// The smallest one that covers both.
+    pub fn around(self, other: Rect) -> Rect {
+        Rect {
+            left: self.left.min(other.left),
+            top: self.top.min(other.top),
+            right: self.right.max(other.right),
+            bottom: self.bottom.max(other.bottom),
+        }
+    }
+
+    /// Whether they share more than their edges, but for rounding.
+    fn overlaps(&self, other: &Rect) -> bool {
+        const ROUNDING: f64 = 1e-6;
+        self.left.max(other.left) + ROUNDING < self.right.min(other.right)
+            && self.top.max(other.top) + ROUNDING < self.bottom.min(other.bottom)
+    }
+
     pub fn contains(&self, (x, y): Point) -> bool {
         (self.left..=self.right).contains(&x) && (self.top..=self.bottom).contains(&y)
     }
@@ -234,6 +251,21 @@ impl Canvas {
         }
     }
 
+    /// What cannot be read: texts that were cut or reach over the edge of the page, and pairs that cover each other.
+    pub fn illegible(&self) -> Vec<String> {
+        let page = Rect { left: 0.0, top: 0.0, right: self.width.into(), bottom: self.height.into() };
+        let texts: Vec<(&str, Rect)> = self.shapes.iter().filter_map(text_box).collect();
+        let outside = texts.iter().filter(|(_, area)| page.around(*area) != page);
+        let mut found: Vec<String> = outside.map(|(text, _)| format!("\"{text}\" reaches over the edge")).collect();
+        let cut = texts.iter().filter(|(text, _)| text.contains('…'));
+        found.extend(cut.map(|(text, _)| format!("\"{text}\" is cut")));
+        for (i, (text, area)) in texts.iter().enumerate() {
+            let over = texts[..i].iter().filter(|(_, other)| area.overlaps(other));
+            found.extend(over.map(|(other, _)| format!("\"{text}\" covers \"{other}\"")));
+        }
+        found
+    }
+
     /// Fills a rectangle.
     pub fn fill(&mut self, area: Rect, colour: Colour) {
         self.shapes.push(Shape::Rectangle { area, colour });
@@ -329,6 +361,18 @@ impl Canvas {
     }
 }
 
+/// A text with the rectangle that its capitals fill.
+fn text_box(shape: &Shape) -> Option<(&str, Rect)> {
+    let Shape::Text { text, at: (x, y), size, upright, .. } = shape else { return None };
+    let (along, across) = (glyphs::width(text, *size), CAP_HEIGHT * size);
+    let area = if *upright {
+        Rect { left: x - across, right: *x, top: y - along, bottom: *y }
+    } else {
+        Rect { left: *x, right: x + along, top: y - across, bottom: *y }
+    };
+    Some((text, area))
+}
+
 /// Where a polyline leaves `window` for good: the last segment inside, cut at the edge; `None` if it ends inside or never
 /// was there.
 pub(super) fn way_out(path: &[Point], window: Rect) -> Option<(Point, Point)> {
@@ -398,6 +442,26 @@ mod tests {
     fn length(path: &[Point]) -> f64 {
         let segments = path.windows(2);
         segments.map(|s| (s[1].0 - s[0].0).hypot(s[1].1 - s[0].1)).sum()
+    }
+
+    #[test]
+    fn texts_outside_or_on_each_other_cannot_be_read() {
+        let page = |texts: &[(&str, Point, bool)]| {
+            let mut canvas = Canvas::new(100, 50);
+            for &(text, at, upright) in texts {
+                canvas.text(text, at, 10.0, Anchor::Start, upright, Colour(0, 0, 0));
+            }
+            canvas.illegible()
+        };
+        // Seven points high, subscripts beside; an upright one ends where the level one begins.
+        let high = 10.0 * CAP_HEIGHT;
+        assert_eq!(page(&[("λ_{1} x^{2}", (20.0, 20.0), false), ("07", (20.0, 20.0 + high), false)]), [""; 0]);
+        assert_eq!(page(&[("07", (20.0, 40.0), true), ("07", (20.0, 40.0), false)]), [""; 0]);
+        assert_eq!(page(&[("a", (20.0, 20.0), false), ("b", (22.0, 24.0), false)]), ["\"b\" covers \"a\""]);
+        assert_eq!(page(&[("w…e", (20.0, 20.0), false)]), ["\"w…e\" is cut"]);
+        assert_eq!(page(&[("wide", (90.0, 20.0), false)]), ["\"wide\" reaches over the edge"]);
+        assert_eq!(page(&[("wide", (20.0, high - 1.0), false)]), ["\"wide\" reaches over the edge"]);
+        assert_eq!(page(&[("wide", (20.0, 10.0), true)]), ["\"wide\" reaches over the edge"]);
     }
 
     #[test]

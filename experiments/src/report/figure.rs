@@ -2,11 +2,11 @@
 
 use super::axis::{Axis, Scale};
 use super::canvas::{Canvas, Rect};
-use super::frame::{BARE_RIGHT, Slot, draw_fitted, title_room};
+use super::frame::{BARE_RIGHT, Slot, TITLE_SIZE, draw_fitted, title_room, title_size};
 use super::plot::LinePlot;
 use super::png::Image;
 use super::provenance::Provenance;
-use super::render::Picture;
+use super::render::{ColourScale, Picture, bar};
 use super::sparsity::SparsityPlot;
 use limitlab::output::write_file;
 use limitlab::{Error, Result, names};
@@ -45,6 +45,14 @@ impl From<Picture> for Panel {
 }
 
 impl Panel {
+    fn title(&self) -> &str {
+        match self {
+            Panel::Lines(plot) => &plot.title,
+            Panel::Sparsity(plot) => &plot.caption,
+            Panel::Picture(picture) => &picture.caption,
+        }
+    }
+
     fn x_axis(&self) -> Axis {
         match self {
             Panel::Lines(plot) => plot.x_axis(),
@@ -78,10 +86,10 @@ impl Panel {
         }
     }
 
-    fn right(&self) -> Result<f64> {
+    fn right(&self) -> f64 {
         match self {
-            Panel::Lines(plot) => Ok(plot.right()),
-            Panel::Sparsity(_) => Ok(BARE_RIGHT),
+            Panel::Lines(plot) => plot.right(),
+            Panel::Sparsity(_) => BARE_RIGHT,
             Panel::Picture(picture) => picture.right(),
         }
     }
@@ -97,7 +105,7 @@ impl Panel {
     fn draw(&self, canvas: &mut Canvas, slot: &Slot) -> Result<()> {
         match self {
             Panel::Lines(plot) => plot.draw(canvas, slot),
-            Panel::Sparsity(plot) => plot.draw(canvas, slot.frame),
+            Panel::Sparsity(plot) => plot.draw(canvas, slot),
             Panel::Picture(picture) => picture.draw(canvas, slot)?,
         }
         Ok(())
@@ -160,6 +168,8 @@ pub struct Figure {
     /// Panels of a column have one x axis, labelled at the lowest only: the range that some of them ask for, or
     /// else the one that shows the data of all. Panels of another scale do not take part.
     pub share_x: bool,
+    /// Drawn beside the panels, whose pictures have their colours from it.
+    pub colour_bar: Option<ColourScale>,
     pub panels: Vec<Panel>,
 }
 
@@ -169,20 +179,14 @@ impl Figure {
 
     /// A single panel, 600×380 points.
     pub fn new(panel: impl Into<Panel>) -> Self {
-        Figure { title: String::new(), width: 600, height: 380, columns: 1, share_x: false, panels: vec![panel.into()] }
+        Figure { width: 600, height: 380, ..Figure::row([panel]) }
     }
 
     /// Panels one above the other that share their x axis, 600 points wide and 220 high each.
     pub fn stack<P: Into<Panel>>(panels: impl IntoIterator<Item = P>) -> Self {
         let panels: Vec<Panel> = panels.into_iter().map(Into::into).collect();
-        Figure {
-            title: String::new(),
-            width: 600,
-            height: 220 * panels.len() as u32,
-            columns: 1,
-            share_x: true,
-            panels,
-        }
+        let height = 220 * panels.len() as u32;
+        Figure { width: 600, height, columns: 1, share_x: true, ..Figure::row(panels) }
     }
 
     /// Panels side by side, 300×320 points each.
@@ -194,6 +198,7 @@ impl Figure {
             height: 320,
             columns: panels.len(),
             share_x: false,
+            colour_bar: None,
             panels,
         }
     }
@@ -202,6 +207,11 @@ impl Figure {
     pub fn title(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
         self
+    }
+
+    /// The same figure under this title, higher by its room.
+    pub fn headed(self, title: impl Into<String>) -> Self {
+        Figure { height: self.height + Self::TITLE_ROOM, ..self.title(title) }
     }
 
     /// Draws the figure. The same figure gives the same image.
@@ -241,6 +251,17 @@ impl Figure {
         write_drawing(&self.drawing()?, path, Format::of(path)?, provenance)
     }
 
+    /// What of its texts cannot be read: those that were cut or reach over the edge, and pairs that cover each other.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    ///
+    /// # Panics
+    /// As [`render`](Self::render).
+    pub fn illegible(&self) -> Result<Vec<String>> {
+        Ok(self.drawing()?.illegible())
+    }
+
     fn drawing(&self) -> Result<Canvas> {
         let mut canvas = Canvas::new(self.width, self.height);
         if !self.title.is_empty() {
@@ -248,8 +269,13 @@ impl Figure {
             let place = (width / 2.0, MARGIN + FIGURE_TITLE_SIZE);
             draw_fitted(&mut canvas, &self.title, place, FIGURE_TITLE_SIZE, width - 2.0 * MARGIN);
         }
-        for (panel, slot) in self.panels.iter().zip(self.slots()?) {
-            panel.draw(&mut canvas, &slot)?;
+        let slots = self.slots()?;
+        for (panel, slot) in self.panels.iter().zip(&slots) {
+            panel.draw(&mut canvas, slot)?;
+        }
+        let frames = slots.into_iter().map(|slot| slot.frame);
+        if let (Some(scale), Some(frames)) = (&self.colour_bar, frames.reduce(Rect::around)) {
+            bar::draw(&mut canvas, frames, scale)?;
         }
         Ok(canvas)
     }
@@ -299,9 +325,10 @@ impl Figure {
         for (index, panel) in self.panels.iter().enumerate() {
             let column = index % columns;
             before[column] = before[column].max(panel.left(height.max(LEAST_FRAME)));
-            after[column] = after[column].max(panel.right()?);
+            after[column] = after[column].max(panel.right());
         }
-        let used = 2.0 * MARGIN + before.iter().chain(&after).sum::<f64>();
+        let bar = self.colour_bar.as_ref().map_or(Ok(0.0), bar::room)?;
+        let used = 2.0 * MARGIN + bar + before.iter().chain(&after).sum::<f64>();
         let width = (f64::from(self.width) - used) / columns as f64;
         if width < LEAST_FRAME || height < LEAST_FRAME {
             return Err(Error::Computation(format!(
@@ -311,6 +338,8 @@ impl Figure {
             )));
         }
 
+        let sizes = self.panels.iter().map(|panel| title_size(panel.title(), width));
+        let title_size = sizes.fold(TITLE_SIZE, f64::min);
         let slot = |index: usize| {
             let (row, column) = (index / columns, index % columns);
             let left = MARGIN + before[..=column].iter().chain(&after[..column]).sum::<f64>() + column as f64 * width;
@@ -320,6 +349,7 @@ impl Figure {
                 left: before[column],
                 x_axis: self.x_axis(index),
                 labelled: self.is_labelled(index),
+                title_size,
             }
         };
         Ok((0..self.panels.len()).map(slot).collect())

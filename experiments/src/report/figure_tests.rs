@@ -1,6 +1,6 @@
 use super::super::canvas::Colour;
 use super::*;
-use crate::report::canvas::{Dash, Marker, PIXELS_PER_POINT, Shape};
+use crate::report::canvas::{Dash, Marker, PIXELS_PER_POINT, Point, Shape, text_width};
 use crate::report::series::{Band, Bars, Rule, marker, palette};
 use crate::report::{ColourScale, Scale, Series, ShadedMesh, View};
 
@@ -154,9 +154,10 @@ fn mixed() -> Figure {
     let scale = ColourScale::linear("x", (-2.0, 2.0));
     let surface = ShadedMesh::smooth(mesh).scalars(values, scale.clone());
     let view = View::named("oblique").unwrap();
-    let picture = Picture { colour_bar: Some(scale), ..Picture::new("a & b < \"c\"", view).surface(surface) };
+    let picture = Picture::new("a & b < \"c\"", view).surface(surface);
     let Panel::Lines(plot) = sweep().panels.remove(0) else { unreachable!() };
-    Figure { width: 800, ..Figure::row([Panel::from(plot), Panel::from(picture)]) }.title("ω_{opt} ‖p − A v‖ 10⁻⁸")
+    let figure = Figure::row([Panel::from(plot), Panel::from(picture)]);
+    Figure { width: 800, colour_bar: Some(scale), ..figure }.title("ω_{opt} ‖p − A v‖ 10⁻⁸")
 }
 
 /// The names of the elements of an XML text in order, every one closed, its attributes quoted, its entities known.
@@ -249,6 +250,128 @@ fn figures_are_written_in_the_formats_that_are_asked_for() {
     let written = |name: &str| folder.path().join(name).exists();
     assert!(written("sweep.svg") && written("sweep.pdf") && !written("sweep.png"));
     assert!("jpg".parse::<Format>().unwrap_err().to_string().contains("use png, svg or pdf"));
+}
+
+#[test]
+fn all_texts_can_be_read() {
+    for figure in [histories(), sweep(), patterns(64), spectrum(), mixed(), maps()] {
+        assert_eq!(figure.illegible().unwrap(), [""; 0], "{}", figure.title);
+    }
+}
+
+/// The texts of a drawing with their sizes.
+fn texts(drawing: &Canvas) -> Vec<(&str, f64)> {
+    let text = |shape| if let &Shape::Text { ref text, size, .. } = shape { Some((text.as_str(), size)) } else { None };
+    drawing.shapes.iter().filter_map(text).collect()
+}
+
+/// Two rows of pictures with titles of several lengths and one bar of colours.
+fn maps() -> Figure {
+    let mesh = limitlab::mesh::builtin::builtin("cube").unwrap();
+    let scale = ColourScale::logarithmic("error / L", (1e-6, 1e-1));
+    let view = View::named("oblique").unwrap();
+    let picture = |k: u32| {
+        let surface = ShadedMesh::flat(mesh.clone()).scalars(vec![1e-3; 8], scale.clone());
+        Picture::new(format!("k = {}: at most 0.1", 10_u64.pow(k)), view).surface(surface)
+    };
+    let figure = Figure::row((0..6).map(picture));
+    Figure { width: 400, height: 260, columns: 3, colour_bar: Some(scale.clone()), ..figure }.headed("errors")
+}
+
+#[test]
+fn titles_of_panels_have_one_size_and_stand_apart() {
+    let drawing = maps().drawing().unwrap();
+    let titles: Vec<(&str, f64)> = texts(&drawing).into_iter().filter(|(text, _)| text.starts_with("k =")).collect();
+    assert_eq!(titles.len(), 6);
+    // That of the longest.
+    let size = crate::report::frame::title_size("k = 100000: at most 0.1", frames(&maps())[0].width());
+    assert!(size < crate::report::frame::TITLE_SIZE);
+    assert!(titles.iter().all(|title| title.1 == size), "{titles:?}");
+    let starts = drawing.shapes.iter().filter_map(|shape| match shape {
+        Shape::Text { text, at, size, .. } if text.starts_with("k =") => Some((at.0, text_width(text, *size))),
+        _ => None,
+    });
+    let starts: Vec<(f64, f64)> = starts.collect();
+    assert!(starts[3..].windows(2).all(|w| w[1].0 - (w[0].0 + w[0].1) >= 10.0), "{starts:?}");
+}
+
+#[test]
+fn pictures_share_one_bar_of_colours_with_its_ends_labelled() {
+    let figure = maps();
+    let drawing = figure.drawing().unwrap();
+    let images: Vec<Point> = drawing
+        .shapes
+        .iter()
+        .filter_map(|shape| if let &Shape::Image { corner, .. } = shape { Some(corner) } else { None })
+        .collect();
+    // Six pictures, then the bar, to the right of all and across both rows.
+    assert_eq!(images.len(), 7);
+    let frames = frames(&figure);
+    assert!(frames.iter().all(|frame| frame.right < images[6].0));
+    assert!(images[6].1 < frames[0].bottom);
+    let labels: Vec<&str> = texts(&drawing).iter().map(|(text, _)| *text).collect();
+    assert!(labels.contains(&"10⁻¹") && labels.contains(&"10⁻⁶"), "{labels:?}");
+    assert_eq!(labels.iter().filter(|label| **label == "error / L").count(), 1);
+}
+
+#[test]
+fn drawings_without_axes_stand_bare_in_the_middle() {
+    let square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)];
+    let plot = LinePlot {
+        title: "a square".into(),
+        x_label: "nothing".into(),
+        equal_units: true,
+        without_axes: true,
+        series: vec![Series::line("", square).colour(Colour(255, 0, 0))],
+        ..LinePlot::default()
+    };
+    let figure = Figure::new(plot);
+    let drawing = figure.drawing().unwrap();
+    assert_eq!(texts(&drawing), [("a square", crate::report::frame::TITLE_SIZE)]);
+    let [_, Shape::Text { .. }] = &drawing.shapes[..] else { panic!("more than a line and a title: {drawing:?}") };
+    let Shape::Lines { paths, .. } = &drawing.shapes[0] else { panic!("no line") };
+    let ends = paths.iter().flatten().map(|&(x, y)| Rect { left: x, right: x, top: y, bottom: y });
+    let area = ends.reduce(Rect::around).unwrap();
+    let (centre, frame) = (area.centre(), frames(&figure)[0].centre());
+    assert!((centre.0 - frame.0).abs() < 1e-6 * area.width() && (centre.1 - frame.1).abs() < 10.0, "{area:?}");
+    assert!((area.width() - area.height()).abs() < 1e-6 && area.height() > 300.0);
+}
+
+#[test]
+fn no_line_hides_a_marker() {
+    let line = |marker| Series::line("", [(0.0, 0.0), (1.0, 1.0)]).marker(marker);
+    let plot = LinePlot { series: vec![line(Marker::Circle), line(Marker::Square)], ..LinePlot::default() };
+    let drawing = Figure::new(plot).drawing().unwrap();
+    let lines = drawing.shapes.iter().rposition(|shape| matches!(shape, Shape::Lines { .. }));
+    let discs = drawing.shapes.iter().position(|shape| matches!(shape, Shape::Disc { .. }));
+    assert!(lines.unwrap() < discs.unwrap());
+}
+
+#[test]
+fn bold_lines_are_twice_as_wide() {
+    let line = |bold| Series { bold, ..Series::line("a line", [(0.0, 0.0), (1.0, 1.0)]).colour(Colour(255, 0, 0)) };
+    let plot = LinePlot { series: vec![line(false), line(true)], ..LinePlot::default() };
+    let drawing = Figure::new(plot).drawing().unwrap();
+    let width = |shape: &Shape| match shape {
+        Shape::Lines { width, colour: Colour(255, 0, 0), .. } => Some(*width),
+        _ => None,
+    };
+    // In the frame, then in the legend.
+    let widths: Vec<f64> = drawing.shapes.iter().filter_map(width).collect();
+    assert_eq!(widths.iter().map(|w| w / widths[0]).collect::<Vec<_>>(), [1.0, 2.0, 1.0, 2.0]);
+}
+
+#[test]
+fn the_legend_explains_arrowheads_where_there_are_some() {
+    let legend = |points: [(f64, f64); 2], x_range| {
+        let series = vec![Series::line("", points)];
+        let plot = LinePlot { series, x_range, arrows: "goes on".into(), ..LinePlot::default() };
+        texts(&Figure::new(plot).drawing().unwrap()).iter().any(|(text, _)| *text == "goes on")
+    };
+    assert!(!legend([(0.0, 1.0), (2.0, 2.0)], None));
+    assert!(!legend([(0.0, 1.0), (2.0, 2.0)], Some((0.0, 2.0))));
+    assert!(legend([(0.0, 1.0), (2.0, 2.0)], Some((0.0, 1.5))));
+    assert!(legend([(0.0, 1.0), (2.0, f64::INFINITY)], None));
 }
 
 #[test]

@@ -30,6 +30,8 @@ pub(super) struct Slot {
     pub x_axis: Axis,
     /// Whether the x axis carries its labels here.
     pub labelled: bool,
+    /// The size of the titles of all panels.
+    pub title_size: f64,
 }
 
 /// Room for a panel's title, above whatever else stands over the frame.
@@ -110,11 +112,18 @@ fn tick_length(tick: &Tick) -> f64 {
 
 /// A title is made smaller down to this part of its size, then cut in its middle.
 const LEAST_TITLE: f64 = 0.8;
+/// Between the titles of neighbours, beside the room between their frames.
+const TITLE_GAP: f64 = 6.0;
 
-/// The title at the top of the `room` above the frame.
-pub(super) fn draw_title(canvas: &mut Canvas, frame: Rect, title: &str, room: f64) {
+/// The size of a panel's title in a frame of this width.
+pub(super) fn title_size(title: &str, width: f64) -> f64 {
+    fitted(title, TITLE_SIZE, width - TITLE_GAP).1
+}
+
+/// The title at the top of the `room` above the frame, no larger than `size`.
+pub(super) fn draw_title(canvas: &mut Canvas, frame: Rect, title: &str, room: f64, size: f64) {
     let place = (frame.centre().0, frame.top - room + 2.0 + TITLE_SIZE);
-    draw_fitted(canvas, title, place, TITLE_SIZE, frame.width());
+    draw_fitted(canvas, title, place, size, frame.width() - TITLE_GAP);
 }
 
 /// Text about `place` that is no wider than `width`: smaller, or with an ellipsis in its middle, where it has to be.

@@ -13,14 +13,18 @@ const BAND_COLOUR: Colour = Colour(226, 238, 246);
 
 // Lengths in points.
 const LINE_WIDTH: f64 = 1.3;
+const BOLD: f64 = 2.0;
 const RULE_WIDTH: f64 = 0.9;
 const GRID_WIDTH: f64 = 0.5;
 const MARKER_RADIUS: f64 = 2.4;
+const BOLD_MARKER: f64 = 1.3;
 /// Markers on a line whose points are closer than this on average are thinned out to [`MARKER_GAP`]; where there are more
 /// than [`FEW`] lines, than so many times more.
 const MARKER_DENSE: f64 = 7.0;
 const FEW: f64 = 3.0;
 const MARKER_GAP: f64 = 36.0;
+/// Around a plot without axes.
+const BARE: f64 = 5.0;
 const LEGEND_GAP: f64 = 10.0;
 const LEGEND_KEY: f64 = 24.0;
 const LEGEND_PITCH: f64 = 13.5;
@@ -61,8 +65,11 @@ pub struct LinePlot {
     /// A unit of x is as long as a unit of y, as in a plot of complex eigenvalues; the frame becomes narrower or
     /// lower for it. For linear axes.
     pub equal_units: bool,
+    /// No frame, ticks, grid and labels, and the drawing in the middle of its room: for shapes in the plane, where coordinates
+    /// mean nothing.
+    pub without_axes: bool,
     pub series: Vec<Series>,
-    /// What the legend says of an arrowhead, if a series goes on or has a point at +∞.
+    /// What the legend says of an arrowhead, if a series goes on, has a point at +∞ or ends outside the range that was asked for.
     pub arrows: String,
     pub vertical_lines: Vec<Rule>,
     pub horizontal_lines: Vec<Rule>,
@@ -75,6 +82,9 @@ struct Look {
     colour: Colour,
     dash: Option<Dash>,
     marker: Option<Marker>,
+    /// In points.
+    width: f64,
+    radius: f64,
 }
 
 /// The sample beside a name in the legend.
@@ -119,7 +129,17 @@ impl LinePlot {
                 Line::None => None,
             },
             marker: series.marker,
+            width: LINE_WIDTH * if series.bold { BOLD } else { 1.0 },
+            radius: MARKER_RADIUS * if series.bold { BOLD_MARKER } else { 1.0 },
         }
+    }
+
+    /// Whether a line ends outside the range that was asked for.
+    fn leaves(&self, series: &Series) -> bool {
+        let is_beyond = |range: Option<(f64, f64)>, at| range.is_some_and(|(lo, hi)| !(lo..=hi).contains(&at));
+        let last = series.points.iter().rev().find(|p| p.0.is_finite() && p.1.is_finite());
+        let has_left = last.is_some_and(|p| is_beyond(self.x_range, p.0) || is_beyond(self.y_range, p.1));
+        series.line != Line::None && has_left
     }
 
     fn bar_colour(&self, index: usize) -> Colour {
@@ -130,8 +150,8 @@ impl LinePlot {
     fn legend(&self) -> Vec<(&str, Key)> {
         let series = self.series.iter().enumerate();
         let series = series.map(|(i, s)| (s.name.as_str(), Key::Line(self.look(i))));
-        let has_arrows = self.series.iter().any(|s| s.goes_on || s.points.iter().any(|p| p.1 == f64::INFINITY));
-        let arrows = has_arrows.then_some((self.arrows.as_str(), Key::Arrow));
+        let has_arrow = |s: &Series| s.goes_on || s.points.iter().any(|p| p.1 == f64::INFINITY) || self.leaves(s);
+        let arrows = self.series.iter().any(has_arrow).then_some((self.arrows.as_str(), Key::Arrow));
         let bars = self.bars.iter().enumerate();
         let bars = bars.map(|(i, b)| (b.name.as_str(), Key::Patch(self.bar_colour(i))));
         let rules = self.horizontal_lines.iter();
@@ -155,11 +175,14 @@ impl LinePlot {
 
     /// The room below the frame, with or without the x axis's labels.
     pub(super) fn bottom(&self, labelled: bool) -> f64 {
-        frame::x_axis_room(&self.x_label, labelled)
+        if self.without_axes { BARE } else { frame::x_axis_room(&self.x_label, labelled) }
     }
 
     /// The room to the left of a frame of this height.
     pub(super) fn left(&self, height: f64) -> f64 {
+        if self.without_axes {
+            return BARE;
+        }
         frame::y_axis_room(&self.y_label, &frame::y_ticks(self.y_axis(), height))
     }
 
@@ -167,12 +190,23 @@ impl LinePlot {
     pub(super) fn right(&self) -> f64 {
         let legend = self.legend();
         let widest = legend.iter().map(|(name, _)| text_width(name, LEGEND_SIZE)).reduce(f64::max);
-        widest.map_or(frame::BARE_RIGHT, |w| LEGEND_GAP + LEGEND_KEY + 6.0 + w + 4.0)
+        let none = if self.without_axes { BARE } else { frame::BARE_RIGHT };
+        widest.map_or(none, |w| LEGEND_GAP + LEGEND_KEY + 6.0 + w + 4.0)
     }
 
     pub(super) fn draw(&self, canvas: &mut Canvas, slot: &Slot) {
         let (x, y) = (slot.x_axis, self.y_axis());
-        let frame = if self.equal_units { with_aspect(slot.frame, (x.hi - x.lo) / (y.hi - y.lo)) } else { slot.frame };
+        let aspect = (x.hi - x.lo) / (y.hi - y.lo);
+        let frame = match (self.equal_units, self.without_axes) {
+            (false, _) => slot.frame,
+            (true, false) => with_aspect(slot.frame, aspect),
+            (true, true) => in_the_middle(slot.frame, with_aspect(slot.frame, aspect)),
+        };
+        if self.without_axes {
+            self.draw_series(canvas, frame, x, y);
+            self.draw_legend(canvas, slot.frame);
+            return frame::draw_title(canvas, slot.frame, &self.title, self.top(), slot.title_size);
+        }
         let x_ticks = frame::x_ticks(x, frame.width());
         let y_ticks = frame::y_ticks(y, frame.height());
         self.draw_bands(canvas, frame, x);
@@ -185,7 +219,7 @@ impl LinePlot {
         frame::draw_y_axis(canvas, frame, slot.left, &y_ticks, &self.y_label);
         self.draw_rule_labels(canvas, frame, x);
         self.draw_legend(canvas, frame);
-        frame::draw_title(canvas, frame, &self.title, self.top());
+        frame::draw_title(canvas, frame, &self.title, self.top(), slot.title_size);
     }
 
     fn draw_bands(&self, canvas: &mut Canvas, frame: Rect, x: Axis) {
@@ -248,14 +282,15 @@ impl LinePlot {
             let (px, py) = (x.position(px)?, y.position(py)?);
             Some((frame.left + px * frame.width(), frame.bottom - py * frame.height()))
         };
-        for (index, series) in self.series.iter().enumerate() {
-            let look = self.look(index);
-            let places: Vec<Option<Point>> = series.points.iter().map(place).collect();
+        let drawn: Vec<(&Series, Look, Vec<Option<Point>>)> = (self.series.iter().enumerate())
+            .map(|(index, series)| (series, self.look(index), series.points.iter().map(place).collect()))
+            .collect();
+        for (series, look, places) in &drawn {
             if let Some(dash) = look.dash {
                 let mut last = None;
                 for piece in places.split(Option::is_none) {
                     let piece: Vec<Point> = piece.iter().copied().flatten().collect();
-                    canvas.stroke(&piece, frame, LINE_WIDTH, dash, look.colour);
+                    canvas.stroke(&piece, frame, look.width, dash, look.colour);
                     if let Some(out) = way_out(&piece, frame) {
                         canvas.arrowhead(out, look.colour);
                     }
@@ -273,16 +308,17 @@ impl LinePlot {
                     canvas.arrowhead(((top.0, frame.bottom), top), look.colour);
                 }
             }
-            if let Some(marker) = look.marker {
-                let visible = places.into_iter().flatten().filter(|&p| frame.contains(p));
-                let mut visible: Vec<Point> = visible.collect();
-                if look.dash.is_some() {
-                    let crowd = (self.series.len() as f64 / FEW).max(1.0);
-                    visible = thinned(visible, index, crowd * MARKER_DENSE);
-                }
-                for at in visible {
-                    canvas.marker(at, marker, MARKER_RADIUS, look.colour);
-                }
+        }
+        // Over all lines, so that none hides where another one ends.
+        for (index, (_, look, places)) in drawn.iter().enumerate() {
+            let Some(marker) = look.marker else { continue };
+            let mut visible: Vec<Point> = places.iter().copied().flatten().filter(|&p| frame.contains(p)).collect();
+            if look.dash.is_some() {
+                let crowd = (self.series.len() as f64 / FEW).max(1.0);
+                visible = thinned(visible, index, crowd * MARKER_DENSE);
+            }
+            for at in visible {
+                canvas.marker(at, marker, look.radius, look.colour);
             }
         }
     }
@@ -324,10 +360,10 @@ impl LinePlot {
             match key {
                 Key::Line(look) => {
                     if let Some(dash) = look.dash {
-                        canvas.stroke(&line, area, LINE_WIDTH, dash, look.colour);
+                        canvas.stroke(&line, area, look.width, dash, look.colour);
                     }
                     if let Some(marker) = look.marker {
-                        canvas.marker(area.centre(), marker, MARKER_RADIUS, look.colour);
+                        canvas.marker(area.centre(), marker, look.radius, look.colour);
                     }
                 }
                 Key::Arrow => {
@@ -348,6 +384,12 @@ impl LinePlot {
 fn with_aspect(frame: Rect, aspect: f64) -> Rect {
     let width = frame.width().min(aspect * frame.height());
     Rect { right: frame.left + width, bottom: frame.top + width / aspect, ..frame }
+}
+
+/// The rectangle moved to the middle of `room`.
+fn in_the_middle(room: Rect, Rect { left, top, right, bottom }: Rect) -> Rect {
+    let (dx, dy) = ((room.right - right) / 2.0, (room.bottom - bottom) / 2.0);
+    Rect { left: left + dx, top: top + dy, right: right + dx, bottom: bottom + dy }
 }
 
 fn draw_grid(canvas: &mut Canvas, frame: Rect, x: &[Tick], y: &[Tick]) {

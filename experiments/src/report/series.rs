@@ -60,6 +60,8 @@ pub struct Series {
     pub marker: Option<Marker>,
     /// By turns from a palette unless told.
     pub colour: Option<Colour>,
+    /// A line twice as wide and larger markers: what the plot is about, among others.
+    pub bold: bool,
 }
 
 impl Series {
@@ -164,17 +166,27 @@ impl Bars {
     /// # Panics
     /// If `bins` is 0.
     pub fn histogram(name: impl Into<String>, values: &[f64], bins: usize) -> Self {
-        assert!(bins > 0, "a histogram has bins");
         let finite = || values.iter().copied().filter(|v| v.is_finite());
         let lo = finite().fold(f64::INFINITY, f64::min);
         let hi = finite().fold(f64::NEG_INFINITY, f64::max);
-        let (lo, hi) = match () {
+        let range = match () {
             () if lo < hi => (lo, hi),
             () if lo == hi => (lo - 0.5, hi + 0.5),
             () => (0.0, 1.0),
         };
+        Bars::histogram_over(name, values, bins, range)
+    }
+
+    /// As [`histogram`](Self::histogram), between the ends of a range, so that the bins of several plots are the same; what lies
+    /// beyond an end counts in the bin there.
+    ///
+    /// # Panics
+    /// If `bins` is 0.
+    pub fn histogram_over(name: impl Into<String>, values: &[f64], bins: usize, (lo, hi): (f64, f64)) -> Self {
+        assert!(bins > 0, "a histogram has bins");
         let mut heights = vec![0.0; bins];
-        for v in finite() {
+        for v in values.iter().filter(|v| v.is_finite()) {
+            // Saturates at 0.
             let bin = ((v - lo) / (hi - lo) * bins as f64) as usize;
             heights[bin.min(bins - 1)] += 1.0; // the greatest value belongs to the last bin
         }
@@ -199,5 +211,7 @@ mod tests {
         assert_eq!(bars.heights, [1.0, 1.0, 1.0, 3.0]);
         assert_eq!(Bars::histogram("h", &[2.0], 1).heights, [1.0]);
         assert_eq!(Bars::histogram("h", &[], 2).heights, [0.0, 0.0]);
+        let over = Bars::histogram_over("h", &[-1.0, 0.25, 1.0, 1.0 + 1e-15, f64::NAN], 2, (0.0, 1.0));
+        assert_eq!((over.edges, over.heights), (vec![0.0, 0.5, 1.0], vec![2.0, 2.0]));
     }
 }

@@ -2,11 +2,11 @@
 
 use super::axis::{Axis, Scale};
 use super::canvas::{Canvas, Colour, Rect};
-use super::frame::{self, FRAME_COLOUR, FRAME_WIDTH};
+use super::frame::{self, FRAME_COLOUR, FRAME_WIDTH, Slot};
 
-/// A larger matrix is shown as at most so many blocks in each direction, about two pixels each: finer ones are
-/// lost in print.
-const MOST_BLOCKS: usize = 320;
+/// A larger matrix is shown as at most so many blocks in each direction, about a pixel of the image each: larger ones would
+/// make scattered entries look dense.
+const MOST_BLOCKS: usize = 640;
 
 /// Grey levels of the emptiest and the fullest block that hold an entry at all.
 const LIGHTEST: f64 = 150.0;
@@ -39,7 +39,7 @@ pub struct SparsityPlot {
 
 impl SparsityPlot {
     /// Counts the entries (row, column), numbered from 0, of a matrix with `dimension` rows. Cost: one pass; at
-    /// most 400 kB.
+    /// most 1.6 MB.
     ///
     /// # Panics
     /// If an entry is outside the matrix.
@@ -56,6 +56,11 @@ impl SparsityPlot {
         SparsityPlot { caption: caption.into(), dimension, block, blocks, counts }
     }
 
+    /// Rows, and columns, of the matrix that a dot stands for.
+    pub fn block(&self) -> usize {
+        self.block
+    }
+
     /// Columns from the left, or rows from the top.
     pub(super) fn axis(&self) -> Axis {
         Axis::over(Scale::Linear, (0.0, self.dimension.max(1) as f64))
@@ -69,8 +74,9 @@ impl SparsityPlot {
         frame::y_axis_room("row", &frame::y_ticks(self.axis(), height / 2.0))
     }
 
-    pub(super) fn draw(&self, canvas: &mut Canvas, room: Rect) {
+    pub(super) fn draw(&self, canvas: &mut Canvas, slot: &Slot) {
         // The largest square at the top of the room, in its middle.
+        let room = slot.frame;
         let side = room.width().min(room.height());
         let left = room.centre().0 - side / 2.0;
         let frame = Rect { left, top: room.top, right: left + side, bottom: room.top + side };
@@ -101,7 +107,7 @@ impl SparsityPlot {
             tick.at = 1.0 - tick.at; // rows count downward
         }
         frame::draw_y_axis(canvas, frame, frame::y_axis_room("row", &y), &y, "row");
-        frame::draw_title(canvas, frame, &self.caption, frame::title_room(&self.caption));
+        frame::draw_title(canvas, room, &self.caption, frame::title_room(&self.caption), slot.title_size);
     }
 }
 

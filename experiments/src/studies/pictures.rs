@@ -97,14 +97,13 @@ pub fn power(x: f64) -> String {
     }
 }
 
-/// Pictures of numbers on one scale in rows of `columns`, each `width`×`height` points, with a colour bar at the end of each
-/// full row.
-pub fn maps(columns: usize, size: (u32, u32), scale: &ColourScale, pictures: Vec<Picture>) -> Figure {
-    let ends_row = |i: usize| i % columns == columns - 1;
-    let with_bar = |(i, picture): (usize, Picture)| {
-        if ends_row(i) { picture.colour_bar(scale.clone()) } else { picture }
-    };
-    sheet(columns, size, pictures.into_iter().enumerate().map(with_bar).collect())
+/// The width of a bar of colours with its numbers, about.
+const BAR: u32 = 60;
+
+/// As [`sheet`], with the bar of colours that pictures of numbers share beside them.
+pub fn maps(columns: usize, size: (u32, u32), scale: ColourScale, pictures: Vec<Picture>) -> Figure {
+    let figure = sheet(columns, size, pictures);
+    Figure { width: figure.width + BAR, colour_bar: Some(scale), ..figure }
 }
 
 /// Numbers at the vertices of a mesh under names.
@@ -150,8 +149,7 @@ impl Maps<'_> {
             Picture::new(caption, view).surface(shaded).frame(&points)
         };
         let pictures: Vec<Picture> = captions.enumerate().map(picture).collect();
-        let figure = maps(IN_A_ROW.min(pictures.len()), (200, 190), &self.scale, pictures);
-        Figure { height: figure.height + Figure::TITLE_ROOM, ..figure.title(title) }
+        maps(IN_A_ROW.min(pictures.len()), (200, 190), self.scale.clone(), pictures).headed(title)
     }
 
     /// A PLY file with all as properties of the vertices, in the colours of `shown` of them.
@@ -210,8 +208,7 @@ pub fn interpolation(
         let positions = (0..points.len()).filter(|&v| is_met(v)).map(|v| points[v]).collect();
         limit = limit.points(Points { positions, radius: 1.1, colour: POINT });
     }
-    let figure = sheet(IN_A_ROW, (230, 240), vec![mesh, cage, limit]);
-    Ok(Figure { height: figure.height + Figure::TITLE_ROOM, ..figure.title(title) })
+    Ok(sheet(IN_A_ROW, (230, 240), vec![mesh, cage, limit]).headed(title))
 }
 
 #[cfg(test)]

@@ -274,6 +274,8 @@ fn maps(scheme: LocalScheme, valences: &[usize]) -> Result<Option<Figure>> {
         panels.push(LinePlot {
             title: format!("n = {n}, λ = {lambda:.4}: {verdict}"),
             equal_units: true,
+            // A map is one only up to similarity.
+            without_axes: true,
             series: vec![
                 Series::line("", joined(net.lines(step))).colour(palette(0)),
                 // Only the lines between sectors.
@@ -291,7 +293,7 @@ fn maps(scheme: LocalScheme, valences: &[usize]) -> Result<Option<Figure>> {
         Figure::row(panels).title(format!("Characteristic maps of {scheme}, sectors parted by orange lines"));
     figure.columns = columns;
     figure.width = 300 * columns as u32;
-    figure.height = 310 * lines as u32 + 24;
+    figure.height = 300 * lines as u32 + Figure::TITLE_ROOM;
     Ok(Some(figure))
 }
 
@@ -401,8 +403,13 @@ fn condition_plot(valences: &[usize], crossings: &[Vec<Crossing>]) -> Result<Fig
         Series::scatter("frequency 2", points(2)).marker(Marker::Square),
     ];
     series.retain(|s| !s.points.is_empty());
+    // A single one needs no legend.
+    let which = match &mut series[..] {
+        [only] => format!("an eigenvalue of {}", std::mem::take(&mut only.name)),
+        _ => "which eigenvalue".to_owned(),
+    };
     let first = LinePlot {
-        title: "Where it ceases to hold, and which eigenvalue meets λ_{1} there".into(),
+        title: format!("Where it ceases to hold: {which} meets λ_{{1}} there"),
         x_label: "valence n".into(),
         y_label: "α".into(),
         x_range: Some((valences[0] as f64 - 1.0, valences[valences.len() - 1] as f64 + 1.0)),

@@ -89,8 +89,11 @@ fn columns() -> Columns<'static, SweepRow> {
         .col(Column::number("max_error", 1e-2, 3).detail(), |r| r.errors.max)
 }
 
-/// Iterations above, rates below, over ω. Where a run does not converge, an arrowhead at the upper edge says so.
+/// Iterations above, rates below, over ω. Where a run does not converge, an arrowhead at the upper edge says so; all rates are
+/// shown.
 pub fn plot(title: String, methods: &[Method<'static>], sweep: &OmegaSweep) -> Figure {
+    let rates = sweep.rows.iter().flat_map(|r| [Some(r.predicted_rho), r.observed_rate]).flatten();
+    let largest = rates.filter(|rate| rate.is_finite()).fold(1.0, f64::max);
     let mut iterations = LinePlot {
         title,
         x_label: "ω".into(),
@@ -102,7 +105,7 @@ pub fn plot(title: String, methods: &[Method<'static>], sweep: &OmegaSweep) -> F
     let mut rates = LinePlot {
         x_label: "ω".into(),
         y_label: "factor per iteration".into(),
-        y_range: Some((0.0, 1.5)),
+        y_range: Some((0.0, 1.05 * largest)),
         horizontal_lines: vec![Rule::new(1.0, "")],
         ..LinePlot::default()
     };
@@ -137,4 +140,37 @@ pub fn plot(title: String, methods: &[Method<'static>], sweep: &OmegaSweep) -> F
         }
     }
     Figure::stack([iterations, rates])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::Panel;
+    use limitlab::analysis::spectrum::spectrum;
+    use limitlab::analysis::sweep::sweep;
+    use limitlab::assemble::LimitSystem;
+    use limitlab::mesh::{Surface, builtin};
+    use limitlab::schemes::Scheme;
+    use limitlab::solvers::Stop;
+
+    /// Every rate has its place in the picture, those of runs that diverge too, and every run that did not converge its sign.
+    #[test]
+    fn nothing_is_cut_without_a_sign() {
+        let surface = Surface::new(builtin::builtin("torus:8x6").unwrap()).unwrap();
+        let system = LimitSystem::new(&surface, Scheme::CatmullClark).unwrap();
+        let points = surface.positions();
+        let method = Method::Jacobi { omega: None };
+        let grids = [(method, vec![0.5, 1.0, 1.5, 2.0])];
+        let stop = Stop { tolerance: 1e-10, max_iterations: 200 };
+        let spectrum = spectrum(&system).unwrap();
+        let found = sweep((&system, &spectrum), (points, points), &grids, None, &stop, 0.0, &|_| {}).unwrap();
+        let figure = plot("a torus".into(), &[method], &found);
+        assert_eq!(figure.illegible().unwrap(), [""; 0]);
+        let [Panel::Lines(iterations), Panel::Lines(rates)] = &figure.panels[..] else { panic!("two plots") };
+        let (_, top) = rates.y_range.unwrap();
+        let largest = rates.series.iter().flat_map(|s| &s.points).map(|p| p.1).fold(0.0, f64::max);
+        assert!(largest > 1.5 && largest < top, "{largest} {top}");
+        let counts: Vec<f64> = iterations.series[0].points.iter().map(|p| p.1).collect();
+        assert!(counts[0].is_finite() && counts[3] == f64::INFINITY, "{counts:?}");
+    }
 }

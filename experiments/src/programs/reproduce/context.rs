@@ -395,6 +395,7 @@ impl Context {
     pub fn figure(&mut self, stem: &str, figure: &Figure) -> Result<()> {
         let shown = [Format::Png, Format::Svg].into_iter().find(|format| self.formats.contains(format));
         self.picture(stem, shown);
+        debug_assert_eq!(figure.illegible()?, [""; 0], "{stem}");
         figure.write(&self.folder(), stem, &self.formats, &self.provenance())
     }
 

@@ -65,9 +65,10 @@ fn run(context: &mut Context) -> Result<()> {
     context.figure(
         POPPING.id,
         &Figure::new(LinePlot {
-            title: "Volume of the surface over that of the mesh".into(),
+            title: "Unified √3 scheme: volume of the surface over that of the mesh".into(),
             x_label: "α (0 approximates, 1 interpolates)".into(),
             y_label: "volume ratio".into(),
+            x_range: Some((0.0, 2.0)),
             horizontal_lines: vec![Rule::new(1.0, "the mesh's own")],
             series,
             ..LinePlot::default()

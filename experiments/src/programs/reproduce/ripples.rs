@@ -82,10 +82,12 @@ fn run(context: &mut Context) -> Result<()> {
     let starts = runs.iter().filter_map(|(_, _, rows)| rows.first()).map(error);
     let largest = starts.fold(SMALLEST_SHOWN, f64::max);
     let panel = |y_label: &str, names: bool, value: &dyn Fn(&FairnessRow) -> f64| LinePlot {
-        x_label: "max error / L (iterations go to the left)".into(),
+        x_label: "largest distance from the points / L: iterations go to the left".into(),
         y_label: y_label.into(),
         x_scale: Scale::Log,
         x_range: Some((SMALLEST_SHOWN, 1.5 * largest)),
+        y_range: Some((0.0, 1.05 * runs.iter().flat_map(|(.., rows)| rows).map(value).fold(1.0, f64::max))),
+        arrows: if names { "goes on, level".into() } else { String::new() },
         series: runs
             .iter()
             .map(|(name, method, rows)| {
@@ -98,8 +100,8 @@ fn run(context: &mut Context) -> Result<()> {
     context.figure(
         RIPPLES.id,
         &Figure::stack([
-            panel("bending energy / least", true, &thin_plate),
-            panel("normals: mean angle (°)", false, &deviation),
+            panel("bending energy (fairest: 1)", true, &thin_plate),
+            panel("normals off the fairest (°)", false, &deviation),
         ])
         .title(format!("{}: ripples against accuracy, beside the fairest surface", context.caption(&subject))),
     )

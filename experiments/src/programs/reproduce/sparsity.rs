@@ -49,10 +49,12 @@ fn run(context: &mut Context) -> Result<()> {
         .table(PATTERNS.id, PATTERNS.title, &bandwidths);
     table.note("Bandwidth: the largest |i − j| of an entry, vertices numbered in the order.");
     context.table(table)?;
-    let (n, entries) = (system.len(), pattern.columns().len());
-    let title = format!("{} under catmull-clark: {n} rows, {entries} entries", context.caption(&subject));
+    let entries = pattern.columns().len();
+    let mesh = context.caption(&subject);
+    let dot = panels.first().map_or(1, SparsityPlot::block);
+    let title = format!("{mesh}, catmull-clark: {entries} entries, in dots of {dot}×{dot}");
     let mut figure = Figure::row(panels);
     figure.columns = 2;
-    (figure.width, figure.height) = (560, 600);
+    (figure.width, figure.height) = (600, 640);
     context.figure(PATTERNS.id, &figure.title(title))
 }

@@ -112,6 +112,7 @@ fn run(context: &mut Context) -> Result<()> {
             y_label: "max error / L".into(),
             x_range: Some((0.0, LONGEST)),
             y_scale: Scale::Log,
+            arrows: "goes on".into(),
             series,
             ..LinePlot::default()
         }),

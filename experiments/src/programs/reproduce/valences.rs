@@ -1,6 +1,6 @@
 //! Spectrum against valence: one extraordinary vertex, and the vertices that slow each method.
 
-use crate::report::series::Bars;
+use crate::report::series::{Band, Bars};
 use crate::report::{Column, Columns, Figure, LinePlot, Rule};
 use limitlab::Result;
 use limitlab::analysis::valence_study::{ValenceRow, regular_band, valence_study};
@@ -60,14 +60,18 @@ fn run(context: &mut Context) -> Result<()> {
 }
 
 fn histograms(scheme: Scheme, rows: &[ValenceRow]) -> Figure {
-    let band = regular_band(scheme);
+    let band = regular_band(scheme).a;
+    // One legend serves all.
+    let label = |valence: usize| if valence == DRAWN[0] { "of a regular mesh" } else { "" };
     let panels = rows.iter().filter(|r| DRAWN.contains(&r.valence)).map(|row| LinePlot {
         title: format!("valence {}, {} vertices", row.valence, row.vertices),
         x_label: "eigenvalue of A".into(),
         y_label: "eigenvalues".into(),
-        x_range: Some((0.0, 1.0)),
-        bars: vec![Bars::histogram("", &row.a, BINS)],
-        vertical_lines: vec![Rule::new(band.a.0, "least of a regular mesh")],
+        // Beyond the upper end of the band.
+        x_range: Some((0.0, 1.04)),
+        bars: vec![Bars::histogram_over("", &row.a, BINS, (0.0, 1.0))],
+        vertical_lines: [band.0, band.1].map(|end| Rule::new(end, "")).to_vec(),
+        bands: vec![Band { from: band.0, to: band.1, label: label(row.valence).into() }],
         ..LinePlot::default()
     });
     let mut figure = Figure::stack(panels);

@@ -1,10 +1,18 @@
-//! Memory bandwidth by STREAM's triad, and the heap that a run takes.
+//! The processor's name, memory bandwidth by STREAM's triad, and the heap that a run takes.
 
 use std::hint::black_box;
 use std::time::Instant;
 
 use peak_alloc::PeakAlloc;
 use rayon::prelude::*;
+use sysinfo::{CpuRefreshKind, RefreshKind, System};
+
+/// What the processor calls itself, as far as it does.
+pub fn processor() -> String {
+    let system = System::new_with_specifics(RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing()));
+    let brand = system.cpus().first().map(|cpu| cpu.brand().trim().to_owned()).unwrap_or_default();
+    if brand.is_empty() { "an unnamed processor".into() } else { brand }
+}
 
 /// Bytes per second of `a ← b + s·c` on arrays far larger than the caches, as STREAM counts them (24 bytes an
 /// entry; McCalpin 1995), the best of several runs.

@@ -137,8 +137,11 @@ fn measure(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     if !panels.is_empty() {
         let rows = panels.len() as u32 / 2;
         let mut figure = Figure::row(panels);
-        figure.title =
-            format!("Time from faces to control points, {threads} threads, triad {:.1} GB/s", bandwidth / 1e9);
+        let processor = machine::processor();
+        figure.title = format!(
+            "Time from faces to control points on {threads} threads of {processor}, STREAM triad {:.1} GB/s",
+            bandwidth / 1e9
+        );
         figure.columns = 2;
         (figure.width, figure.height) = (900, 40 + 230 * rows);
         figure.write(&arguments.out, "scaling", arguments.figures.formats(), provenance)?;
@@ -425,11 +428,13 @@ fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) ->
                 true if last < largest => format!("{} (to {last} vertices)", c.way.name()),
                 true => c.way.name(),
             };
-            Series::line(name, c.points.iter().copied()).style(look(c.way))
+            // What users run, with and without files, and the yardstick.
+            let bold = matches!(c.way, Way::Auto | Way::Files | Way::Plain);
+            Series { bold, ..Series::line(name, c.points.iter().copied()).style(look(c.way)) }
         })
         .collect();
     if bound.len() > 1 {
-        let name = if random { "least that Chebyshev must move, at the triad's speed" } else { "" };
+        let name = if random { "bandwidth bound: chebyshev's bytes at the triad's speed" } else { "" };
         series.push(Series::line(name, bound.iter().copied()).colour(Colour(110, 110, 110)).dash(Dash::DashDotted));
     }
     LinePlot {
@@ -439,6 +444,7 @@ fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) ->
         x_scale: Scale::Log,
         y_scale: Scale::Log,
         y_range: Some((30.0, 3e4)),
+        arrows: if random { "goes on above".into() } else { String::new() },
         series,
         ..LinePlot::default()
     }

@@ -9,7 +9,7 @@
 //! - [`camera`]: views by name or angle, orthographic or perspective, automatic framing;
 //! - [`colour`]: perceptually uniform maps, sequential and diverging, and their scales;
 //! - `scene`: checks the arrays, cuts polygons into triangles, projects; `raster`: which triangle is seen in a
-//!   pixel, hidden lines; `shade`: light and reflection lines; `panel`: caption and colour bar.
+//!   pixel, hidden lines; `shade`: light and reflection lines; `panel`: caption; `bar`: colour bar.
 //!
 //! ```
 //! use limitlab::mesh::builtin::builtin;
@@ -22,6 +22,7 @@
 //! # Ok::<(), limitlab::Error>(())
 //! ```
 
+pub(super) mod bar;
 pub mod camera;
 pub mod colour;
 mod panel;
@@ -102,6 +103,7 @@ pub struct ShadedMesh {
 pub const SURFACE_COLOUR: Colour = Colour(168, 190, 214);
 
 const EDGE_COLOUR: Colour = Colour(30, 30, 40);
+const MAP_EDGE_COLOUR: Colour = Colour(125, 125, 130);
 
 impl ShadedMesh {
     /// Faces with one normal each.
@@ -131,9 +133,11 @@ impl ShadedMesh {
         ShadedMesh { paint: None, ..ShadedMesh::flat(mesh).edges(width) }
     }
 
-    /// The same surface with dark edges of this width, in points.
+    /// The same surface with edges of this width, in points: dark ones, and grey ones on the colours of numbers, whose darkest
+    /// they are told from.
     pub fn edges(mut self, width: f64) -> Self {
-        self.edges = Some(Stroke { width, colour: EDGE_COLOUR });
+        let is_map = matches!(self.paint, Some(Paint::Scalars { .. }));
+        self.edges = Some(Stroke { width, colour: if is_map { MAP_EDGE_COLOUR } else { EDGE_COLOUR } });
         self
     }
 
@@ -184,13 +188,11 @@ pub struct Picture {
     pub caption: String,
     pub view: View,
     /// What the camera frames; everything in the picture unless told. With the same points, pictures of one size
-    /// show the same scale and place.
+    /// show the same scale and place. A picture that something reaches out of has an outline.
     pub framed: Option<Vec<DVec3>>,
     pub surfaces: Vec<ShadedMesh>,
     pub points: Vec<Points>,
     pub vectors: Vec<Vectors>,
-    /// Drawn beside the picture.
-    pub colour_bar: Option<ColourScale>,
 }
 
 impl Picture {
@@ -203,7 +205,6 @@ impl Picture {
             surfaces: Vec::new(),
             points: Vec::new(),
             vectors: Vec::new(),
-            colour_bar: None,
         }
     }
 
@@ -228,12 +229,6 @@ impl Picture {
     /// The same picture framing these points.
     pub fn frame(mut self, points: &[DVec3]) -> Self {
         self.framed = Some(points.to_vec());
-        self
-    }
-
-    /// The same picture with a colour bar beside it.
-    pub fn colour_bar(mut self, scale: ColourScale) -> Self {
-        self.colour_bar = Some(scale);
         self
     }
 }

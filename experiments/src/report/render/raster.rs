@@ -20,7 +20,7 @@ use crate::report::png::Image;
 /// Rows of a band.
 const BAND: usize = 64;
 
-const BACKGROUND: u8 = 255;
+pub(super) const BACKGROUND: u8 = 255;
 
 /// Nothing is seen here.
 const NOTHING: u32 = u32::MAX;

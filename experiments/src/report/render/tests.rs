@@ -280,8 +280,8 @@ fn the_colour_bar_ends_with_the_ends_of_the_map() {
         (ColourScale::logarithmic("error", (1e-6, 1.0)), [[68, 1, 84], [253, 231, 37]]),
         (ColourScale::signed("mode", 2.0), [[59, 76, 192], [180, 4, 38]]),
     ] {
-        let picture = picture().surface(ShadedMesh::flat(square(0.0))).colour_bar(scale);
-        let image = Figure::row([picture]).render().unwrap();
+        let picture = picture().surface(ShadedMesh::flat(square(0.0)));
+        let image = Figure { colour_bar: Some(scale), ..Figure::row([picture]) }.render().unwrap();
         // Down the column with the most colours of the map's upper end.
         let near = |pixel: [u8; 3], wanted: [u8; 3]| pixel.iter().zip(wanted).all(|(&a, b)| a.abs_diff(b) <= 6);
         let column =
@@ -292,6 +292,32 @@ fn the_colour_bar_ends_with_the_ends_of_the_map() {
         assert!(!bottom.is_empty() && !top.is_empty());
         assert!(top.iter().max() < bottom.iter().min(), "the greatest number is on top");
     }
+}
+
+#[test]
+fn a_picture_that_something_reaches_out_of_has_an_outline() {
+    // Grey beside the middle of the left edge of the frame.
+    let is_outlined = |framed: &[DVec3]| {
+        let cube = builtin("cube").unwrap();
+        let picture = Picture::new("", View::named("front").unwrap()).surface(ShadedMesh::flat(cube));
+        let image = Figure::row([picture.frame(framed)]).render().unwrap();
+        let middle = image.height / 2;
+        let edge = (0..image.width).map(|x| image.pixel(x, middle)).find(|pixel| *pixel != WHITE);
+        edge.is_some_and(|[r, g, b]| r == g && g == b)
+    };
+    let all = builtin("cube").unwrap().positions;
+    assert!(!is_outlined(&all));
+    assert!(is_outlined(&all.iter().map(|p| 0.5 * *p).collect::<Vec<_>>()));
+}
+
+#[test]
+fn edges_are_told_from_the_darkest_colour_of_a_map() {
+    let brightness = |Colour(r, g, b): Colour| u32::from(r) + u32::from(g) + u32::from(b);
+    let cube = ShadedMesh::flat(builtin("cube").unwrap());
+    let map = cube.clone().scalars(vec![0.0; 8], ColourScale::linear("", (0.0, 1.0)));
+    let edge = |surface: ShadedMesh| brightness(surface.edges(1.0).edges.unwrap().colour);
+    assert!(edge(map) > brightness(ColourMap::Sequential.colour(0.0)) + 200);
+    assert!(edge(cube) < brightness(SURFACE_COLOUR) - 200);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::report::{Picture, Points};
+use crate::report::{Finish, Picture, Points};
 use limitlab::Result;
 use limitlab::interpolate::{Options, interpolate};
 use limitlab::mesh::features::{SHARP, Tags};
@@ -17,7 +17,8 @@ pub fn frozen(album: &mut Album) -> Result<()> {
     let subject = Subject::built_in("torus:10x8")?;
     let points = subject.surface.positions();
     let tags = Tags { creases: closed_loop(torus_loop(10, 8, 2), SHARP), ..Tags::default() };
-    let mut panels = Vec::new();
+    let (mut panels, mut below) = (Vec::new(), Vec::new());
+    let reflections = ["(d) reflections of (a)", "(e) of (b)", "(f) of (c)"];
     let mut gap = 0.0;
     for crease in Crease::ALL {
         let control = crease.control(&subject.surface, &tags)?;
@@ -29,12 +30,15 @@ pub fn frozen(album: &mut Album) -> Result<()> {
             Crease::Solved => "(c) solved for".into(),
         };
         let crease: Vec<DVec3> = torus_loop(10, 8, 2).map(|v| points[v as usize]).collect();
-        let picture = Picture::new(caption, view(DVec3::Z, 15.0, 40.0))
-            .surface(limit_surface(Refinement::CatmullClark, &control)?)
-            .points(Points { positions: crease, radius: 1.3, colour: POINT })
-            .frame(points);
-        panels.push(picture);
+        let surface = limit_surface(Refinement::CatmullClark, &control)?;
+        let picture = Picture::new(caption, view(DVec3::Z, 15.0, 40.0)).frame(points);
+        below.push(Picture {
+            caption: reflections[below.len()].into(),
+            ..picture.clone().surface(surface.clone().finish(Finish::ReflectionLines))
+        });
+        panels.push(picture.surface(surface).points(Points { positions: crease, radius: 1.3, colour: POINT }));
     }
+    panels.append(&mut below);
     let line = Line {
         name: "thall-creases",
         shows: "Thall §2.7: a crease of vertices frozen at the start, resting or averaged along it, and one solved for",

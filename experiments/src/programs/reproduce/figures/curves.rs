@@ -51,6 +51,7 @@ pub fn relation(album: &mut Album) -> Result<()> {
     let curve = |alpha: f64| refine_n(p, &[alpha; 5], Ends::Open, LEVELS).0;
     let plot = LinePlot {
         equal_units: true,
+        without_axes: true,
         series: vec![
             Series::line("control points P_{i}^{0}", flat(p)).colour(POLYGON).marker(Marker::Circle),
             Series::scatter("midpoints P_{i}^{1}", flat(&middle)).marker(Marker::Square).colour(palette(0)),
@@ -118,6 +119,7 @@ pub fn samples(album: &mut Album) -> Result<()> {
     ];
     let panels = panels.map(|panel| LinePlot {
         equal_units: true,
+        without_axes: true,
         x_range: Some((-0.5, 4.9)),
         y_range: Some((-1.3, 2.9)),
         ..panel
@@ -198,11 +200,18 @@ pub fn stencils(album: &mut Album) -> Result<()> {
         let face = mesh.faces.face(0);
         let center = face.iter().map(|&v| at(v)).sum::<DVec3>() / 3.0;
         series.push(Series::scatter("the new vertex", flat(&[center])).marker(Marker::Plus).colour(Colour(0, 0, 0)));
-        panels.push(LinePlot { title: title.into(), equal_units: true, series, ..LinePlot::default() });
+        panels.push(LinePlot {
+            title: title.into(),
+            equal_units: true,
+            without_axes: true,
+            series,
+            ..LinePlot::default()
+        });
         last = Some(subject);
     }
     let Some(subject) = last else { return Ok(()) };
-    let figure = Figure { width: 640, height: 240, ..Figure::row(panels) };
+    let figure = Figure { width: 620, height: 200, ..Figure::row(panels) }
+        .headed("Weights of a new vertex, times the number of vertices that have them");
     let shows = "Lin-Luo Fig. 4: the weights of a new vertex of the interpolatory √3 scheme, with how many vertices have \
                  each";
     album.add(&line("lin-luo-4", shows, subject.points()), figure)

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use crate::report::{Colour, Paint, Picture, Points, ShadedMesh, Vectors, View};
+use crate::report::{Colour, ColourScale, Paint, Picture, Points, ShadedMesh, Vectors, View};
 use limitlab::Result;
 use limitlab::interpolate::nasri;
 use limitlab::interpolate::zheng_cai::{Constraints, PhaseOne, TwoPhase, interpolate};
@@ -12,7 +12,7 @@ use limitlab::schemes::Refinement;
 use limitlab::solvers::{Method, Stop};
 
 use super::stand_ins::StandIn;
-use super::{Album, CONTROL, FACES, GIVEN, Line, POINT, cage, plain, sheet, view};
+use super::{Album, CONTROL, FACES, FINEST_EDGE, GIVEN, Line, POINT, cage, maps, plain, sheet, view};
 use crate::programs::reproduce::context::Subject;
 use crate::programs::reproduce::corpus;
 
@@ -83,24 +83,34 @@ pub fn against_nasri(album: &mut Album) -> Result<()> {
     let stop = Stop { tolerance: 1e-10 * subject.surface.diagonal(), max_iterations: 10 };
     let solution = nasri::control_points(&subject.surface, None, Method::Lu, &stop)?;
     let nasri = subject.surface.with_positions(solution.points);
+    // On triangles the two meshes are iterates of one system.
+    let auxiliary = found.auxiliary.surface.positions();
+    let size = subject.surface.diagonal();
+    let distances: Vec<f64> = auxiliary.iter().zip(nasri.positions()).map(|(a, b)| a.distance(*b) / size).collect();
+    // No less than rounding.
+    let top = 10f64.powf(distances.iter().copied().fold(1e-15, f64::max).log10().ceil());
+    let scale = ColourScale::logarithmic("(f): distance / L", (1e-3 * top, top));
+    let apart = ShadedMesh::smooth(nasri.mesh().clone()).scalars(distances, scale.clone()).edges(FINEST_EDGE);
     let shown = vec![
         ("(a) input", cage(subject.surface.mesh(), GIVEN)),
         ("(b) auxiliary mesh", cage(found.auxiliary.surface.mesh(), CONTROL)),
         ("(c) its surface", surface(&found.first.surface)?),
         ("(d) Nasri's mesh", cage(nasri.mesh(), CONTROL)),
         ("(e) its surface", surface(&Refinement::DooSabin.refined(&nasri)?)?),
+        ("(f) from (b) to (d)", apart),
     ];
     let view = view(DVec3::Y, 25.0, 20.0);
     let line = Line {
         name: "zheng-cai-4",
         shows: "Zheng-Cai Fig. 4: their method (b, c; iterations are theirs) and Nasri's (d, e); on triangles both \
-                systems are the same",
+                systems are the same, and what is left between (b) and (d) is the tolerance of the iteration (f)",
         subject: subject.points(),
         iterations: Some(found.auxiliary.updates.len()),
         error: Some(largest_error(&subject, &found, |_| true)),
     };
     let panels = panels(view, subject.surface.positions(), shown);
-    album.add(&line, sheet(3, (135, 120), panels))
+    let title = "On triangles Zheng and Cai's system (b, c) is Nasri's (d, e)";
+    album.add(&line, maps(3, (150, 130), scale, panels).headed(title))
 }
 
 /// Fig. 5: a large mesh.
@@ -251,7 +261,7 @@ pub fn scaled_faces(album: &mut Album) -> Result<()> {
     let mut last = tagged.solve(false, 1.0)?;
     let mut pictures = Vec::new();
     let mut framed = Vec::new();
-    for (caption, handle) in [("s = 1", 1.0), ("s = 0.4", 0.4), ("s = 2.5", 2.5)] {
+    for (caption, handle) in [("(a) s = 1", 1.0), ("(b) s = 0.4", 0.4), ("(c) s = 2.5", 2.5)] {
         last = tagged.solve(false, handle)?;
         let face = last.first.first_vertex_face + tagged.tips[1];
         let corners = last.first.surface.faces().face(face);

@@ -7,7 +7,7 @@ use limitlab::Result;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::assemble::LimitSystem;
 use limitlab::error::Error;
-use limitlab::mesh::builtin;
+use limitlab::mesh::{Surface, builtin};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, System};
 
@@ -23,29 +23,35 @@ pub fn error_maps(album: &mut Album) -> Result<()> {
     let subject = album.subject(&corpus::HORSE, StandIn::Knot("tri-torus:39x6"))?;
     let system = subject.system(Scheme::Loop)?;
     let size = subject.surface.diagonal();
-    let scale = ColourScale::logarithmic("error / L", (1e-6, 1e-1));
     let view = view(DVec3::Y, 30.0, 12.0);
-    let mut panels = Vec::new();
-    let mut last = 0.0;
-    for k in SHOWN {
-        let (iterate, error) = control(&subject, &system, Method::Pia, k);
-        last = error;
+    let iterates = SHOWN.map(|k| control(&subject, &system, Method::Pia, k));
+    let [first, .., last] = iterates.each_ref().map(|(_, error)| error / size);
+    let scale = ColourScale::logarithmic("error / L", decades(last, first));
+    let picture = |(k, (iterate, error)): (usize, &(Surface, f64))| {
         let errors = (0..system.len())
             .map(|v| (subject.surface.positions()[v] - system.row(v, iterate.positions())).length() / size)
             .collect();
         let surface =
             ShadedMesh::smooth(subject.surface.mesh().clone()).scalars(errors, scale.clone()).edges(FINEST_EDGE);
-        panels.push(Picture::new(format!("k = {k}: at most {}", power(error / size)), view).surface(surface));
-    }
+        Picture::new(format!("k = {k}: at most {}", power(error / size)), view).surface(surface)
+    };
+    let panels = SHOWN.into_iter().zip(&iterates).map(picture).collect();
     let line = Line {
         name: "error-maps",
         shows: "PIA, Loop: ‖p_i − (A v)_i‖ at every vertex after 0, 1, 2, 5, 10, 20 updates, L the bounding box's \
                 diagonal",
         subject: subject.points(),
         iterations: SHOWN.last().copied(),
-        error: Some(last),
+        error: Some(last * size),
     };
-    album.add(&line, maps(3, (150, 140), &scale, panels))
+    let title = "PIA, Loop: distance of every vertex from its limit point after k updates";
+    album.add(&line, maps(3, (150, 140), scale, panels).headed(title))
+}
+
+/// The powers of ten about the largest errors of the last and the first map, a decade lower: most errors are smaller than the
+/// largest.
+fn decades(last: f64, first: f64) -> (f64, f64) {
+    (10f64.powf(last.log10().floor() - 1.0), 10f64.powf(first.log10().ceil()))
 }
 
 /// The eigenvectors of Catmull-Clark's matrix that PIA is slowest to remove.
@@ -62,7 +68,8 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
         // Where the mode is; elsewhere there is nothing to see.
         let framed: Vec<DVec3> =
             (subject.surface.positions().iter().zip(&mode)).filter(|(_, x)| x.abs() > 0.01).map(|(&p, _)| p).collect();
-        let caption = format!("{}: λ = {}", subject.name, significant(lambda));
+        let part = if framed.len() < system.len() { ", part" } else { "" };
+        let caption = format!("{}{part}: λ = {}", subject.name, significant(lambda));
         let mut picture = Picture::new(caption, view)
             .surface(ShadedMesh::flat(subject.surface.mesh().clone()).scalars(mode, scale.clone()).edges(FINE_EDGE));
         picture.framed = Some(framed);
@@ -76,7 +83,10 @@ pub fn slow_modes(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, maps(2, (180, 150), &scale, panels))
+    album.add(
+        &line,
+        maps(2, (190, 160), scale, panels).headed("Catmull-Clark: eigenvectors of the least eigenvalue of A"),
+    )
 }
 
 /// Steps of the power iteration; it ends before where it has converged.
@@ -117,4 +127,20 @@ fn slowest(system: &LimitSystem, name: &str) -> Result<(f64, Vec<f64>)> {
 /// Three digits; rounding is 0.
 fn significant(x: f64) -> String {
     if x.abs() < 1e-9 { "0".into() } else { format!("{x:.4}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scale_of_errors_has_room_for_the_last_map() {
+        for ((last, first), exponents) in
+            [((5.1e-5, 3.8e-2), [-6, -1]), ((3.2e-8, 2.2e-2), [-9, -1]), ((1e-3, 1e-1), [-4, -1])]
+        {
+            let (least, largest) = decades(last, first);
+            let [a, b] = exponents.map(|k| 10f64.powi(k));
+            assert!((least / a - 1.0).abs() < 1e-12 && (largest / b - 1.0).abs() < 1e-12, "{least} {largest}");
+        }
+    }
 }

@@ -73,7 +73,8 @@ const PRINTED: [Printed; 5] = [
     },
     Printed {
         name: "pia-6-boy",
-        caption: "PIA Fig. 6 (boy, holes filled): mesh and Loop surface, 6 iterations; the head alone",
+        caption: "PIA Fig. 6 (boy, holes filled): mesh and Loop surface, 6 iterations; the head alone. At the slits in the \
+                  temple and at the spot on the cheek the model is folded, by 115° and more",
         model: corpus::BOY_FILLED,
         stand_in: StandIn::Bumps("icosphere:5"),
         scheme: Scheme::Loop,
@@ -82,7 +83,7 @@ const PRINTED: [Printed; 5] = [
         azimuth: 60.0,
         elevation: 12.0,
         shown: 0.22,
-        size: (165, 160),
+        size: (200, 185),
     },
     Printed {
         name: "pia-7-mushroom",
@@ -111,7 +112,7 @@ pub fn pia(album: &mut Album) -> Result<()> {
         let heights = || subject.surface.positions().iter().map(height);
         let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
         let shown = if album.context.real() { printed.shown } else { 1.0 };
-        let what = if shown < 1.0 { "top of the " } else { "" };
+        let what = if shown < 1.0 { "head of the " } else { "" };
         let framed: Vec<DVec3> = (surface.mesh.positions.iter())
             .chain(subject.surface.positions())
             .filter(|p| height(p) >= high - shown * (high - low))
@@ -171,7 +172,7 @@ pub fn thall_series(album: &mut Album) -> Result<()> {
         iterations: SERIES.last().copied(),
         error: Some(last),
     };
-    album.add(&line, sheet(3, (130, 136), panels))
+    album.add(&line, sheet(3, (150, 150), panels))
 }
 
 /// The same, moving.
@@ -179,7 +180,10 @@ pub fn thall_animation(album: &mut Album) -> Result<()> {
     let subject = album.subject(&corpus::SPOT_COARSE, StandIn::Bumps("quad-sphere:2"))?;
     let iterates: Vec<usize> = (0..=6).collect();
     let (panels, last) = thall_pictures(&subject, &iterates)?;
-    let frames: Vec<Figure> = (panels.into_iter()).map(|panel| sheet(1, (94, 104), vec![panel])).collect();
+    // A viewer that shows the first frame alone says so too.
+    let title = format!("animation of {} iterates", panels.len());
+    let frame = |panel| sheet(1, (180, 170), vec![panel]).headed(title.as_str());
+    let frames: Vec<Figure> = panels.into_iter().map(frame).collect();
     let line = Line {
         name: "thall-animation",
         shows: "Thall's iteration, ω = ½, as an animated PNG: iterates 0 to 6 and the given points",

@@ -133,7 +133,12 @@ impl<'a> Album<'a> {
         if !self.stand_ins.iter().any(|stand_in| stand_in == name) {
             return figure;
         }
-        Figure { height: figure.height + Figure::TITLE_ROOM, ..figure.title(format!("stand-in: {name}")) }
+        let note = format!("stand-in: {name}");
+        if figure.title.is_empty() {
+            return figure.headed(note);
+        }
+        let title = format!("{} ({note})", figure.title);
+        figure.title(title)
     }
 
     /// As [`add`](Self::add), figures one after the other.

@@ -2,14 +2,16 @@
 
 use glam::DVec3;
 
-use crate::report::{Finish, Picture, Points, ShadedMesh};
+use crate::report::render::Projection;
+use crate::report::{ColourScale, Finish, Picture, Points, ShadedMesh, View};
+use crate::studies::pictures::peak;
 use limitlab::Result;
 use limitlab::interpolate::lin_luo::surface::refine_n;
 use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::Refinement;
 
 use super::stand_ins::StandIn;
-use super::{Album, FACES, GIVEN, Line, POINT, cage, sheet, view};
+use super::{Album, FACES, GIVEN, Line, POINT, cage, maps, sheet, view};
 use crate::programs::reproduce::corpus;
 
 /// The mesh after `steps` of the unified scheme.
@@ -30,7 +32,11 @@ fn steps(mesh: &Mesh) -> usize {
     steps
 }
 
-/// Fig. 5: modified Butterfly and the interpolatory √3 scheme, and beside them Labsik and Greiner's.
+/// The part of the diagonal about the place where two surfaces are farthest apart that is shown close.
+const NEAR: f64 = 0.2;
+
+/// Fig. 5: modified Butterfly and the interpolatory √3 scheme, and beside them Labsik and Greiner's; where the last two
+/// differ, and how smooth all three are.
 pub fn against_butterfly(album: &mut Album) -> Result<()> {
     let subject = album.subject(&corpus::BOB_TRIANGLES, StandIn::Plain("tri-torus:12x7"))?;
     let mesh = subject.surface.mesh();
@@ -38,23 +44,40 @@ pub fn against_butterfly(album: &mut Album) -> Result<()> {
     let butterfly = ShadedMesh::smooth(Refinement::Butterfly.refine_n(&subject.surface, 4)?);
     let ours = shown(&subject.surface, &vec![1.0; mesh.len()])?;
     let earlier = ShadedMesh::smooth(Refinement::LabsikGreiner.refine_n(&subject.surface, steps(mesh))?);
-    let panels = [
+    // Both split the triangles in the same way, so that each vertex has its counterpart.
+    let size = subject.surface.diagonal();
+    let pairs = ours.mesh.positions.iter().zip(&earlier.mesh.positions);
+    let distances: Vec<f64> = pairs.map(|(a, b)| 100.0 * a.distance(*b) / size).collect();
+    let largest = distances.iter().copied().fold(0.0, f64::max);
+    let scale = ColourScale::linear("(e): distance, % of L", (0.0, largest));
+    // Lines of sight are parallel: what is not framed may lie behind an eye.
+    let beside = View { projection: Projection::Orthographic, ..view };
+    let middle = ours.mesh.positions[peak(&distances)];
+    let near: Vec<DVec3> = mesh.positions.iter().copied().filter(|p| p.distance(middle) < NEAR * size).collect();
+    let close = |(caption, surface): (&str, &ShadedMesh)| {
+        let surface = surface.clone().finish(Finish::ReflectionLines);
+        Picture::new(caption, beside).surface(surface).frame(&near)
+    };
+    let below = [("(f) lines on (b)", &butterfly), ("(g) on (c)", &ours), ("(h) on (d)", &earlier)].map(close);
+    let apart = ours.clone().scalars(distances, scale.clone());
+    let above = [
         ("(a) the mesh", cage(mesh, GIVEN)),
         ("(b) modified Butterfly", butterfly),
         ("(c) interpolatory √3", ours),
         ("(d) Labsik-Greiner √3", earlier),
+        ("(e) from (c) to (d)", apart),
     ];
-    let panels =
-        panels.map(|(caption, surface)| Picture::new(caption, view).surface(surface).frame(&mesh.positions)).to_vec();
+    let whole = above.map(|(caption, surface)| Picture::new(caption, view).surface(surface).frame(&mesh.positions));
+    let panels = whole.into_iter().chain(below).collect();
     let line = Line {
         name: "lin-luo-5",
         shows: "Lin-Luo Fig. 5: a mesh with a hole by modified Butterfly and by the interpolatory √3 scheme (α = 1), with \
-                Labsik and Greiner's beside",
+                Labsik and Greiner's beside; below, how far the last two are apart, and the reflection lines of all three where that is farthest",
         subject: subject.points(),
         iterations: None,
         error: None,
     };
-    album.add(&line, sheet(4, (135, 131), panels))
+    album.add(&line, maps(4, (150, 135), scale, panels))
 }
 
 /// Fig. 6: a bunny under the interpolatory √3 scheme, step by step.
@@ -65,9 +88,8 @@ pub fn bunny(album: &mut Album) -> Result<()> {
     let view = view(DVec3::Y, 0.0, 10.0);
     let panels = vec![
         Picture::new("(a) the mesh", view).surface(cage(mesh, GIVEN)),
-        Picture::new("(b) one step, √3, α = 1", view)
-            .surface(cage(&refined(&subject.surface, &alpha, 1)?, super::CONTROL)),
-        Picture::new("(c) four steps or more", view).surface(shown(&subject.surface, &alpha)?),
+        Picture::new("(b) one step", view).surface(cage(&refined(&subject.surface, &alpha, 1)?, super::CONTROL)),
+        Picture::new(format!("(c) {} steps", steps(mesh)), view).surface(shown(&subject.surface, &alpha)?),
     ];
     let line = Line {
         name: "lin-luo-6",
@@ -76,7 +98,7 @@ pub fn bunny(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, sheet(3, (135, 138), panels))
+    album.add(&line, sheet(3, (150, 145), panels).headed("Interpolatory √3 scheme, α = 1"))
 }
 
 /// Fig. 7: the surfaces for several α, and two through some vertices only.
@@ -112,7 +134,7 @@ pub fn parameters(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, sheet(4, (115, 115), panels))
+    album.add(&line, sheet(4, (130, 120), panels).headed("Unified √3 scheme; red: α = 1 there, 0 elsewhere"))
 }
 
 /// How smooth the surfaces are: reflection lines for α = 0, ½, 1.
@@ -132,5 +154,5 @@ pub fn reflections(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, sheet(3, (170, 165), panels))
+    album.add(&line, sheet(3, (170, 165), panels).headed("Unified √3 scheme: reflection lines"))
 }
