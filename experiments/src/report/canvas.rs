@@ -455,7 +455,7 @@ mod tests {
         };
         // Seven points high, subscripts beside; an upright one ends where the level one begins.
         let high = 10.0 * CAP_HEIGHT;
-        assert_eq!(page(&[("λ_{1} x^{2}", (20.0, 20.0), false), ("07", (20.0, 20.0 + high), false)]), [""; 0]);
+        assert_eq!(page(&[("λ_{1} x^{2}", (20.0, 20.0), false), ("07", (20.0, 22.0 + high), false)]), [""; 0]);
         assert_eq!(page(&[("07", (20.0, 40.0), true), ("07", (20.0, 40.0), false)]), [""; 0]);
         assert_eq!(page(&[("a", (20.0, 20.0), false), ("b", (22.0, 24.0), false)]), ["\"b\" covers \"a\""]);
         assert_eq!(page(&[("w…e", (20.0, 20.0), false)]), ["\"w…e\" is cut"]);

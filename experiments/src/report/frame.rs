@@ -123,7 +123,8 @@ pub(super) fn title_size(title: &str, width: f64) -> f64 {
 /// The title at the top of the `room` above the frame, no larger than `size`.
 pub(super) fn draw_title(canvas: &mut Canvas, frame: Rect, title: &str, room: f64, size: f64) {
     let place = (frame.centre().0, frame.top - room + 2.0 + TITLE_SIZE);
-    draw_fitted(canvas, title, place, size, frame.width() - TITLE_GAP);
+    let title = cut(title, size, frame.width() - TITLE_GAP);
+    canvas.text(&title, place, size, Anchor::Middle, false, TEXT_COLOUR);
 }
 
 /// Text about `place` that is no wider than `width`: smaller, or with an ellipsis in its middle, where it has to be.
@@ -135,18 +136,23 @@ pub(super) fn draw_fitted(canvas: &mut Canvas, text: &str, place: Point, size: f
 fn fitted(text: &str, size: f64, width: f64) -> (String, f64) {
     let full = text_width(text, size).max(1.0);
     let size = size * (width / full).clamp(LEAST_TITLE, 1.0);
+    (cut(text, size, width), size)
+}
+
+/// The text of this size, without its middle where it is wider than `width`.
+fn cut(text: &str, size: f64, width: f64) -> String {
     let letters: Vec<char> = text.chars().collect();
     // The start says less than the end, where the name of a file and what was done to it are.
-    let cut = |kept: usize| -> String {
+    let without = |kept: usize| -> String {
         let head = kept / 3;
         letters[..head].iter().chain(&['…']).chain(&letters[letters.len() - (kept - head)..]).collect()
     };
     let fits = |text: &str| text_width(text, size) <= width * (1.0 + 1e-9);
     if fits(text) {
-        return (text.to_owned(), size);
+        return text.to_owned();
     }
-    let kept = (0..letters.len()).rev().find(|&kept| fits(&cut(kept))).unwrap_or(0);
-    (cut(kept), size)
+    let kept = (0..letters.len()).rev().find(|&kept| fits(&without(kept))).unwrap_or(0);
+    without(kept)
 }
 
 #[cfg(test)]

@@ -416,7 +416,9 @@ fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) ->
         Way::Colours => of(GAUSS_SEIDEL, Dash::Dotted, Marker::Diamond),
         Way::Stored(method) => of(method, Dash::Dashed, style::of(method, "").marker),
     };
-    let largest = curves.iter().flat_map(|c| &c.points).map(|p| p.0).fold(0.0, f64::max);
+    let points = || curves.iter().flat_map(|c| &c.points);
+    let largest = points().map(|p| p.0).fold(0.0, f64::max);
+    let slowest = points().map(|p| p.1).fold(2.5e4, f64::max);
     let mut series: Vec<Series> = curves
         .iter()
         .filter(|c| c.random == random)
@@ -443,8 +445,8 @@ fn plot(scheme: Scheme, random: bool, curves: &[Curve], bound: &[(f64, f64)]) ->
         y_label: "nanoseconds a vertex".into(),
         x_scale: Scale::Log,
         y_scale: Scale::Log,
-        y_range: Some((30.0, 3e4)),
-        arrows: if random { "goes on above".into() } else { String::new() },
+        // The same in both orders.
+        y_range: Some((30.0, 1.2 * slowest)),
         series,
         ..LinePlot::default()
     }

@@ -154,9 +154,14 @@ fn thall_pictures(subject: &Subject, iterates: &[usize]) -> Result<(Vec<Picture>
         let caption = format!("k = {k}: error {:.2} %", 100.0 * error / size);
         let picture = Picture::new(caption, view)
             .surface(limit_surface(Refinement::CatmullClark, &cage_mesh)?)
-            .points(Points { positions: subject.surface.positions().to_vec(), radius: 0.9, colour: POINT })
-            .frame(subject.surface.positions());
+            .points(Points { positions: subject.surface.positions().to_vec(), radius: 0.9, colour: POINT });
         panels.push(picture);
+    }
+    // Surfaces swell beyond the points.
+    let all = panels.iter().flat_map(|panel| panel.surfaces.iter().flat_map(|surface| &surface.mesh.positions));
+    let framed: Vec<DVec3> = subject.surface.positions().iter().chain(all).copied().collect();
+    for panel in &mut panels {
+        panel.framed = Some(framed.clone());
     }
     Ok((panels, last))
 }
@@ -181,8 +186,10 @@ pub fn thall_animation(album: &mut Album) -> Result<()> {
     let iterates: Vec<usize> = (0..=6).collect();
     let (panels, last) = thall_pictures(&subject, &iterates)?;
     // A viewer that shows the first frame alone says so too.
-    let title = format!("animation of {} iterates", panels.len());
-    let frame = |panel| sheet(1, (180, 170), vec![panel]).headed(title.as_str());
+    let frame = |panel: Picture| {
+        let caption = format!("animation, {}", panel.caption);
+        sheet(1, (190, 175), vec![Picture { caption, ..panel }])
+    };
     let frames: Vec<Figure> = panels.into_iter().map(frame).collect();
     let line = Line {
         name: "thall-animation",

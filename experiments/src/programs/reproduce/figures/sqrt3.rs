@@ -33,7 +33,7 @@ fn steps(mesh: &Mesh) -> usize {
 }
 
 /// The part of the diagonal about the place where two surfaces are farthest apart that is shown close.
-const NEAR: f64 = 0.2;
+const NEAR: f64 = 0.12;
 
 /// Fig. 5: modified Butterfly and the interpolatory √3 scheme, and beside them Labsik and Greiner's; where the last two
 /// differ, and how smooth all three are.
