@@ -421,3 +421,24 @@ fn condition_plot(valences: &[usize], crossings: &[Vec<Crossing>]) -> Result<Fig
     figure.height = 520;
     Ok(figure)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::Panel;
+
+    #[test]
+    fn figures_can_be_read_and_have_no_legend_for_one_series() {
+        let scheme = LocalScheme::Sqrt3 { alpha: 0.0 };
+        let valences = [3, 4, 5, 6];
+        let sampled = sampled(scheme, &valences).unwrap();
+        let figures = figures(scheme, &valences, sampled.as_ref()).unwrap();
+        assert_eq!(figures.len(), 2);
+        for (stem, figure) in &figures {
+            assert_eq!(figure.illegible().unwrap(), [""; 0], "{stem}");
+        }
+        let Panel::Lines(crossings) = &figures[1].1.panels[1] else { panic!("a plot") };
+        let names: Vec<&str> = crossings.series.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!((names, crossings.title.contains("an eigenvalue of frequency 0 meets")), (vec![""], true));
+    }
+}

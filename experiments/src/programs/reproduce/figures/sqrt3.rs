@@ -58,7 +58,7 @@ pub fn against_butterfly(album: &mut Album) -> Result<()> {
         let surface = surface.clone().finish(Finish::ReflectionLines);
         Picture::new(caption, beside).surface(surface).frame(&near)
     };
-    let below = [("(f) lines on (b)", &butterfly), ("(g) on (c)", &ours), ("(h) on (d)", &earlier)].map(close);
+    let below = [("(f) reflections on (b)", &butterfly), ("(g) on (c)", &ours), ("(h) on (d)", &earlier)].map(close);
     let apart = ours.clone().scalars(distances, scale.clone());
     let above = [
         ("(a) the mesh", cage(mesh, GIVEN)),
@@ -77,7 +77,8 @@ pub fn against_butterfly(album: &mut Album) -> Result<()> {
         iterations: None,
         error: None,
     };
-    album.add(&line, maps(4, (150, 135), scale, panels))
+    let title = "Below: how far (d) is from (c), and reflection lines where it is farthest";
+    album.add(&line, maps(4, (150, 135), scale, panels).headed(title))
 }
 
 /// Fig. 6: a bunny under the interpolatory √3 scheme, step by step.
