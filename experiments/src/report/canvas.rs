@@ -25,6 +25,9 @@ pub(super) const SCALE: f64 = (PIXELS_PER_POINT * SUPERSAMPLING) as f64;
 /// The height of digits and capitals in ems.
 pub(super) const CAP_HEIGHT: f64 = 0.73;
 
+/// The length of an arrowhead in points.
+pub(super) const ARROW_LENGTH: f64 = 6.5;
+
 /// Size of a subscript or superscript, and how far it is lowered or raised, in ems of the text.
 const SCRIPT_SIZE: f64 = 0.72;
 const SUBSCRIPT_DROP: f64 = 0.16;
@@ -317,13 +320,12 @@ impl Canvas {
 
     /// Draws an arrowhead with its tip at `to`, in the direction from `from`.
     pub fn arrowhead(&mut self, (from, to): (Point, Point), colour: Colour) {
-        const LENGTH: f64 = 6.5;
         const HALF_WIDTH: f64 = 2.7;
         let (dx, dy) = (to.0 - from.0, to.1 - from.1);
         let length = dx.hypot(dy);
         if length > 0.0 {
             let (ux, uy) = (dx / length, dy / length);
-            let corner = |side: f64| (to.0 - LENGTH * ux - side * uy, to.1 - LENGTH * uy + side * ux);
+            let corner = |side: f64| (to.0 - ARROW_LENGTH * ux - side * uy, to.1 - ARROW_LENGTH * uy + side * ux);
             self.shapes.push(Shape::Polygon { corners: vec![to, corner(HALF_WIDTH), corner(-HALF_WIDTH)], colour });
         }
     }

@@ -393,6 +393,20 @@ fn curves_that_go_on_end_in_arrowheads() {
 }
 
 #[test]
+fn no_marker_covers_an_arrowhead() {
+    let red = Colour(255, 0, 0);
+    let near_the_edge = Series::line("", [(0.0, 1.0), (9.95, 1.0), (20.0, 1.0)]).colour(red).marker(Marker::Circle);
+    let plot = LinePlot { series: vec![near_the_edge], x_range: Some((0.0, 10.0)), ..LinePlot::default() };
+    let drawing = Figure::new(plot).drawing().unwrap();
+    let place = |wanted: fn(&Shape) -> bool| drawing.shapes.iter().rposition(wanted);
+    let discs = drawing.shapes.iter().filter(|s| matches!(s, Shape::Disc { colour: Colour(255, 0, 0), .. }));
+    assert_eq!(discs.count(), 1);
+    let disc = place(|s| matches!(s, Shape::Disc { .. })).unwrap();
+    let arrow = place(|s| matches!(s, Shape::Polygon { colour: Colour(255, 0, 0), .. })).unwrap();
+    assert!(disc < arrow);
+}
+
+#[test]
 fn nothing_reaches_the_border_of_the_picture() {
     for figure in [histories(), sweep(), patterns(64), spectrum()] {
         let image = figure.render().unwrap();

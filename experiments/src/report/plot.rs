@@ -1,7 +1,7 @@
 //! Line plots, scatter plots and histograms on linear or logarithmic axes: how they are drawn.
 
 use super::axis::{Axis, Scale, Tick};
-use super::canvas::{Anchor, CAP_HEIGHT, Canvas, Colour, Dash, Marker, Point, Rect, text_width, way_out};
+use super::canvas::{ARROW_LENGTH, Anchor, CAP_HEIGHT, Canvas, Colour, Dash, Marker, Point, Rect, text_width, way_out};
 use super::frame::{self, FRAME_COLOUR, FRAME_WIDTH, Slot, TEXT_COLOUR};
 use super::series::{Band, Bars, Line, PALETTE, Rule, Series, palette};
 
@@ -285,40 +285,43 @@ impl LinePlot {
         let drawn: Vec<(&Series, Look, Vec<Option<Point>>)> = (self.series.iter().enumerate())
             .map(|(index, series)| (series, self.look(index), series.points.iter().map(place).collect()))
             .collect();
-        for (series, look, places) in &drawn {
+        let mut arrows = vec![Vec::new(); drawn.len()];
+        for ((series, look, places), arrows) in drawn.iter().zip(&mut arrows) {
             if let Some(dash) = look.dash {
                 let mut last = None;
                 for piece in places.split(Option::is_none) {
                     let piece: Vec<Point> = piece.iter().copied().flatten().collect();
                     canvas.stroke(&piece, frame, look.width, dash, look.colour);
-                    if let Some(out) = way_out(&piece, frame) {
-                        canvas.arrowhead(out, look.colour);
-                    }
+                    arrows.extend(way_out(&piece, frame));
                     if let [.., from, to] = piece[..] {
                         last = Some((from, to));
                     }
                 }
-                if let Some(end) = last.filter(|end| series.goes_on && frame.contains(end.1)) {
-                    canvas.arrowhead(end, look.colour);
-                }
+                arrows.extend(last.filter(|end| series.goes_on && frame.contains(end.1)));
             }
-            for at in series.points.iter().filter(|p| p.1 == f64::INFINITY).filter_map(|p| x.position(p.0)) {
-                let top = (frame.left + at * frame.width(), frame.top);
-                if frame.contains(top) {
-                    canvas.arrowhead(((top.0, frame.bottom), top), look.colour);
-                }
-            }
+            let tops = series.points.iter().filter(|p| p.1 == f64::INFINITY).filter_map(|p| x.position(p.0));
+            let tops = tops.map(|at| (frame.left + at * frame.width(), frame.top)).filter(|&top| frame.contains(top));
+            arrows.extend(tops.map(|top| ((top.0, frame.bottom), top)));
         }
-        // Over all lines, so that none hides where another one ends.
-        for (index, (_, look, places)) in drawn.iter().enumerate() {
+        // Over all lines, so that none hides where another one ends; and none on the arrowhead of its own line.
+        for (index, ((_, look, places), arrows)) in drawn.iter().zip(&arrows).enumerate() {
             let Some(marker) = look.marker else { continue };
-            let mut visible: Vec<Point> = places.iter().copied().flatten().filter(|&p| frame.contains(p)).collect();
+            let is_free = |p: &Point| {
+                let far = |to: Point| (to.0 - p.0).hypot(to.1 - p.1) > ARROW_LENGTH + look.radius;
+                frame.contains(*p) && arrows.iter().all(|&(_, to)| far(to))
+            };
+            let mut visible: Vec<Point> = places.iter().copied().flatten().filter(is_free).collect();
             if look.dash.is_some() {
                 let crowd = (self.series.len() as f64 / FEW).max(1.0);
                 visible = thinned(visible, index, crowd * MARKER_DENSE);
             }
             for at in visible {
                 canvas.marker(at, marker, look.radius, look.colour);
+            }
+        }
+        for ((_, look, _), arrows) in drawn.iter().zip(arrows) {
+            for arrow in arrows {
+                canvas.arrowhead(arrow, look.colour);
             }
         }
     }
