@@ -102,8 +102,8 @@ fn run(context: &mut Context) -> Result<()> {
         .enumerate()
         .map(|(k, r)| Series::history(r.subject.name.as_str(), r.errors.iter().copied()).marker(marker(k)))
         .collect();
-    let noise = if context.real() { "" } else { ", noise 0.1" };
-    let title = format!("Thall's iteration (ω = ½) on {} of {} meshes{noise}", series.len(), subjects.len());
+    let which = if context.real() { ", the slowest among them" } else { ", noise 0.1" };
+    let title = format!("Thall's iteration (ω = ½) on {} of {} meshes{which}", series.len(), subjects.len());
     context.figure(
         ITERATIONS.id,
         &Figure::new(LinePlot {

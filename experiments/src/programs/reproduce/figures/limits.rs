@@ -73,8 +73,7 @@ const PRINTED: [Printed; 5] = [
     },
     Printed {
         name: "pia-6-boy",
-        caption: "PIA Fig. 6 (boy, holes filled): mesh and Loop surface, 6 iterations; the head alone. At the slits in the \
-                  temple and at the spot on the cheek the model is folded, by 115° and more",
+        caption: "PIA Fig. 6 (boy, holes filled): mesh and Loop surface, 6 iterations; the head alone",
         model: corpus::BOY_FILLED,
         stand_in: StandIn::Bumps("icosphere:5"),
         scheme: Scheme::Loop,
