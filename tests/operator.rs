@@ -396,9 +396,11 @@ fn gauss_seidel_by_colours_solves_and_knows_when_it_cannot() {
     assert_eq!((report.outcome, report.iterations, report.history), (Outcome::Stopped, 8, seen));
     assert_eq!(control, by_colours(&operator, &points, 1.0, &Stop { max_iterations: 8, ..stop }).0);
     // A singular matrix with noisy points, and a tolerance below rounding.
-    for (name, tolerance) in [("cube", 1e-10), ("irregular-quad:3000", 1e-18)] {
+    for (name, tolerance, outcome) in
+        [("cube", 1e-10, Outcome::Stagnated), ("irregular-quad:3000", 1e-18, Outcome::Rounding)]
+    {
         let (report, _) = solve(name, tolerance);
-        assert_eq!(report.outcome, Outcome::Stagnated, "{name}");
+        assert_eq!(report.outcome, outcome, "{name}");
         assert!(report.iterations < 500, "{name}");
     }
 }

@@ -6,10 +6,12 @@ use super::singularity::{SingularComponent, Singularity};
 use crate::mesh::Surface;
 use crate::mesh::features::Features;
 use crate::schemes::Scheme;
+use crate::solvers::iteration::FLOOR;
 use crate::solvers::{Outcome, Report, Stop};
 
 /// Errors of this many times ε·max‖p‖ are rounding: what methods leave on the edge of theirs.
 const ROUNDING: f64 = 64.0;
+
 /// A run of A V = P that ended without a solution.
 #[derive(Clone, Debug)]
 pub struct Failed {
@@ -63,8 +65,13 @@ impl Failed {
         worst.filter(|c| self.verdict.excited && size(c) > self.tolerance)
     }
 
+    /// A tolerance that this run would have met: twice its last error, and no less than twice what rounding leaves.
+    pub fn reachable(&self) -> f64 {
+        2.0 * self.max_error.max(FLOOR * self.last_digit)
+    }
+
     /// Whether the error is as small as the digits of the points allow.
     pub fn is_rounding(&self) -> bool {
-        self.max_error <= ROUNDING * self.last_digit
+        self.outcome == Outcome::Rounding || self.max_error <= ROUNDING * self.last_digit
     }
 }

@@ -55,8 +55,9 @@ use crate::schemes::Scheme;
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::gmres::gmres;
 use crate::solvers::mixed::{self, Workspace};
+use crate::solvers::iteration::{largest, solve_in_scale};
 use crate::solvers::system::Rows;
-use crate::solvers::{Errors, Iterate, Method, Outcome, Recorded, Report, Solution, Step, Stop, run_watched, solve};
+use crate::solvers::{Errors, Iterate, Method, Outcome, Recorded, Report, Solution, Step, Stop, run_watched};
 
 /// From this many vertices on, the rows of the operator are breadth first. Tuned.
 pub const ORDERED: usize = 200_000;
@@ -477,16 +478,16 @@ impl Interpolator {
                 residual.iter().map(|r| r.length()).fold(errors.max, |a, b| if b > a || b.is_nan() { b } else { a });
             history.push(Recorded { iteration: iterations, errors });
             let told = watch(method, &Step { iteration: iterations, errors, points: control });
-            let met = errors.max <= stop.tolerance;
-            if met || no_progress(found.outcome) || told.is_break() || round == ROUNDS {
+            let reached = stop.reached(errors.max, largest(points));
+            if reached.is_some() || no_progress(found.outcome) || told.is_break() || round == ROUNDS {
                 // Short of the part of the tolerance that the block was asked for, it may be met.
-                let outcome = match found.outcome {
-                    _ if met => Outcome::Converged,
-                    Outcome::Converged if told.is_break() => Outcome::Stopped,
-                    Outcome::Converged => Outcome::Stagnated,
-                    other => other,
+                let outcome = match (reached, found.outcome) {
+                    (Some(reached), _) => reached,
+                    (None, Outcome::Converged | Outcome::Rounding) if told.is_break() => Outcome::Stopped,
+                    (None, Outcome::Converged | Outcome::Rounding) => Outcome::Stagnated,
+                    (None, other) => other,
                 };
-                let detail = found.detail.filter(|_| !met);
+                let detail = found.detail.filter(|_| reached.is_none());
                 return (method, Report { outcome, iterations, history, detail });
             }
             let mut moved = Vec::new();
@@ -531,7 +532,7 @@ impl Interpolator {
         assert!(points.len() == n && (control.is_empty() || control.len() == n), "one point a vertex");
         let cold = control.is_empty();
         if self.numbering.is_none() && self.free.is_none() {
-            return chain(&self.operator, points, control, &mut self.workspace, stop, watch);
+            return chain(&self.operator, points, 0.0, control, &mut self.workspace, stop, watch);
         }
         let points: &[DVec3] = match self.curves.is_empty() {
             true => points,
@@ -564,7 +565,7 @@ impl Interpolator {
             None => self.iterate.clone_from(control),
         }
         let (method, report) = match &self.free {
-            None => chain(&self.operator, points, &mut self.iterate, &mut self.workspace, stop, watch),
+            None => chain(&self.operator, points, 0.0, &mut self.iterate, &mut self.workspace, stop, watch),
             Some(free) => {
                 // The mean is that of the vertices in question.
                 let share = n as f64 / free.iter().filter(|free| **free).count().max(1) as f64;
@@ -579,8 +580,9 @@ impl Interpolator {
                 if !cold {
                     parallel::change(&mut self.iterate, |i, x| *x = if free[i] { *x - points[i] } else { DVec3::ZERO });
                 }
-                let (operator, right) = (&self.operator, &self.right);
-                let (method, mut report) = chain(operator, right, &mut self.iterate, &mut self.workspace, stop, watch);
+                let size = largest(points);
+                let (operator, right, workspace) = (&self.operator, &self.right, &mut self.workspace);
+                let (method, mut report) = chain(operator, right, size, &mut self.iterate, workspace, stop, watch);
                 parallel::change(&mut self.iterate, |i, x| *x += points[i]);
                 report.history.iter_mut().for_each(|recorded| recorded.errors = of_block(recorded.errors));
                 (method, report)
@@ -600,22 +602,23 @@ impl Interpolator {
     }
 }
 
-/// The first two steps.
+/// The first two steps, for points that are differences of data of a `size`, or 0 for data themselves.
 fn chain(
     operator: &Operator,
     points: &[DVec3],
+    size: f64,
     control: &mut Vec<DVec3>,
     workspace: &mut Workspace,
     stop: &Stop,
     watch: &mut Watch,
 ) -> (&'static str, Report) {
     let by_mixed = &mut |step: &Step| watch("chebyshev", step);
-    let report = mixed::solve_from(operator, points, control, workspace, stop, by_mixed);
+    let report = mixed::solve_within(operator, points, size, control, workspace, stop, by_mixed);
     if !matches!(report.outcome, Outcome::Stagnated | Outcome::Diverged) {
         return ("chebyshev", report);
     }
     let mut cg = ConjugateGradient::new(operator, points, Preconditioner::weights(operator));
-    let report = solve(&mut cg, stop, &mut |step| watch("cg", step));
+    let report = solve_in_scale(&mut cg, size.max(largest(points)), stop, &mut |step| watch("cg", step));
     control.copy_from_slice(cg.points());
     ("cg", report)
 }

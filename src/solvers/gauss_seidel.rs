@@ -11,6 +11,7 @@ use glam::DVec3;
 use super::coloured::Coloured;
 use super::iteration::{
     Errors, Failure, Iterate, Outcome, PATIENCE, PROGRESS, Recorded, Report, Step, Stop, WarmStart,
+    largest,
 };
 use super::system::{Rows, System, sweep};
 use super::wavefront::Wavefront;
@@ -116,6 +117,7 @@ fn in_looks(
 ) -> (Vec<DVec3>, Report) {
     let mut rows = Rows::new(points.len());
     let mut x = points.to_vec();
+    let size = largest(points);
     let mut history: Vec<Recorded> = Vec::new();
     let (mut iterations, mut count) = (0, LOOK);
     // The smallest error that was progress, and the sweeps before it.
@@ -125,7 +127,7 @@ fn in_looks(
         let before = history.last().map(|e| e.errors.max);
         history.push(Recorded { iteration: iterations, errors });
         let told = watch(&Step { iteration: iterations, errors, points: &x });
-        if let Some(outcome) = stop.verdict(errors.max, iterations, told) {
+        if let Some(outcome) = stop.verdict(errors.max, size, iterations, told) {
             break outcome;
         }
         if errors.max < (1.0 - PROGRESS) * progress.0 {

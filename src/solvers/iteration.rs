@@ -33,26 +33,42 @@ pub struct Recorded {
 }
 
 /// When to stop: at the first iterate with maximum error ≤ `tolerance` (absolute, in mesh units), or after
-/// `max_iterations` updates.
+/// `max_iterations` updates. A tolerance below [`FLOOR`] last digits of the data ends the run there, as
+/// [`Outcome::Rounding`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
-    /// The bound of the maximum error, in mesh units; one that is not finite is never met.
+    /// The bound of the maximum error, in mesh units; one that is not finite is never met, nor is it below rounding.
     pub tolerance: f64,
     /// The most updates of all vertices; the start is measured before the first.
     pub max_iterations: usize,
 }
 
 impl Stop {
-    /// Whether an error is within the tolerance. One that is not finite holds nothing.
-    fn is_met(&self, error: f64) -> bool {
-        error <= self.tolerance && self.tolerance.is_finite()
+    /// How a run on data whose largest coordinate is `size` ends at an error that is as small as was asked for, or as
+    /// can be told. Below the floor it is a matter of luck which residuals round to the tolerance, so that none is held
+    /// against it there.
+    pub(crate) fn reached(&self, error: f64, size: f64) -> Option<Outcome> {
+        let floor = floor(size);
+        if !self.tolerance.is_finite() {
+            None
+        } else if self.tolerance < floor {
+            (error <= floor).then_some(Outcome::Rounding)
+        } else {
+            (error <= self.tolerance).then_some(Outcome::Converged)
+        }
     }
 
-    /// How a run ends that has got to an error after so many iterations, and whose watch has `told` to go on or not, if it
-    /// does whatever the method is.
-    pub(super) fn verdict(&self, error: f64, iterations: usize, told: ControlFlow<()>) -> Option<Outcome> {
-        if self.is_met(error) {
-            Some(Outcome::Converged)
+    /// How a run ends that has got to an error after so many iterations, on data of a `size`, and whose watch has `told` to
+    /// go on or not, if it does whatever the method is.
+    pub(super) fn verdict(
+        &self,
+        error: f64,
+        size: f64,
+        iterations: usize,
+        told: ControlFlow<()>,
+    ) -> Option<Outcome> {
+        if let Some(reached) = self.reached(error, size) {
+            Some(reached)
         } else if !error.is_finite() {
             Some(Outcome::Diverged)
         } else if told.is_break() {
@@ -68,6 +84,9 @@ impl Stop {
 pub enum Outcome {
     /// The tolerance is met by the true residual.
     Converged,
+    /// The true residual is within [`FLOOR`] last digits of the data, and the tolerance lies below: it cannot be told
+    /// whether it is met.
+    Rounding,
     /// The error grew: [`GROWTH`]-fold from its smallest value with [`RISES`] rises in a row, or
     /// [`BLOW_UP`]-fold from the start, or it is no longer finite.
     Diverged,
@@ -88,6 +107,7 @@ impl Outcome {
     pub fn name(self) -> &'static str {
         match self {
             Outcome::Converged => "converged",
+            Outcome::Rounding => "rounding",
             Outcome::Diverged => "diverged",
             Outcome::MaxIterations => "max-iterations",
             Outcome::Stagnated => "stagnated",
@@ -195,6 +215,16 @@ pub const PATIENCE: usize = 100;
 /// The relative improvement of the smallest error that counts as progress.
 pub const PROGRESS: f64 = 1e-8;
 
+/// Errors of this many times ε·max|p|, the last digit of the data, are rounding: what one product leaves of an exact
+/// solution on meshes of usual valences, and so nothing that a tolerance below can be held against.
+pub const FLOOR: f64 = 4.0;
+
+/// What errors cannot be told below, for data whose largest coordinate is `size`; 0 where that overflows.
+pub(super) fn floor(size: f64) -> f64 {
+    let floor = FLOOR * f64::EPSILON * size;
+    if floor.is_finite() { floor } else { 0.0 }
+}
+
 /// Runs `method` until a stopping rule applies. The start is the method's current iterate. The watch sees every
 /// iterate and may stop the run.
 pub fn solve(method: &mut dyn Iterate, stop: &Stop, watch: &mut dyn FnMut(&Step) -> ControlFlow<()>) -> Report {
@@ -203,12 +233,12 @@ pub fn solve(method: &mut dyn Iterate, stop: &Stop, watch: &mut dyn FnMut(&Step)
 }
 
 /// The largest coordinate.
-pub(super) fn largest(points: &[DVec3]) -> f64 {
+pub(crate) fn largest(points: &[DVec3]) -> f64 {
     points.iter().fold(0.0f64, |m, p| m.max(p.abs().max_element()))
 }
 
 /// As [`solve`], for data whose largest coordinate is `size`.
-pub(super) fn solve_in_scale(
+pub(crate) fn solve_in_scale(
     method: &mut dyn Iterate,
     size: f64,
     stop: &Stop,
@@ -219,14 +249,14 @@ pub(super) fn solve_in_scale(
     loop {
         let mut errors = method.errors();
         let iteration = history.len();
-        if stop.is_met(errors.max) || iteration >= stop.max_iterations {
+        if stop.reached(errors.max, size).is_some() || iteration >= stop.max_iterations {
             errors = method.confirm(errors);
         }
         history.push(Recorded { iteration, errors });
         let step = Step { iteration, errors, points: method.points() };
         let told = watch(&step);
-        let ended = if stop.is_met(errors.max) {
-            Some(Outcome::Converged)
+        let ended = if let Some(reached) = stop.reached(errors.max, size) {
+            Some(reached)
         } else if let Some(outcome) = rules.judge(errors.max) {
             Some(outcome)
         } else if told.is_break() {
@@ -368,9 +398,34 @@ mod tests {
         // An error that falls below the last digit of coordinates of 5·10⁵, by a recurrence, and climbs back to it.
         let errors = |k: usize| (1e-2 * 0.01f64.powi(k as i32)).max(1e-20 * 3f64.powi(k.min(23) as i32));
         assert_eq!(run(&errors, 1e-30).outcome, Outcome::Diverged);
-        assert_eq!(run_on(&[DVec3::X * 5e5], &errors, 1e-30).outcome, Outcome::Stagnated);
+        assert_eq!(run_on(&[DVec3::X * 5e5], &errors, f64::NAN).outcome, Outcome::Stagnated);
         let report = run_on(&[DVec3::X * 5e5], &|k| 1.25f64.powi(k as i32), 1e-3);
         assert_eq!((report.outcome, report.iterations), (Outcome::Diverged, 31));
+    }
+
+    #[test]
+    fn a_tolerance_below_a_few_last_digits_of_the_data_ends_at_them() {
+        let errors = |k: usize| 0.1f64.powi(k as i32);
+        // The floor is 4ε = 8.9e-16 for coordinates of size 1.
+        let points = [DVec3::new(0.5, -1.0, 0.25)];
+        for (tolerance, outcome, iterations) in [
+            (1.1e-14, Outcome::Converged, 14),
+            (9e-16, Outcome::Converged, 16),
+            (8e-16, Outcome::Rounding, 16),
+            (1e-30, Outcome::Rounding, 16),
+            (0.0, Outcome::Rounding, 16),
+            (-1.0, Outcome::Rounding, 16),
+        ] {
+            let report = run_on(&points, &errors, tolerance);
+            assert_eq!((report.outcome, report.iterations), (outcome, iterations), "{tolerance:e}");
+        }
+        // A residual that happens to round to nothing is none the nearer.
+        assert_eq!(run_on(&points, &|_| 0.0, 0.0).outcome, Outcome::Rounding);
+        // The floor goes with the data.
+        let report = run_on(&[DVec3::Y * 1e6], &errors, 1e-10);
+        assert_eq!((report.outcome, report.iterations), (Outcome::Rounding, 10));
+        // Where the data overflow, nothing is told.
+        assert_eq!(run_on(&[DVec3::Y * f64::INFINITY], &errors, 1e-10).outcome, Outcome::Converged);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use glam::{DVec3, Vec3A};
 
 use super::chebyshev::{Recurrence, promised_iterations};
-use super::iteration::{Outcome, Recorded, Report, Step, Stop};
+use super::iteration::{self, Outcome, Recorded, Report, Step, Stop};
 use super::system::Rows;
 use super::wavefront::{Scratch, Wavefront};
 use crate::assemble::Operator;
@@ -88,16 +88,31 @@ pub fn solve_from(
     stop: &Stop,
     watch: &mut (dyn FnMut(&Step) -> ControlFlow<()> + Send),
 ) -> Report {
+    solve_within(operator, points, 0.0, control, workspace, stop, watch)
+}
+
+/// As [`solve_from`], for points that are differences of data whose largest coordinate is `size`: what can be told of errors
+/// is what can be told there.
+pub(crate) fn solve_within(
+    operator: &Operator,
+    points: &[DVec3],
+    size: f64,
+    control: &mut Vec<DVec3>,
+    workspace: &mut Workspace,
+    stop: &Stop,
+    watch: &mut (dyn FnMut(&Step) -> ControlFlow<()> + Send),
+) -> Report {
     let n = operator.len();
     assert!(points.len() == n && (control.is_empty() || control.len() == n), "one point a vertex");
     assert_eq!(workspace.residual.len(), n, "the workspace of this operator");
     // Within the thread pool, so that the many short parallel loops need not be handed over to it.
-    rayon::scope(|_| in_pool(operator, points, control, workspace, stop, watch))
+    rayon::scope(|_| in_pool(operator, points, size, control, workspace, stop, watch))
 }
 
 fn in_pool(
     operator: &Operator,
     points: &[DVec3],
+    size: f64,
     control: &mut Vec<DVec3>,
     workspace: &mut Workspace,
     stop: &Stop,
@@ -111,6 +126,8 @@ fn in_pool(
     let mut interval = (operator.usual_lambda_min().max(least), 1.0);
     let largest = points.iter().map(|p| p.length_squared()).fold(0.0, f64::max);
     let floor = FLOOR * f64::EPSILON * largest.sqrt();
+    let size = size.max(iteration::largest(points));
+    let goal = stop.tolerance.max(iteration::floor(size));
     let mut history: Vec<Recorded> = Vec::new();
     let mut iterations = 0;
     // The last correction: its number of iterations.
@@ -133,7 +150,7 @@ fn in_pool(
         let before = history.last().map(|e| e.errors.max);
         history.push(Recorded { iteration: iterations, errors });
         let told = watch(&Step { iteration: iterations, errors, points: current });
-        if let Some(outcome) = stop.verdict(errors.max, iterations, told) {
+        if let Some(outcome) = stop.verdict(errors.max, size, iterations, told) {
             break outcome;
         }
         if let Some(before) = before {
@@ -151,7 +168,7 @@ fn in_pool(
                 break Outcome::Stagnated;
             }
         }
-        count = iterations_for(interval, stop.tolerance / errors.max).min(stop.max_iterations - iterations);
+        count = iterations_for(interval, goal / errors.max).min(stop.max_iterations - iterations);
         wavefront.iterate(Recurrence::new(interval), count, residual, correction, scratch);
         iterations += count;
         if control.is_empty() {

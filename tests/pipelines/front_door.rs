@@ -80,6 +80,19 @@ fn some_vertices_are_interpolated_and_the_others_stay() {
     assert!(message.contains("name at least one"), "{message}");
 }
 
+/// For some vertices the chain solves for a difference, which may be far smaller than the data: their last digits count.
+#[test]
+fn a_tolerance_below_the_last_digits_ends_the_chain_at_its_first_step() {
+    for_each(|what, surface, scheme| {
+        let marks = every_third(surface.len());
+        for interpolated in [None, Some(&marks[..])] {
+            let options = Options { tolerance: Tolerance::Relative(1e-18), interpolated, ..Options::default() };
+            let found = interpolate(surface, scheme, &options).unwrap();
+            assert_eq!((found.report.outcome, found.method), (Outcome::Rounding, "chebyshev"), "{what}");
+        }
+    });
+}
+
 /// Prisms with many sides are nearly singular under Catmull-Clark: iterations stand still, a factorization does not.
 #[test]
 fn the_chain_ends_with_a_factorization() {

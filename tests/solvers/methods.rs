@@ -91,9 +91,9 @@ pub fn checked(system: &LimitSystem, points: &[DVec3], method: Method, stop: &St
         assert!(errors.mean <= limit || errors.mean.is_nan(), "{method:?}: mean above maximum");
     }
     let (truth, last) = (residual(system, points, &solution.points), report.last().max);
-    if report.outcome == Outcome::Converged {
+    if matches!(report.outcome, Outcome::Converged | Outcome::Rounding) {
         assert!(same(last, truth), "{method:?} claims {last:e} but has {truth:e}");
-        assert!(truth <= stop.tolerance);
+        assert!(truth <= stop.tolerance || report.outcome == Outcome::Rounding);
     }
     solution
 }

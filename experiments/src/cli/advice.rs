@@ -84,12 +84,12 @@ pub fn of_failed(failed: &Failed, unit: f64) -> String {
             failed.verdict.set.condition().unwrap_or_default()
         );
     }
-    let reachable = unit * 2.0 * failed.max_error;
+    let reachable = unit * failed.reachable();
     let chosen = failed.chosen;
     match failed.outcome {
         Outcome::MaxIterations if chosen => "the iterations ran out: raise --max-iter, or use --method auto".into(),
         Outcome::MaxIterations => "the iterations ran out: raise --max-iter".into(),
-        Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown if failed.is_rounding() => {
+        Outcome::Rounding | Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown if failed.is_rounding() => {
             format!(
                 "the error is the rounding of such coordinates, whose last digit is {:.1e}, and the tolerance lies \
                  below: use --tol-absolute {reachable:.0e}",

@@ -275,7 +275,7 @@ fn runs_that_do_not_converge_leave_no_control_mesh() {
         ("cube", &["--method", "lu"], "singular"),
         ("icosphere:1", &["--max-iter", "1"], "max-iterations"),
         ("icosphere:1", &["--max-iter", "0", "--method", "cg"], "max-iterations"),
-        ("icosphere:1", &["--tol", "1e-30", "--method", "pia"], "stagnated"),
+        ("icosphere:1", &["--tol", "1e-30", "--method", "pia"], "rounding"),
     ] {
         let mut arguments = vec![mesh, "-o", "v.obj", "--quiet"];
         arguments.extend(more);
