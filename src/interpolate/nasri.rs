@@ -1,7 +1,7 @@
 //! Nasri's interpolation with Doo-Sabin surfaces (1987): the control mesh whose type-V faces, after one ordinary
 //! step, have the given points as centroids. What Zheng & Cai compare with. The surface is plain Doo-Sabin subdivision
-//! of the control mesh; [`FirstRefinement`](super::zheng_cai::FirstRefinement) with the ordinary rule adds exact
-//! centroids, normals and shape handles.
+//! of the control mesh; [`FirstRefinement`](super::zheng_cai::FirstRefinement) with the ordinary rule adds normals and
+//! shape handles where they are asked for.
 
 use super::staged;
 use crate::Result;

@@ -87,7 +87,7 @@ pub fn check(surface: &Surface, scheme: Scheme, request: &SurfaceOptions) -> Res
 ///
 /// Catmull-Clark, Loop and √3: original vertices keep their numbers; given normals are met by turned rings
 /// ([`rotate_rings`]), which need two levels or more. Nasri and Zheng-Cai: the first level is the scheme's own first
-/// refinement, whose type-V faces Zheng-Cai corrects always and Nasri if normals or handles are given; all further
+/// refinement, whose type-V faces Zheng-Cai corrects always and Nasri where a normal or a handle other than 1 is given; all further
 /// ones are Doo-Sabin. Mid-edge: plain refinement. Time and memory are those of the refinements.
 ///
 /// # Errors

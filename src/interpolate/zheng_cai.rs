@@ -258,7 +258,7 @@ pub struct FirstRefinement {
     pub surface: Surface,
     /// The type-V face of vertex v is face `first_vertex_face + v`; of one that is not smooth, the first of them.
     pub first_vertex_face: usize,
-    /// Interpolated vertices whose type-V face has no average normal (its corners lie in a line or a point, or its
+    /// Interpolated vertices whose type-V face should have been flattened and has no average normal (its corners lie in a line or a point, or its
     /// vector area vanishes): their centroid is exact, but the face was only moved, not flattened.
     pub not_flattened: Vec<u32>,
 }
@@ -268,6 +268,10 @@ impl FirstRefinement {
     /// W_k += ((W_c − W_k)·n) n + (I − W_c), then W_k ← I + s(W_k − I). n is the given normal or the average one
     /// of Eq. 10. Afterwards the centroid is I and the face lies in a plane perpendicular to n, so the limit surface
     /// passes through I with the normal ±n. Of all such corrections this is the smallest (Eq. 9).
+    ///
+    /// By another rule than [`CornerRule::ZhengCai`] faces have their centroids already, as far as the system was solved.
+    /// Only those are corrected of which something is asked, a normal or a handle other than 1, and only a given
+    /// normal flattens one.
     ///
     /// Type-V faces share no vertices, so each is corrected on its own; time and memory are those of the
     /// refinement.
@@ -287,10 +291,15 @@ impl FirstRefinement {
         let first_vertex_face = first_vertex_face(auxiliary);
         // Those of sharp vertices hold no limit points.
         let is_smooth = |v: usize| auxiliary.features().is_none_or(|features| features.is_smooth(v));
+        // What phase one leaves of the distance to the points is left to phase two everywhere.
+        let corrects_all = rule == CornerRule::ZhengCai;
         let mut not_flattened = Vec::new();
         let mut ring = Vec::new();
         for (v, &point) in points.iter().enumerate() {
-            if !constraints.is_interpolated(v) || !is_smooth(v) {
+            let given = normals.as_ref().and_then(|n| n[v]);
+            let scale = constraints.handles.map_or(1.0, |s| s[v]);
+            let is_asked = corrects_all || given.is_some() || scale != 1.0;
+            if !constraints.is_interpolated(v) || !is_smooth(v) || !is_asked {
                 continue;
             }
             let face = mesh.faces.face(first_vertex_face + v);
@@ -298,17 +307,17 @@ impl FirstRefinement {
             ring.extend(face.iter().map(|&c| mesh.positions[c as usize]));
             let center = ring.iter().sum::<DVec3>() / ring.len() as f64;
             ring.iter_mut().for_each(|w| *w -= center);
-            let normal = match normals.as_ref().and_then(|n| n[v]) {
+            let normal = match given {
                 Some(n) => {
                     require_area(v, &ring, n)?;
                     Some(n)
                 }
-                None => average_normal(&ring),
+                None if corrects_all => average_normal(&ring),
+                None => None,
             };
-            if normal.is_none() {
+            if corrects_all && normal.is_none() {
                 not_flattened.push(v as u32);
             }
-            let scale = constraints.handles.map_or(1.0, |s| s[v]);
             for (&c, &w) in face.iter().zip(&ring) {
                 let flat = normal.map_or(w, |n| w - w.dot(n) * n);
                 mesh.positions[c as usize] = point + scale * flat;

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 use limitlab::assemble::{LimitSystem, Stages};
 use limitlab::interpolate::zheng_cai::*;
+use limitlab::interpolate::surface::{self, SurfaceOptions};
 use limitlab::interpolate::{nasri, staged};
 use limitlab::mesh::{Mesh, Surface, builtin, io};
 use limitlab::schemes::Scheme;
@@ -156,6 +157,40 @@ fn opposite_normals_are_the_same_and_handles_scale() {
             let (p, q) = (plain.surface.positions()[c as usize], scaled.surface.positions()[c as usize]);
             let expected = surface.positions()[v] + s * (p - surface.positions()[v]);
             assert!(q.distance(expected) < ROUNDING);
+        }
+    }
+}
+
+/// Under Nasri's rule, whose surface is plain Doo-Sabin, a handle of 1 is no wish, and a wish is one vertex's.
+#[test]
+fn nasri_s_surface_changes_only_where_something_is_asked() {
+    let surface = noisy_surface("irregular-poly:60");
+    let stop = Stop { tolerance: 1e-13, max_iterations: 5000 };
+    let solution = nasri::control_points(&surface, None, Method::Cholesky, &stop).unwrap();
+    let control = surface.with_positions(solution.points);
+    let made = |constraints: Constraints| {
+        let request = SurfaceOptions { levels: 1, constraints, ..SurfaceOptions::default() };
+        surface::surface(control.clone(), Scheme::Nasri, surface.positions(), &request).unwrap().surface
+    };
+    let plain = made(Constraints::default());
+    let mut handles = vec![1.0; surface.len()];
+    assert_eq!(made(Constraints { handles: Some(&handles), ..Constraints::default() }).positions(), plain.positions());
+
+    let mut normals = vec![None; surface.len()];
+    handles[7] = 2.5;
+    normals[3] = Some(DVec3::new(0.2, 0.9, -0.4));
+    let shaped = made(Constraints { handles: Some(&handles), normals: Some(&normals), interpolated: None });
+    let first = doo_sabin::first_vertex_face(&surface);
+    for v in 0..surface.len() {
+        let point = surface.positions()[v];
+        for &c in plain.faces().face(first + v) {
+            let (p, q) = (plain.positions()[c as usize], shaped.positions()[c as usize]);
+            match v {
+                // No plane: its own corners, further out.
+                7 => assert!(q.distance(point + 2.5 * (p - point)) < ROUNDING),
+                3 => assert!((q - point).dot(normals[3].unwrap()).abs() < ROUNDING),
+                _ => assert_eq!(p, q, "vertex {v}"),
+            }
         }
     }
 }

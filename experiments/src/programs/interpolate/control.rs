@@ -67,12 +67,14 @@ impl<'a> Shown<'a> {
     }
 }
 
-/// The control points, and the errors of what will be left of them in the digits of the file.
+/// The control points, and the errors of what will be left of them in the digits of the file. Where some vertices stay, the
+/// solver's own errors are those of an equation for the others, whose right-hand side is rounded.
 pub fn control_mesh(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -> Result<Control> {
     let mut control = solved(arguments, input, per_vertex)?;
     let frame = &input.frame;
     let rounded = |p: &DVec3| frame.there(frame.back(*p));
-    if !frame.is_identity() && control.points.iter().any(|p| rounded(p) != *p) {
+    let is_rounded = !frame.is_identity() && control.points.iter().any(|p| rounded(p) != *p);
+    if is_rounded || per_vertex.interpolated.is_some() {
         let written: Vec<DVec3> = control.points.iter().map(rounded).collect();
         control.errors = limit_errors(input, per_vertex.interpolated.as_deref(), &written)?;
     }
