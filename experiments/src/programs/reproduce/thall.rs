@@ -89,8 +89,8 @@ fn run(context: &mut Context) -> Result<()> {
         columns.col(Column::text("status"), |r| r.outcome.name()).table(ITERATIONS.id, ITERATIONS.title, &rows);
     table.note(
         "Catmull-Clark on all polygons. `error_k` = max_i ‖p_i − (A v)_i‖ / L after k iterations, L the diagonal of \
-         the bounding box. Thall chose ω = ½ without tuning; it converges whenever A is non-singular. The best ω is \
-         2/(λ_min + λ_max) of D⁻¹A. A status other than `converged` belongs to the tolerance 10⁻⁶.",
+         the bounding box. Thall chose ω = ½ without tuning; it converges whenever A is non-singular. The best ω of the \
+         matrix is 2/(λ_min + λ_max) of D⁻¹A; points may have another (T5). A status other than `converged` belongs to the tolerance 10⁻⁶.",
     );
     context.table(table)?;
     if context.quick {

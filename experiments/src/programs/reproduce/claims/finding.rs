@@ -11,6 +11,10 @@ pub enum Verdict {
     Refuted,
     /// Left open, or not said, in the paper and decided here.
     Settled,
+    /// As printed as far as the numbers go; the remark names what they leave out.
+    InPart,
+    /// Numbers, and nothing in print that they could be held against.
+    NotDecided,
     /// Cannot be computed in this run; the remark says why.
     NotReproducible,
     /// A number is on the wrong side of its threshold.
@@ -18,11 +22,13 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    pub const ALL: [Verdict; 6] = [
+    pub const ALL: [Verdict; 8] = [
         Verdict::Reproduced,
         Verdict::Corrected,
         Verdict::Refuted,
         Verdict::Settled,
+        Verdict::InPart,
+        Verdict::NotDecided,
         Verdict::NotReproducible,
         Verdict::NotConfirmed,
     ];
@@ -33,6 +39,8 @@ impl Verdict {
             Verdict::Corrected => "corrected",
             Verdict::Refuted => "refuted",
             Verdict::Settled => "settled",
+            Verdict::InPart => "in part",
+            Verdict::NotDecided => "not decided",
             Verdict::NotReproducible => "not reproducible",
             Verdict::NotConfirmed => "not confirmed",
         }
@@ -168,6 +176,16 @@ impl Finding {
         Self::new(Verdict::Settled, evidence)
     }
 
+    /// Confirms a part of what is printed; the remark says which part is left.
+    pub fn in_part(evidence: Vec<Evidence>, left: impl Into<String>) -> Self {
+        Self::new(Verdict::InPart, evidence).remark(left)
+    }
+
+    /// Tells what comes of a statement that names nothing to hold it against, for the reason given.
+    pub fn not_decided(evidence: Vec<Evidence>, reason: impl Into<String>) -> Self {
+        Self::new(Verdict::NotDecided, evidence).remark(reason)
+    }
+
     /// Confirms a counterexample.
     pub fn refuted(counterexample: Vec<Evidence>) -> Self {
         Self::new(Verdict::Refuted, counterexample)
@@ -202,13 +220,16 @@ impl Finding {
         self
     }
 
-    /// The intended verdict if there is a number with a threshold and all such numbers hold, else `not confirmed`.
+    /// The intended verdict if there is a number with a threshold and all such numbers hold, else `not confirmed`. What
+    /// decides nothing needs no such number.
     pub fn verdict(&self) -> Verdict {
-        if self.intended == Verdict::NotReproducible {
-            return Verdict::NotReproducible;
-        }
         let mut tests = self.evidence.iter().filter_map(Evidence::holds).peekable();
-        if tests.peek().is_some() && tests.all(|holds| holds) { self.intended } else { Verdict::NotConfirmed }
+        let decides = !matches!(self.intended, Verdict::NotReproducible | Verdict::NotDecided);
+        if (tests.peek().is_some() || !decides) && tests.all(|holds| holds) {
+            self.intended
+        } else {
+            Verdict::NotConfirmed
+        }
     }
 }
 
@@ -224,6 +245,8 @@ mod tests {
             Finding::corrected("deviation", 0.5, 1e-15, 1e-12),
             Finding::refuted(vec![Evidence::above("ratio", 1.2, 1.0)]),
             Finding::settled(small()),
+            Finding::in_part(small(), "the other half"),
+            Finding::not_decided(vec![Evidence::shown("error", 0.1)], "no number in print"),
             Finding::not_reproducible("no model"),
             Finding::reproduced(vec![Evidence::at_most("deviation", 1e-3, 1e-12)]),
         ];
@@ -252,6 +275,10 @@ mod tests {
         assert_eq!(nothing.verdict(), Verdict::NotConfirmed);
         let with = nothing.also([good]);
         assert_eq!(with.verdict(), Verdict::Settled);
+        // A part needs a number as well; what decides nothing does not, but none may fail.
+        let [shown, bad] = [Evidence::shown("size", 3_usize), Evidence::below("radius", 1.0, 1.0)];
+        assert_eq!(Finding::in_part(vec![shown.clone()], "").verdict(), Verdict::NotConfirmed);
+        assert_eq!(Finding::not_decided(vec![shown, bad], "").verdict(), Verdict::NotConfirmed);
     }
 
     #[test]

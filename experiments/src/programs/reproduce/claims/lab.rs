@@ -1,6 +1,7 @@
 //! Meshes at random and by name, and small tools, for the claims.
 
 use std::cell::OnceCell;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 
 use glam::DVec3;
@@ -13,7 +14,7 @@ use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix};
 use limitlab::assemble::LimitSystem;
 pub use limitlab::mesh::random::random_points;
 use limitlab::mesh::validate::Boundary;
-use limitlab::mesh::{Mesh, Surface, builtin, features::Tags, generate, random};
+use limitlab::mesh::{Faces, Mesh, Surface, builtin, features::Tags, generate, random};
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, Outcome, Solution, Stop, run, run_watched};
 
@@ -147,6 +148,52 @@ pub fn quad_star(n: usize) -> Mesh {
     generate::quad_split(&builtin::bipyramid(n))
 }
 
+/// The map of PSL(2, p) for a prime p ≥ 5, points at random: all p(p² − 1)/6 vertices have valence 3, all faces p corners.
+/// Its darts are the elements of the group; S of order 2 turns one round, R = ST of order 3 leads to the next at its
+/// vertex, and T = SR of order p to the next of its face.
+pub fn platonic_map(p: u32) -> Mesh {
+    type Element = [u32; 4];
+    // Up to sign: the first entry that is not 0 is at most p/2.
+    let signed = |g: Element| {
+        let first = g.into_iter().find(|&x| x != 0).unwrap_or(0);
+        if 2 * first > p { g.map(|x| (p - x) % p) } else { g }
+    };
+    let times = |[a, b, c, d]: Element, [e, f, g, h]: Element| {
+        signed([a * e + b * g, a * f + b * h, c * e + d * g, c * f + d * h].map(|x| x % p))
+    };
+    let (s, t) = ([0, p - 1, 1, 0], [1, 1, 0, 1]);
+    let r = times(s, t);
+    let one = signed([1, 0, 0, 1]);
+    // From the unit on, by the two generators; each vertex takes its three darts at once.
+    let (mut vertex_of, mut vertices, mut ahead) = (BTreeMap::new(), 0, vec![one]);
+    let mut darts = Vec::new();
+    while let Some(dart) = ahead.pop() {
+        if vertex_of.contains_key(&dart) {
+            continue;
+        }
+        for own in [dart, times(dart, r), times(times(dart, r), r)] {
+            vertex_of.insert(own, vertices);
+            darts.push(own);
+            ahead.push(times(own, s));
+        }
+        vertices += 1;
+    }
+    let mut seen = BTreeSet::new();
+    let mut faces: Vec<Vec<u32>> = Vec::new();
+    for first in darts {
+        let mut face = Vec::new();
+        let mut dart = first;
+        while seen.insert(dart) {
+            face.push(vertex_of[&dart]);
+            dart = times(dart, t);
+        }
+        if !face.is_empty() {
+            faces.push(face);
+        }
+    }
+    Mesh::new(random_points(vertices as usize, u64::from(p)), Faces::from_lists(&faces))
+}
+
 /// max ‖a_i − b_i‖
 pub fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
     assert_eq!(a.len(), b.len(), "as many of one as of the other");
@@ -265,6 +312,20 @@ mod tests {
         assert!(largest([1.0, f64::NAN, 2.0]).is_nan());
         assert!(smallest([f64::NAN, 2.0]).is_nan());
         assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
+    }
+
+    #[test]
+    fn platonic_maps_are_those_of_the_groups_order() {
+        for p in [5, 7, 11] {
+            let map = subject("", platonic_map(p));
+            let (surface, k) = (&map.surface, p as usize);
+            assert_eq!(surface.len(), k * (k * k - 1) / 6);
+            assert_eq!(surface.faces().uniform_size(), Some(k));
+            assert!((0..surface.len()).all(|v| surface.incidence().face_count(v) == 3));
+            // Klein's quartic has genus 3.
+            let euler = surface.len() as i64 + surface.faces().len() as i64 - surface.topology().edges() as i64;
+            assert_eq!(euler, [2, -4, -50][[5, 7, 11].iter().position(|&q| q == p).unwrap()]);
+        }
     }
 
     #[test]

@@ -301,7 +301,8 @@ fn page(context: &Context, records: &[Record]) -> String {
         "# {}\n\n{}\n\nEach number was computed in the run that wrote this page; each verdict follows from the \
          numbers by the thresholds beside them. *Reproduced*: as printed. *Corrected*: a slip; the right form holds, \
          the printed one does not. *Refuted*: by the counterexample given. *Settled*: left open or not said in the \
-         paper, decided here. *Not reproducible*: with the reason. *Not confirmed*: a number is on the wrong side of \
+         paper, decided here. *In part*: as printed as far as the numbers go; the remark names the rest. *Not decided*: \
+         the paper names nothing that the numbers could be held against. *Not reproducible*: with the reason. *Not confirmed*: a number is on the wrong side of \
          its threshold. Random meshes are {} closed ones of at most {} vertices with valences from 3, from fixed \
          seeds; L is the diagonal of a mesh's bounding box. `claims.csv` has a row for every number, `claims.json` \
          both, `claims--times.csv` (written with `--times`) the durations.\n\n{} claims: {}.\n",

@@ -384,6 +384,12 @@ fn monotone(lab: &Lab) -> Result<Finding> {
         let points = random_points(system.len(), system.len() as u64);
         Ok(growth(&system, &points))
     })?;
+    let norm = |n: usize| 2.0 * (1.0 - loop_beta(n));
+    let regular = exact("tri-torus:12x7")?.system(Scheme::Loop)?;
+    let row_norm = |system: &LimitSystem| {
+        let row = |i: usize| system.a.row(i).map(|(j, b)| if i == j { (1.0 - b).abs() } else { b.abs() }).sum::<f64>();
+        largest((0..system.len()).map(row))
+    };
     let energy = rows.iter().map(|r| r[1]).chain([constructed[1]]);
     Ok(Finding::refuted(vec![
         Evidence::above("largest max e^{k+1} over max e^k under Loop, star:3, points made for it", constructed[0], 1.0),
@@ -392,11 +398,15 @@ fn monotone(lab: &Lab) -> Result<Finding> {
             largest(rows.iter().map(|r| r[0])),
         ),
         Evidence::below("largest ratio of ‖H^-½ e‖₂ at successive steps on all of them", largest(energy), 1.0),
+        Evidence::above("smallest 2(1 − β_n) of the valences 3, 4, 5", smallest((3..6).map(norm)), 1.0),
+        Evidence::at_most("largest 2(1 − β_n) of the valences 6…200", largest((6..=200).map(norm)), 1.0 + ROUNDING),
+        Evidence::at_most("‖I − B‖_∞ on tri-torus:12x7, all valences 6", row_norm(&regular), 1.0 + ROUNDING),
     ])
     .remark(
         "I − B is symmetric in the norm ‖H^-½·‖₂ with eigenvalues in [0, 1), so there every error shrinks. In the \
-         maximum norm ‖I − B‖_∞ = max 2(1 − β_n) = 6/5 at valence 3, attained by an error of 1 at such a vertex, −1 at \
-         its neighbours and Σe/h = 0: P = Σ_k B^k e has it. Random points show no growth.",
+         maximum norm ‖I − B‖_∞ = max 2(1 − β_n), which is 6/5 at valence 3 and above 1 only where some valence is below \
+         6, as β_n ≥ ½ from there on: with valences from 6 on no error grows. An error of 1 at a vertex of valence 3, −1 at \
+         its neighbours and Σe/h = 0 grows to 6/5: P = Σ_k B^k e has it. Random points show no growth.",
     ))
 }
 

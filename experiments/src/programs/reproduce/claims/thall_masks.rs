@@ -329,21 +329,23 @@ fn full_step(lab: &Lab) -> Result<Finding> {
 
 fn other_schemes(lab: &Lab) -> Result<Finding> {
     let mut evidence = Vec::new();
+    // Of 1/a_ii, and of λ_min.
     let bounds = [
-        (Scheme::CatmullClark, 4.0),
-        (Scheme::Loop, 2.5),
-        (Scheme::Sqrt3, 8.0 / 3.0),
-        (Scheme::Nasri, 4.0),
-        (Scheme::ZhengCai, 2.0),
+        (Scheme::CatmullClark, 4.0, 0.0),
+        (Scheme::Loop, 2.5, 0.1),
+        (Scheme::Sqrt3, 8.0 / 3.0, 1.0 / 16.0),
+        (Scheme::Nasri, 4.0, 0.25),
+        (Scheme::ZhengCai, 2.0, 0.5),
     ];
-    for (scheme, bound) in bounds {
+    for (scheme, bound, least) in bounds {
         let subjects = if scheme.needs_triangles() { lab.triangles() } else { lab.polygons() };
         let rows = each(subjects, |subject| {
             let system = subject.system(scheme)?;
             let inverse = largest(system.diagonal.iter().map(|a| 1.0 / a));
-            let slow = scheme == Scheme::CatmullClark && ends(&system)?.jacobi_min < 1e-3;
+            let ends = ends(&system)?;
+            let slow = scheme == Scheme::CatmullClark && ends.jacobi_min < 1e-3;
             let outcome = (!slow).then(|| solve_random(&system, Method::Thall, 1e-6, 60_000).report.outcome);
-            Ok((inverse, outcome))
+            Ok((inverse, outcome, ends.min))
         })?;
         let stuck = rows.iter().filter(|r| r.1.is_some_and(|o| o != Outcome::Converged)).count();
         evidence.push(Evidence::at_most(
@@ -351,11 +353,17 @@ fn other_schemes(lab: &Lab) -> Result<Finding> {
             largest(rows.iter().map(|r| r.0)),
             bound + ROUNDING,
         ));
+        evidence.push(Evidence::at_least(
+            format!("smallest eigenvalue of A under {scheme} on random meshes"),
+            smallest(rows.iter().map(|r| r.2)),
+            least - ROUNDING,
+        ));
         evidence.push(Evidence::equal(format!("runs at ω = ½ under {scheme} that did not converge"), stuck, 0.0));
     }
     Ok(Finding::settled(evidence).remark(
-        "λ_max(D⁻¹A) ≤ max 1/a_ii ≤ 4 for all five schemes and the matrices are non-singular (T6, P5, P7, Z4, Z12): ω = ½ \
-         converges. Runs from random points; Catmull-Clark where λ_min(D⁻¹A) > 10⁻³.",
+        "λ_max(D⁻¹A) ≤ max 1/a_ii ≤ 4 for all five schemes, and λ_min(A) ≥ min (3β_n − 1)/2 > 0 under Loop and √3 (1/10 and \
+         1/16 at valence 3), ¼ under Nasri, ½ under Zheng-Cai; under Catmull-Clark A is as in P7. So ω = ½ converges \
+         whenever the matrix is non-singular, as it always is but under Catmull-Clark. Runs from random points; Catmull-Clark where λ_min(D⁻¹A) > 10⁻³.",
     ))
 }
 

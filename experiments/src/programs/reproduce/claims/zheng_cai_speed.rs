@@ -29,16 +29,17 @@ pub fn sweeps(lab: &Lab) -> Result<Finding> {
     let updates = (1..)
         .zip(&found.updates)
         .map(|(k, u)| Evidence::shown(format!("largest update of sweep {k} over L"), u / size));
-    Ok(Finding::reproduced(vec![Evidence::equal(
-        "sweeps until the largest update is at most 0.3 % of L, m1630 (562 vertices)",
-        found.updates.len(),
-        3.0,
-    )])
-    .also(updates)
-    .remark(
-        "The identity of the model is inferred from the number of vertices and of sweeps. The model of 11 540 vertices \
-         is not at hand, so its two iterations are not reproduced.",
-    ))
+    Ok(Finding::in_part(
+        vec![Evidence::equal(
+            "sweeps until the largest update is at most 0.3 % of L, m1630 (562 vertices)",
+            found.updates.len(),
+            3.0,
+        )],
+        "The three iterations are reproduced. That m1630 is the paper's model is inferred from its size alone: among 1310 \
+         models of the benchmark it is the only closed one of 562 vertices. The model of 11 540 vertices is not at hand, so \
+         its two iterations are not reproduced.",
+    )
+    .also(updates))
 }
 
 /// The paper's own model where it is at hand, else a stand-in of its size.
@@ -74,19 +75,19 @@ pub fn speed(lab: &Lab) -> Result<Finding> {
     let stop = Stop { tolerance: 1e-10 * subject.surface.diagonal(), max_iterations: 1 };
     let direct = |method| seconds(3, || run(&nasri, points, method, &stop));
     let ratio = |seconds: f64| Value::Time(seconds / own);
-    Ok(Finding::reproduced(vec![
-        Evidence::at_least(
-            "multiplications of dense elimination on Nasri's system over those of Gauss-Seidel to 0.3 %",
-            elimination / sweeping,
-            10.0,
-        ),
-        Evidence::shown("seconds of dense elimination over those of Gauss-Seidel", ratio(dense)),
-        Evidence::shown("the same, sparse LU", ratio(direct(Method::Lu))),
-        Evidence::shown("the same, sparse Cholesky", ratio(direct(Method::Cholesky))),
-    ])
-    .remark(
-        "Reproduced is read as ten times the multiplications at least; the printed ratio, of seconds, is 286. Sparse \
-         factorisation takes most of it away.",
+    Ok(Finding::in_part(
+        vec![
+            Evidence::above(
+                "multiplications of dense elimination on Nasri's system over those of Gauss-Seidel to 0.3 %",
+                elimination / sweeping,
+                1.0,
+            ),
+            Evidence::shown("seconds of dense elimination over those of Gauss-Seidel", ratio(dense)),
+            Evidence::shown("the same, sparse LU", ratio(direct(Method::Lu))),
+            Evidence::shown("the same, sparse Cholesky", ratio(direct(Method::Cholesky))),
+        ],
+        "That sweeps are cheaper is reproduced, by counts. The printed ratio, 286, is one of seconds of two programs on \
+         one machine, and no count can be held against it. Sparse factorisation takes most of it away.",
     ))
 }
 
@@ -164,14 +165,14 @@ pub fn phases(lab: &Lab) -> Result<Finding> {
         Ok((points, Value::Time(second / first)))
     }
     let (large, small) = (ratios(&model_11540(lab)?)?, ratios(&model_562(lab)?)?);
-    Ok(Finding::reproduced(vec![
-        Evidence::above("points of refining and adjusting over those of the sweeps, 11 540 vertices", large.0, 1.0),
-        Evidence::above("the same, 562 vertices", small.0, 1.0),
-        Evidence::shown("seconds of the two, 11 540 vertices (printed 6.2)", large.1),
-        Evidence::shown("the same, 562 vertices (printed 7.6), too short to be sure of", small.1),
-    ])
-    .remark(
-        "Reproduced is read as: the adjusting phase computes more points. The printed ratios are of seconds, and so of \
-         programs and machines.",
+    Ok(Finding::in_part(
+        vec![
+            Evidence::above("points of refining and adjusting over those of the sweeps, 11 540 vertices", large.0, 1.0),
+            Evidence::above("the same, 562 vertices", small.0, 1.0),
+            Evidence::shown("seconds of the two, 11 540 vertices (printed 6.2)", large.1),
+            Evidence::shown("the same, 562 vertices (printed 7.6), too short to be sure of", small.1),
+        ],
+        "That the adjusting phase computes more is reproduced, by counts of points. The printed ratios are of seconds, and \
+         so of a program and a machine: six to eight is not held against anything.",
     ))
 }
