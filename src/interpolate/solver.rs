@@ -54,8 +54,8 @@ use crate::parallel;
 use crate::schemes::Scheme;
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
 use crate::solvers::gmres::gmres;
-use crate::solvers::mixed::{self, Workspace};
 use crate::solvers::iteration::{largest, solve_in_scale};
+use crate::solvers::mixed::{self, Workspace};
 use crate::solvers::system::Rows;
 use crate::solvers::{Errors, Iterate, Method, Outcome, Recorded, Report, Solution, Step, Stop, run_watched};
 

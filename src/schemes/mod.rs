@@ -10,6 +10,7 @@
 //! | [`sqrt3`] | Kobbelt 2000 | triangles | no |
 //! | [`mid_edge`] | Peters & Reif 1997 | any polygons | no |
 //! | [`unified_sqrt3`] | Lin & Luo, α per vertex | triangles | where α = 1 |
+//! | [`blend`] | the same blend of any scheme above that keeps the numbers of its vertices | as of the scheme | where α = 1 |
 //! | [`butterfly`] | modified Butterfly, Zorin, Schröder & Sweldens 1996 | triangles | yes |
 //! | [`labsik_greiner`] | interpolatory √3, Labsik & Greiner 2000 | triangles | yes |
 //!
@@ -32,6 +33,7 @@
 //! # Ok::<(), limitlab::Error>(())
 //! ```
 
+pub mod blend;
 pub mod butterfly;
 pub mod catmull_clark;
 mod chaikin;

@@ -10,8 +10,7 @@ use glam::DVec3;
 
 use super::coloured::Coloured;
 use super::iteration::{
-    Errors, Failure, Iterate, Outcome, PATIENCE, PROGRESS, Recorded, Report, Step, Stop, WarmStart,
-    largest,
+    Errors, Failure, Iterate, Outcome, PATIENCE, PROGRESS, Recorded, Report, Step, Stop, WarmStart, largest,
 };
 use super::system::{Rows, System, sweep};
 use super::wavefront::Wavefront;

@@ -60,13 +60,7 @@ impl Stop {
 
     /// How a run ends that has got to an error after so many iterations, on data of a `size`, and whose watch has `told` to
     /// go on or not, if it does whatever the method is.
-    pub(super) fn verdict(
-        &self,
-        error: f64,
-        size: f64,
-        iterations: usize,
-        told: ControlFlow<()>,
-    ) -> Option<Outcome> {
+    pub(super) fn verdict(&self, error: f64, size: f64, iterations: usize, told: ControlFlow<()>) -> Option<Outcome> {
         if let Some(reached) = self.reached(error, size) {
             Some(reached)
         } else if !error.is_finite() {

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 use limitlab::assemble::{LimitSystem, Stages};
-use limitlab::interpolate::zheng_cai::*;
 use limitlab::interpolate::surface::{self, SurfaceOptions};
+use limitlab::interpolate::zheng_cai::*;
 use limitlab::interpolate::{nasri, staged};
 use limitlab::mesh::{Mesh, Surface, builtin, io};
 use limitlab::schemes::Scheme;

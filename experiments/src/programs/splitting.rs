@@ -33,10 +33,10 @@ pub struct Arguments {
     /// The vertex: smooth, boundary, crease, corner or dart
     #[arg(long, value_name = "KIND", default_value = "smooth")]
     at: At,
-    /// catmull-clark, loop, doo-sabin (at a face), sqrt3 or labsik-greiner
+    /// catmull-clark, loop, doo-sabin (at a face), sqrt3, labsik-greiner, blended-catmull-clark or blended-loop
     #[arg(long, value_name = "NAME", default_value = "catmull-clark")]
     scheme: String,
-    /// The blend of sqrt3, 0 to 2: 0 approximating (unless told), 1 interpolating
+    /// The blend of sqrt3 (0 unless told) and of the blended schemes (1), 0 to 2: 0 approximating, 1 interpolating
     #[arg(long, value_name = "A")]
     alpha: Option<f64>,
     #[command(flatten)]
@@ -160,7 +160,7 @@ fn run(arguments: &Arguments, scheme: LocalScheme, valences: &[usize], provenanc
     let mut object = json!({
         "scheme": scheme.name(),
         "alpha": match scheme {
-            LocalScheme::Sqrt3 { alpha } => number(alpha),
+            LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. } => number(alpha),
             _ => Value::Null,
         },
         "rows": rows.iter().map(row_json).collect::<Vec<_>>(),

@@ -149,7 +149,9 @@ fn grid(step: f64) -> Vec<f64> {
 
 fn stem(scheme: LocalScheme) -> String {
     match scheme {
-        LocalScheme::Sqrt3 { alpha } if alpha != 0.0 => format!("splitting-sqrt3-alpha-{alpha}"),
+        LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. } if alpha != 0.0 => {
+            format!("splitting-{}-alpha-{alpha}", scheme.name())
+        }
         _ => format!("splitting-{}", scheme.name()),
     }
 }

@@ -86,8 +86,7 @@ fn assert_numbers(object: &Value, fields: &[&str]) {
     }
 }
 
-const STATUS: [&str; 7] =
-    ["converged", "rounding", "diverged", "max-iterations", "stagnated", "singular", "breakdown"];
+const STATUS: [&str; 7] = ["converged", "rounding", "diverged", "max-iterations", "stagnated", "singular", "breakdown"];
 
 #[test]
 fn compare_solvers_prints_the_fields_of_the_contract() {

@@ -47,32 +47,7 @@ impl SplittingMatrix {
     /// If `rings` is 0.
     pub fn on_rings(scheme: LocalScheme, valence: usize, rings: usize) -> Result<Self> {
         assert!(rings > 0, "a star has at least one ring");
-        LocalScheme::require_valence(valence)?;
-        let layout = scheme.layout();
-        let size = layout.len(valence, rings);
-        let mut points = vec![DVec3::ZERO; size + 1];
-        let mesh = Mesh::new(points.clone(), layout.closed(valence, rings));
-        let mut round = Round::new(scheme, mesh, valence, rings)?;
-        let mut entries = DMatrix::zeros(size, size);
-        for first in (0..size).step_by(3) {
-            let columns = 3.min(size - first);
-            points.fill(DVec3::ZERO);
-            points[size] = DVec3::NAN;
-            for axis in 0..columns {
-                points[first + axis][axis] = 1.0;
-            }
-            for (row, point) in round.apply(&points)?.into_iter().enumerate() {
-                if !point.is_finite() {
-                    return Err(Error::Computation(format!(
-                        "the splitting matrix of {scheme} does not close on {rings} rings: take {} or more",
-                        scheme.least_rings()
-                    )));
-                }
-                for axis in 0..columns {
-                    entries[(row, first + axis)] = point[axis];
-                }
-            }
-        }
+        let entries = rows(scheme, valence, rings, rings)?;
         Ok(SplittingMatrix { scheme, valence, rings, entries })
     }
 
@@ -122,4 +97,36 @@ impl SplittingMatrix {
         }
         worst
     }
+}
+
+/// What leads from the positions of `rings` rings to those of `reach` rings after one round, as of
+/// [`SplittingMatrix::on_rings`].
+pub(super) fn rows(scheme: LocalScheme, valence: usize, rings: usize, reach: usize) -> Result<DMatrix<f64>> {
+    LocalScheme::require_valence(valence)?;
+    let layout = scheme.layout();
+    let size = layout.len(valence, rings);
+    let mut points = vec![DVec3::ZERO; size + 1];
+    let mesh = Mesh::new(points.clone(), layout.closed(valence, rings));
+    let mut round = Round::new(scheme, mesh, valence, reach)?;
+    let mut entries = DMatrix::zeros(layout.len(valence, reach), size);
+    for first in (0..size).step_by(3) {
+        let columns = 3.min(size - first);
+        points.fill(DVec3::ZERO);
+        points[size] = DVec3::NAN;
+        for axis in 0..columns {
+            points[first + axis][axis] = 1.0;
+        }
+        for (row, point) in round.apply(&points)?.into_iter().enumerate() {
+            if !point.is_finite() {
+                return Err(Error::Computation(format!(
+                    "the splitting matrix of {scheme} does not close on {rings} rings: take {} or more",
+                    scheme.least_rings()
+                )));
+            }
+            for axis in 0..columns {
+                entries[(row, first + axis)] = point[axis];
+            }
+        }
+    }
+    Ok(entries)
 }

@@ -5,6 +5,7 @@
 //! - [`scheme`]: the schemes, applied to a star, and their closed forms;
 //! - [`matrix`]: the matrix S read off from the refinement of unit vectors, and its Fourier blocks;
 //! - [`spectrum`]: eigenvalues, left and right invariant subspaces, limit and tangent masks;
+//! - [`evaluation`]: points of the surface at any parameter, by eigendecomposition;
 //! - [`characteristic`]: characteristic maps, and whether they are regular and injective;
 //! - [`condition`]: Lin & Luo's eigenvalue condition over α;
 //! - [`thall`]: the matrices, masks and tables that Thall prints, against computed ones;
@@ -23,6 +24,7 @@
 
 pub mod characteristic;
 pub mod condition;
+pub mod evaluation;
 pub mod matrix;
 pub mod row;
 pub mod scheme;
@@ -35,9 +37,10 @@ use nalgebra::Complex;
 
 pub use characteristic::{Check, Net, characteristic_map};
 pub use condition::{Condition, Crossing, condition_over_alpha, crossings};
+pub use evaluation::ExactSurface;
 pub use matrix::SplittingMatrix;
 pub use row::{StarRow, rows};
-pub use scheme::{LocalScheme, VALENCES};
+pub use scheme::{Blended, LocalScheme, VALENCES};
 pub use sharp::{SharpMask, SharpRow, SharpSector, SharpVertex, sharp_rows};
 pub use spectrum::{Eigenspace, Mode, distance_to_space};
 pub use star::Layout;

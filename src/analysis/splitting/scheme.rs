@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::mesh::{Mesh, Surface};
 use crate::names;
 use crate::schemes::unified_sqrt3::{self, ALPHA_RANGE};
-use crate::schemes::{catmull_clark, doo_sabin, labsik_greiner, loop_scheme, sqrt3};
+use crate::schemes::{Refinement, blend, catmull_clark, doo_sabin, labsik_greiner, loop_scheme, sqrt3};
 
 /// Valences of local matrices. Below 3 a star is degenerate; the matrices are dense, and the largest (three rings
 /// of quads) has 12n+1 rows.
@@ -31,13 +31,45 @@ pub enum LocalScheme {
         /// The blend parameter α, from 0 to 2.
         alpha: f64,
     },
+    /// The same [blend](crate::schemes::blend) of another scheme; with α = 0 it is that scheme.
+    Blend {
+        /// The scheme that is blended.
+        of: Blended,
+        /// The blend parameter α, from 0 to 2.
+        alpha: f64,
+    },
     /// The interpolatory √3 scheme of Labsik & Greiner, two steps turned back as of `Sqrt3`.
     LabsikGreiner,
 }
 
+/// What is blended in [`LocalScheme::Blend`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blended {
+    /// Catmull-Clark, at a vertex among quads.
+    CatmullClark,
+    /// Loop, at a vertex among triangles.
+    Loop,
+}
+
+impl Blended {
+    fn scheme(self) -> LocalScheme {
+        match self {
+            Blended::CatmullClark => LocalScheme::CatmullClark,
+            Blended::Loop => LocalScheme::Loop,
+        }
+    }
+
+    fn refinement(self) -> Refinement {
+        match self {
+            Blended::CatmullClark => Refinement::CatmullClark,
+            Blended::Loop => Refinement::Loop,
+        }
+    }
+}
+
 impl LocalScheme {
-    /// The scheme called `name`, one of `catmull-clark`, `loop`, `doo-sabin`, `sqrt3`, `labsik-greiner`; only `sqrt3`
-    /// takes an `alpha`.
+    /// The scheme called `name`, one of `catmull-clark`, `loop`, `doo-sabin`, `sqrt3`, `labsik-greiner`,
+    /// `blended-catmull-clark` and `blended-loop`; `sqrt3` (0 unless told) and the blends (1) take an `alpha`.
     ///
     /// # Errors
     /// [`Error::Unknown`] for another name, an `alpha` outside [`ALPHA_RANGE`], or one for a scheme without.
@@ -48,14 +80,16 @@ impl LocalScheme {
             LocalScheme::DooSabin,
             LocalScheme::Sqrt3 { alpha: alpha.unwrap_or(0.0) },
             LocalScheme::LabsikGreiner,
+            LocalScheme::Blend { of: Blended::CatmullClark, alpha: alpha.unwrap_or(1.0) },
+            LocalScheme::Blend { of: Blended::Loop, alpha: alpha.unwrap_or(1.0) },
         ];
         let scheme =
             names::find("scheme with a splitting matrix", name, &all.map(|scheme| (scheme.name(), scheme)), &[])?;
         match (scheme, alpha) {
-            (LocalScheme::Sqrt3 { alpha }, _) if !ALPHA_RANGE.contains(&alpha) => {
+            (LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. }, _) if !ALPHA_RANGE.contains(&alpha) => {
                 Err(Error::Unknown(format!("α = {alpha} is outside [{}, {}]", ALPHA_RANGE.start(), ALPHA_RANGE.end())))
             }
-            (LocalScheme::Sqrt3 { .. }, _) | (_, None) => Ok(scheme),
+            (LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. }, _) | (_, None) => Ok(scheme),
             (_, Some(_)) => Err(Error::Unknown(format!("{name} has no parameter α: leave it out or choose sqrt3"))),
         }
     }
@@ -68,6 +102,8 @@ impl LocalScheme {
             LocalScheme::DooSabin => "doo-sabin",
             LocalScheme::Sqrt3 { .. } => "sqrt3",
             LocalScheme::LabsikGreiner => "labsik-greiner",
+            LocalScheme::Blend { of: Blended::CatmullClark, .. } => "blended-catmull-clark",
+            LocalScheme::Blend { of: Blended::Loop, .. } => "blended-loop",
         }
     }
 
@@ -77,13 +113,14 @@ impl LocalScheme {
             LocalScheme::CatmullClark => Layout::Quads,
             LocalScheme::Loop | LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => Layout::Triangles,
             LocalScheme::DooSabin => Layout::QuadsAboutFace,
+            LocalScheme::Blend { of, .. } => of.scheme().layout(),
         }
     }
 
-    /// The fewest rings on which the local matrix closes: 1, but 3 for the blend with α ≠ 0 and Labsik-Greiner.
+    /// The fewest rings on which the local matrix closes: 1, but 3 for blends with α ≠ 0 and Labsik-Greiner.
     pub fn least_rings(self) -> usize {
         match self {
-            LocalScheme::Sqrt3 { alpha } if alpha != 0.0 => 3,
+            LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. } if alpha != 0.0 => 3,
             LocalScheme::LabsikGreiner => 3,
             _ => 1,
         }
@@ -129,15 +166,17 @@ impl LocalScheme {
                 Ok(mesh)
             }
             LocalScheme::LabsikGreiner => labsik_greiner::refine(surface),
+            LocalScheme::Blend { of, alpha } => blend::refine(surface, of.refinement(), alpha),
         }
     }
 
     /// Where the half-edge `root` from the middle is found after a step; of √3 turned clockwise by half a sector.
-    pub(super) fn root_after_step(self, root: u32) -> u32 {
+    pub fn root_after_step(self, root: u32) -> u32 {
         match self {
             LocalScheme::CatmullClark => 4 * root,
             LocalScheme::Loop => 12 * (root / 3) + 3 * (root % 3),
             LocalScheme::DooSabin => root,
+            LocalScheme::Blend { of, .. } => of.scheme().root_after_step(root),
             LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => 3 * root,
         }
     }
@@ -159,7 +198,8 @@ impl LocalScheme {
             LocalScheme::Loop => Some(0.375 + 0.25 * turn.cos()),
             LocalScheme::DooSabin => Some(0.5),
             LocalScheme::Sqrt3 { alpha: 0.0 } => Some((2.0 / 3.0 * (PI / n as f64).cos()).powi(2)),
-            LocalScheme::Sqrt3 { .. } => None,
+            LocalScheme::Blend { of, alpha: 0.0 } => of.scheme().subdominant_formula(n),
+            LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. } => None,
             LocalScheme::LabsikGreiner => Some(labsik_greiner::subdominant(n).powi(2)),
         }
     }
@@ -197,7 +237,8 @@ impl LocalScheme {
                 all.push((2.0 / 3.0 - sqrt3::relaxation(n)).powi(2));
                 all.extend((1..n).map(|k| (2.0 / 3.0 * half(k)).powi(2)));
             }
-            LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => return None,
+            LocalScheme::Blend { of, alpha: 0.0 } => return of.scheme().eigenvalues_formula(n),
+            LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. } | LocalScheme::LabsikGreiner => return None,
         }
         let mut all: Vec<_> = all.into_iter().map(Complex::from).collect();
         super::sort(&mut all);
@@ -212,8 +253,12 @@ impl LocalScheme {
             LocalScheme::Loop => Some(loop_scheme::limit_mask(n).to_vec()),
             LocalScheme::DooSabin => Some(vec![1.0 / n as f64]),
             LocalScheme::Sqrt3 { alpha: 0.0 } => Some(sqrt3::limit_mask(n).to_vec()),
-            LocalScheme::Sqrt3 { alpha: 1.0 } | LocalScheme::LabsikGreiner => Some(vec![1.0, 0.0]),
-            LocalScheme::Sqrt3 { .. } => None,
+            LocalScheme::Blend { of, alpha: 0.0 } => of.scheme().limit_mask_formula(n),
+            LocalScheme::Blend { of: Blended::CatmullClark, alpha: 1.0 } => Some(vec![1.0, 0.0, 0.0]),
+            LocalScheme::Sqrt3 { alpha: 1.0 }
+            | LocalScheme::Blend { of: Blended::Loop, alpha: 1.0 }
+            | LocalScheme::LabsikGreiner => Some(vec![1.0, 0.0]),
+            LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. } => None,
         }
     }
 
@@ -229,7 +274,8 @@ impl LocalScheme {
             }
             LocalScheme::DooSabin => Some(ring().collect()),
             LocalScheme::Loop | LocalScheme::Sqrt3 { alpha: 0.0 } => Some([0.0].into_iter().chain(ring()).collect()),
-            LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => None,
+            LocalScheme::Blend { of, alpha: 0.0 } => of.scheme().cosine_mask_formula(n),
+            LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. } | LocalScheme::LabsikGreiner => None,
         }
     }
 }
@@ -237,7 +283,9 @@ impl LocalScheme {
 impl fmt::Display for LocalScheme {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            LocalScheme::Sqrt3 { alpha } => write!(f, "sqrt3, α = {alpha}"),
+            LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. } => {
+                write!(f, "{}, α = {alpha}", self.name())
+            }
             _ => f.write_str(self.name()),
         }
     }

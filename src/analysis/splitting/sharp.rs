@@ -81,9 +81,13 @@ impl SharpVertex {
         match scheme {
             LocalScheme::CatmullClark => Ok(StarRule::CatmullClark),
             LocalScheme::Loop => Ok(StarRule::Loop),
-            LocalScheme::DooSabin | LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => Err(Error::Unknown(
-                format!("{} has no local matrix at a {self} vertex: choose catmull-clark or loop", scheme.name()),
-            )),
+            LocalScheme::DooSabin
+            | LocalScheme::Sqrt3 { .. }
+            | LocalScheme::Blend { .. }
+            | LocalScheme::LabsikGreiner => Err(Error::Unknown(format!(
+                "{} has no local matrix at a {self} vertex: choose catmull-clark or loop",
+                scheme.name()
+            ))),
         }
     }
 }

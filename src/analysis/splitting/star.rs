@@ -61,6 +61,26 @@ impl Layout {
         (self.centre() + orbit * n + sector % n) as u32
     }
 
+    /// The number of the position i steps along the first axis of a sector and j towards its second, about the middle of n
+    /// sectors, as [`walk`](Self::walk) orders them. One of both may be negative, which is in the sector beside.
+    ///
+    /// # Panics
+    /// If both are negative.
+    pub fn position(self, n: usize, sector: usize, i: i64, j: i64) -> u32 {
+        let (turn, i, j) = match self {
+            // With axes e_s: e_{s+1} = e_s + e_{s+2} and e_s = e_{s+1} + e_{s−1}.
+            Layout::Triangles if i < 0 => (1, i + j, -i),
+            Layout::Triangles if j < 0 => (n - 1, -j, i + j),
+            Layout::Quads if i < 0 => (1, j, -i),
+            Layout::Quads if j < 0 => (n - 1, -j, i),
+            // (0, 0) lies half a step from both axes.
+            Layout::QuadsAboutFace if i < 0 => (1, j, -i - 1),
+            Layout::QuadsAboutFace if j < 0 => (n - 1, -j - 1, i),
+            Layout::Triangles | Layout::Quads | Layout::QuadsAboutFace => (0, i, j),
+        };
+        self.index(n, sector + turn, i as usize, j as usize)
+    }
+
     /// The name of position `index`: `v` for the middle, else `sector:i,j`, sectors from 0.
     pub fn label(self, n: usize, index: usize) -> String {
         let Some(rest) = index.checked_sub(self.centre()) else {

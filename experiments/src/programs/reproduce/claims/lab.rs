@@ -291,6 +291,25 @@ pub fn history(system: &LimitSystem, subject: &Subject, method: Method, count: u
     report.maxima().into_iter().map(|error| error / size).collect()
 }
 
+/// The largest second difference along straight lines of edges through vertices of an even valence, halved as often as there are
+/// `levels`: the jump of first divided differences, which tends to 0 exactly where these are continuous.
+pub fn largest_kink(surface: &Surface, values: &[DVec3], levels: usize) -> f64 {
+    let (faces, topology) = (surface.faces(), surface.topology());
+    let (mut star, mut found) = (Vec::new(), 0.0f64);
+    for v in 0..surface.len() {
+        topology.star(faces, v, &mut star);
+        let half = star.len() / 2;
+        if star.len() % 2 == 1 {
+            continue;
+        }
+        let end = |k: usize| values[faces.corners()[topology.incidence.next(faces, star[k]) as usize] as usize];
+        for k in 0..half {
+            found = largest([found, (end(k) - 2.0 * values[v] + end(k + half)).length()]);
+        }
+    }
+    found * 2f64.powi(levels as i32)
+}
+
 /// Stored entries of A a vertex.
 pub fn entries_per_vertex(system: &LimitSystem) -> f64 {
     system.a.values().len() as f64 / system.len() as f64

@@ -12,14 +12,18 @@ mod finding;
 pub mod findings;
 mod lab;
 mod lin_luo;
+mod lin_luo_others;
 pub mod links;
 mod open;
 mod pia;
 mod pia_catmull_clark;
+mod pia_lemma;
 mod thall;
 mod thall_masks;
+mod thall_normals;
 mod thall_surfaces;
 mod zheng_cai;
+mod zheng_cai_exact;
 mod zheng_cai_faces;
 mod zheng_cai_speed;
 
@@ -80,9 +84,11 @@ const PAPERS: [(char, &str); 4] = [
 
 /// All claims in the order of the ledger.
 pub fn all() -> impl Iterator<Item = &'static Claim> {
-    let zheng_cai = [zheng_cai::CLAIMS, open::ZHENG_CAI];
-    let pia = [pia::CLAIMS, open::PIA];
-    [thall::CLAIMS, thall_masks::CLAIMS].into_iter().chain(zheng_cai).chain(pia).chain([lin_luo::CLAIMS]).flatten()
+    let thall = [thall::CLAIMS, thall_masks::CLAIMS, thall_normals::CLAIMS];
+    let zheng_cai = [zheng_cai::CLAIMS, open::ZHENG_CAI, zheng_cai_exact::CLAIMS];
+    let pia = [pia::CLAIMS, open::PIA, pia_lemma::CLAIMS];
+    let lin_luo = [lin_luo::CLAIMS, lin_luo_others::CLAIMS];
+    thall.into_iter().chain(zheng_cai).chain(pia).chain(lin_luo).flatten()
 }
 
 pub fn find(id: &str) -> Option<&'static Claim> {

@@ -103,20 +103,24 @@ pub fn metrics(_: &Lab) -> Result<Finding> {
     let shifts: Vec<f64> = shifts.into_iter().flatten().collect();
     Ok(Finding::in_part(
         vec![
-        Evidence::at_most(
-            "metric 1 after 100 iterations, r = 0.1, irregular-tri:300 on the unit sphere",
-            largest(scaled_distances(&limits, &mesh.positions, &radius)),
-            1e-4,
-        ),
-        Evidence::shown("metric 1 before", largest(scaled_distances(&start, &mesh.positions, &radius))),
-        Evidence::above("metric 2: largest angle to the sphere's normals after the iterations", largest(angles), 0.01),
-        Evidence::at_most(
-            "metric 3: distance of the fitted medial atom from the sphere's own",
-            ball.map_or(f64::NAN, |b| b.position.length() + (b.radius - 1.0).abs()),
-            ROUNDING,
-        ),
-        Evidence::shown("metric 3: median shift of the atoms of the triangles", median(shifts)),
-    ],
+            Evidence::at_most(
+                "metric 1 after 100 iterations, r = 0.1, irregular-tri:300 on the unit sphere",
+                largest(scaled_distances(&limits, &mesh.positions, &radius)),
+                1e-4,
+            ),
+            Evidence::shown("metric 1 before", largest(scaled_distances(&start, &mesh.positions, &radius))),
+            Evidence::above(
+                "metric 2: largest angle to the sphere's normals after the iterations",
+                largest(angles),
+                0.01,
+            ),
+            Evidence::at_most(
+                "metric 3: distance of the fitted medial atom from the sphere's own",
+                ball.map_or(f64::NAN, |b| b.position.length() + (b.radius - 1.0).abs()),
+                ROUNDING,
+            ),
+            Evidence::shown("metric 3: median shift of the atoms of the triangles", median(shifts)),
+        ],
         "Metrics 1 and 2 are as described. Metric 3 refers to a construction of another chapter of the thesis, which is \
          not at hand: its numbers are those of a least-squares ball that stands in for it.",
     ))
