@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use assert_cmd::Command;
 use glam::DVec3;
+use limitlab::interpolate::limit_points;
 use limitlab::mesh::{Mesh, Surface, builtin, io, noise};
-use limitlab::schemes::{Refinement, catmull_clark, doo_sabin};
+use limitlab::schemes::{Refinement, Scheme, catmull_clark, doo_sabin};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -164,6 +165,8 @@ fn two_phases_give_exact_centroids_with_handles_and_subsets() {
         }
     }
     let (_, plain) = bench.run("irregular-poly:40 --noise 0.1 --scheme nasri --tol 1e-13 --subdivide 2");
+    let (_, one) = bench.run("irregular-poly:40 --noise 0.1 --scheme nasri --tol 1e-13 --subdivide 2 --shape-handle 1");
+    assert_eq!(one.mesh.positions, plain.mesh.positions);
     let (_, control) = bench.run("irregular-poly:40 --noise 0.1 --scheme nasri --tol 1e-13");
     let control = surface(&control.mesh);
     let expected = Refinement::DooSabin.refine_n(&control, 2).unwrap();
@@ -186,6 +189,10 @@ fn a_subset_moves_no_other_vertex() {
         let point = if marked { *limit } else { loaded.mesh.positions[v] };
         assert!(point.distance(given.positions[v]) < ROUNDING, "{v}");
     }
+    // To the last bit that of the file, and not of the difference that was solved for.
+    let limits = limit_points(&surface(&loaded.mesh), Scheme::CatmullClark).unwrap();
+    let off = [3, 5, 8, 9, 10, 11].map(|v| limits[v].distance(given.positions[v])).into_iter().fold(0.0, f64::max);
+    assert_eq!(json["max_error"].as_f64(), Some(off));
 }
 
 #[test]

@@ -1,13 +1,18 @@
 //! Characteristic maps, and maps built to fail.
 
 use glam::DVec2;
-use limitlab::analysis::splitting::{LocalScheme, Net, SplittingMatrix, characteristic_map};
+use limitlab::analysis::splitting::{Blended, LocalScheme, Net, SplittingMatrix, characteristic_map};
 
 use super::{EIGEN, SCHEMES};
 
 const VALENCES: [usize; 8] = [3, 4, 5, 6, 7, 8, 12, 50];
-const BLENDS: [LocalScheme; 3] =
-    [LocalScheme::Sqrt3 { alpha: 0.5 }, LocalScheme::Sqrt3 { alpha: 1.0 }, LocalScheme::LabsikGreiner];
+const BLENDS: [LocalScheme; 5] = [
+    LocalScheme::Sqrt3 { alpha: 0.5 },
+    LocalScheme::Sqrt3 { alpha: 1.0 },
+    LocalScheme::LabsikGreiner,
+    LocalScheme::Blend { of: Blended::CatmullClark, alpha: 1.0 },
+    LocalScheme::Blend { of: Blended::Loop, alpha: 1.0 },
+];
 
 fn map(scheme: LocalScheme, n: usize) -> Net {
     characteristic_map(scheme, n, scheme.map_rings()).unwrap()

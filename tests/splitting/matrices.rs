@@ -1,15 +1,18 @@
 //! The matrices themselves, their eigenvalues, subspaces and masks.
 
-use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix, distance_to_space, rows};
+use limitlab::analysis::splitting::{Blended, LocalScheme, SplittingMatrix, distance_to_space, rows};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::{EIGEN, ROUNDING, SCHEMES};
 
-const BLENDS: [LocalScheme; 4] = [
+const BLENDS: [LocalScheme; 7] = [
     LocalScheme::Sqrt3 { alpha: 0.5 },
     LocalScheme::Sqrt3 { alpha: 1.0 },
     LocalScheme::Sqrt3 { alpha: 1.5 },
     LocalScheme::LabsikGreiner,
+    LocalScheme::Blend { of: Blended::CatmullClark, alpha: 0.5 },
+    LocalScheme::Blend { of: Blended::CatmullClark, alpha: 1.0 },
+    LocalScheme::Blend { of: Blended::Loop, alpha: 1.0 },
 ];
 
 #[test]
@@ -26,13 +29,22 @@ fn sizes_are_those_of_the_literature() {
 
 #[test]
 fn the_blend_closes_on_three_rings_and_no_fewer() {
-    let scheme = LocalScheme::Sqrt3 { alpha: 1.0 };
-    for n in [3, 5, 6, 9] {
-        for rings in [1, 2] {
-            let refused = SplittingMatrix::on_rings(scheme, n, rings).unwrap_err().to_string();
-            assert!(refused.contains("take 3 or more"), "{refused}");
+    for scheme in BLENDS {
+        for n in [3, 5, 6, 9] {
+            for rings in [1, 2] {
+                let refused = SplittingMatrix::on_rings(scheme, n, rings).unwrap_err().to_string();
+                assert!(refused.contains("take 3 or more"), "{refused}");
+            }
+            assert!(SplittingMatrix::on_rings(scheme, n, 3).is_ok());
         }
-        assert!(SplittingMatrix::on_rings(scheme, n, 3).is_ok());
+    }
+}
+
+#[test]
+fn without_blending_the_matrix_is_the_scheme_s_own() {
+    for (of, own) in [(Blended::CatmullClark, LocalScheme::CatmullClark), (Blended::Loop, LocalScheme::Loop)] {
+        let plain = SplittingMatrix::new(LocalScheme::Blend { of, alpha: 0.0 }, 5).unwrap();
+        assert!((plain.entries - SplittingMatrix::new(own, 5).unwrap().entries).amax() < ROUNDING);
     }
 }
 
@@ -210,10 +222,15 @@ fn more_rings_keep_the_leading_eigenvalues_and_the_masks() {
 #[test]
 fn the_interpolating_scheme_keeps_its_vertex() {
     for n in [3, 4, 5, 6, 7, 30] {
-        let s = SplittingMatrix::new(LocalScheme::Sqrt3 { alpha: 1.0 }, n).unwrap();
-        let mask = s.limit_mask().unwrap();
-        assert!((mask[0] - 1.0).abs() < EIGEN);
-        assert!(mask.rows(1, 6 * n).amax() < EIGEN);
+        for scheme in BLENDS {
+            if matches!(scheme, LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. } if alpha != 1.0) {
+                continue;
+            }
+            let s = SplittingMatrix::new(scheme, n).unwrap();
+            let mask = s.limit_mask().unwrap();
+            assert!((mask[0] - 1.0).abs() < EIGEN);
+            assert!(mask.rows(1, s.size() - 1).amax() < EIGEN, "{scheme} {n}");
+        }
     }
 }
 
