@@ -274,18 +274,19 @@ mod tests {
         }
     }
 
-    /// Where refinement cannot follow: along a ray towards the middle points tend to its limit like λ_1^k.
+    /// Where refinement hardly follows: of the characteristic net, all of it λ_1, a point half as far is λ_1 times the former.
     #[test]
-    fn points_tend_to_the_limit_of_the_middle_at_the_subdominant_rate() {
+    fn points_of_the_characteristic_map_shrink_by_the_subdominant_eigenvalue() {
         for scheme in SCHEMES {
             for n in [3, 5, 8] {
                 let exact = ExactSurface::new(scheme, n).expect("patches");
-                let control = random_points(scheme.layout().len(n, RINGS), 3);
-                let middle = exact.point(&control, 1, [0.0, 0.0]);
-                let off = |k: i32| exact.point(&control, 1, [0.4, 0.3].map(|x| x * 0.5f64.powi(k))).distance(middle);
+                let matrix = SplittingMatrix::on_rings(scheme, n, RINGS).expect("a matrix");
+                let control: Vec<DVec3> =
+                    matrix.characteristic_net().expect("a net").iter().map(|p| p.extend(0.0)).collect();
+                let at = |k: i32| exact.point(&control, 1, [0.4, 0.3].map(|x| x * 0.5f64.powi(k)));
                 let lambda = scheme.subdominant_formula(n).expect("a formula");
-                let ratio = (off(30) / off(20)).powf(0.1);
-                assert!((ratio / lambda - 1.0).abs() < 1e-3, "{scheme} {n}: {ratio} {lambda}");
+                assert!(at(12).distance(lambda.powi(7) * at(5)) < 1e-7 * at(12).length(), "{scheme} {n}");
+                assert!(exact.point(&control, 1, [0.0, 0.0]).length() < 1e-14, "{scheme} {n}");
             }
         }
     }

@@ -166,6 +166,7 @@ impl LocalScheme {
                 Ok(mesh)
             }
             LocalScheme::LabsikGreiner => labsik_greiner::refine(surface),
+            LocalScheme::Blend { of, alpha: 0.0 } => of.scheme().step(surface),
             LocalScheme::Blend { of, alpha } => blend::refine(surface, of.refinement(), alpha),
         }
     }

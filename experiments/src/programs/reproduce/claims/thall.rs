@@ -422,10 +422,10 @@ fn best_omega(lab: &Lab) -> Result<Finding> {
         ),
         Evidence::shown("the largest of these ratios", largest(of(|t| t.at_half / t.at_data))),
         Evidence::shown(
-            "part of the first error in modes that ½ shrinks by less than that ω its worst, largest where ½ is the faster",
+            "part of the first error in modes that ½ shrinks by less than the spectral radius at that ω, largest where ½ is the faster",
             largest(slow_parts(true)),
         ),
-        Evidence::shown("the same, smallest of the other meshes", smallest(slow_parts(false))),
+        Evidence::shown("the same, median of the other meshes", median(slow_parts(false))),
     ])
     .remark(format!(
         "The guess is always safe (T6), and never above the matrix's best ω, which makes the error of the worst points \
