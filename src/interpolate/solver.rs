@@ -414,14 +414,27 @@ impl Interpolator {
     /// # Panics
     /// If there is not one point a vertex in both.
     pub fn solve(&mut self, points: &[DVec3], control: &mut Vec<DVec3>, stop: &Stop) -> Report {
+        self.solve_watched(points, control, stop, &mut unwatched).1
+    }
+
+    /// As [`solve`](Self::solve), watched as [`interpolate_watched`] is; also the name of the method that came to the end.
+    ///
+    /// # Panics
+    /// As [`solve`](Self::solve).
+    pub fn solve_watched(
+        &mut self,
+        points: &[DVec3],
+        control: &mut Vec<DVec3>,
+        stop: &Stop,
+        watch: &mut Watch,
+    ) -> (&'static str, Report) {
         // What a failed solution left is no start.
         if !parallel::all(control.len(), |v| control[v].is_finite()) {
             control.clear();
         }
-        self.solve_into(points, control, stop, &mut unwatched).1
+        self.solve_into(points, control, stop, watch)
     }
 
-    /// As [`solve`](Self::solve), with the name of the method that came to the end.
     fn solve_into(
         &mut self,
         points: &[DVec3],

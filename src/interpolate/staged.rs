@@ -5,13 +5,13 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 
 use crate::assemble::Stages;
-use crate::solvers::{Method, Solution, Step, Stop, run_from};
+use crate::solvers::{self, Method, Solution, Step, Stop};
 
 /// Solves `A V = P`: the curves, then the block by `method` from V_S = P_S. The solution holds all vertices; its errors are
 /// those of the block, the mean too.
 ///
 /// # Panics
-/// As [`run_from`].
+/// As [`solvers::run_from`].
 ///
 /// ```
 /// use limitlab::assemble::Stages;
@@ -38,7 +38,7 @@ pub fn run(stages: &Stages, points: &[DVec3], method: Method, stop: &Stop) -> So
 /// [block](Stages::order).
 ///
 /// # Panics
-/// As [`run_from`].
+/// As [`run`].
 pub fn run_watched(
     stages: &Stages,
     points: &[DVec3],
@@ -46,12 +46,27 @@ pub fn run_watched(
     stop: &Stop,
     watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
 ) -> Solution {
+    run_from(stages, points, points, method, stop, watch)
+}
+
+/// As [`run_watched`], from V = `start` on the smooth vertices instead of V = P.
+///
+/// # Panics
+/// As [`run_watched`], and if there is not one point of the start a vertex.
+pub fn run_from(
+    stages: &Stages,
+    points: &[DVec3],
+    start: &[DVec3],
+    method: Method,
+    stop: &Stop,
+    watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
+) -> Solution {
     if stages.vertices().is_none() {
-        return run_from(stages.block(), points, points, method, stop, watch);
+        return solvers::run_from(stages.block(), points, start, method, stop, watch);
     }
     let known = stages.known(points);
-    let (right, start) = (stages.right_hand_side(&known), stages.restricted(&known));
+    let (right, start) = (stages.right_hand_side(&known), stages.restricted(start));
     let Solution { points: block, method, report, setup_seconds, solve_seconds, fill } =
-        run_from(stages.block(), &right, &start, method, stop, watch);
+        solvers::run_from(stages.block(), &right, &start, method, stop, watch);
     Solution { points: stages.joined(known, block), method, report, setup_seconds, solve_seconds, fill }
 }

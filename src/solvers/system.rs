@@ -206,6 +206,36 @@ pub struct Totals {
     pub dot: f64,
 }
 
+/// `out` becomes A x, of one number or one point a vertex, in parallel.
+///
+/// # Panics
+/// If `x` or `out` has not one entry a vertex.
+///
+/// ```
+/// use limitlab::assemble::Operator;
+/// use limitlab::mesh::{Surface, builtin};
+/// use limitlab::schemes::Scheme;
+/// use limitlab::solvers::system::product;
+///
+/// let surface = Surface::new(builtin::builtin("torus:4x4")?)?;
+/// let operator = Operator::new(&surface, Scheme::CatmullClark)?;
+/// let mut image = vec![0.0; 16];
+/// product(&operator, &[1.0; 16], &mut image);
+/// assert!(image.iter().all(|y| (y - 1.0f64).abs() < 1e-15));
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn product<S: System, P: Point>(system: &S, x: &[P], out: &mut [P]) {
+    assert!(x.len() == system.len() && out.len() == system.len(), "one entry a vertex");
+    let mut shared = Vec::new();
+    system.prepare(x, &mut shared);
+    parallel::chunks(out, CHUNK, |first, part| {
+        for (k, strip) in part.chunks_mut(STRIP).enumerate() {
+            let first = first + k * STRIP;
+            system.product(first..first + strip.len(), x, &shared, strip);
+        }
+    });
+}
+
 /// One in-place sweep over the vertices in the order given.
 pub fn sweep<S: System>(system: &S, points: &[DVec3], omega: f64, order: impl Iterator<Item = usize>, x: &mut [DVec3]) {
     let diagonal = system.diagonal();
