@@ -50,7 +50,7 @@ pub fn of_vertices<T: Element + Copy>(
 /// Faces of `size` corners each, or from `offsets`.
 pub fn faces(corners: &Bound<'_, PyAny>, size: usize, offsets: Option<&PyReadonlyArray1<'_, i64>>) -> PyResult<Faces> {
     let corners = if let Ok(array) = corners.cast::<PyArray1<i32>>() {
-        indices(array.readonly().as_slice()?)?
+        short_indices(array.readonly().as_slice()?)?
     } else if let Ok(array) = corners.cast::<PyArray1<i64>>() {
         indices(array.readonly().as_slice()?)?
     } else {
@@ -75,11 +75,24 @@ pub fn faces(corners: &Bound<'_, PyAny>, size: usize, offsets: Option<&PyReadonl
 }
 
 /// Indices of vertices; whether these exist is for the validator.
-pub fn indices<T: Copy + TryInto<u32> + std::fmt::Display>(values: &[T]) -> PyResult<Vec<u32>> {
-    let index = |&v: &T| {
-        v.try_into().map_err(|_| PyValueError::new_err(format!("{v} is no index: vertices are numbered from 0")))
-    };
-    values.iter().map(index).collect()
+pub fn indices(values: &[i64]) -> PyResult<Vec<u32>> {
+    // Seen all at once, which is many times faster than one by one.
+    if values.iter().fold(0, |all, &v| all | v) >> 32 != 0 {
+        let negative = values.iter().find(|&&v| u32::try_from(v).is_err());
+        return Err(no_index(negative.copied().unwrap_or_default()));
+    }
+    Ok(values.iter().map(|&v| v as u32).collect())
+}
+
+fn short_indices(values: &[i32]) -> PyResult<Vec<u32>> {
+    if values.iter().fold(0, |all, &v| all | v) < 0 {
+        return Err(no_index(values.iter().find(|&&v| v < 0).copied().unwrap_or_default().into()));
+    }
+    Ok(bytemuck::cast_slice(values).to_vec())
+}
+
+fn no_index(v: i64) -> PyErr {
+    PyValueError::new_err(format!("{v} is no index of a vertex: they are numbered from 0"))
 }
 
 /// (n, 3), in the memory of the points.

@@ -1,5 +1,7 @@
 //! Errors of the library as exceptions: those of `limitlab.errors`, and Python's own where they say the same.
 
+use std::io::ErrorKind;
+
 use limitlab::Error;
 use limitlab::mesh::validate::Validation;
 use pyo3::exceptions::{PyMemoryError, PyOSError, PyValueError};
@@ -38,14 +40,16 @@ fn exception(py: Python<'_>, error: Error) -> PyResult<PyErr> {
         made(py, "MeshError", (text.clone(), report))
     };
     match error {
-        Error::Io { path, source, .. } => match source.raw_os_error() {
-            // From these three Python makes FileNotFoundError and its like.
-            Some(code) => {
-                let words: String = py.import("os")?.getattr("strerror")?.call1((code,))?.extract()?;
-                Ok(PyOSError::new_err((code, words, path.display().to_string())))
-            }
-            None => Ok(PyOSError::new_err(text)),
-        },
+        Error::Io { path, source, .. } => {
+            // From a code, words and a name Python makes FileNotFoundError and its like.
+            let errno = py.import("errno")?;
+            let code: i32 = match (source.raw_os_error(), source.kind()) {
+                (Some(code), _) => code,
+                (None, ErrorKind::NotFound) => errno.getattr("ENOENT")?.extract()?,
+                (None, _) => errno.getattr("EIO")?.extract()?,
+            };
+            Ok(PyOSError::new_err((code, source.to_string(), path.display().to_string())))
+        }
         Error::Parse { path, line, .. } => made(py, "FormatError", (text, path.display().to_string(), line)),
         Error::Defects(report) => Ok(of_defects(py, &report)),
         Error::NotTriangles { face, .. } => at("not-a-triangle", "face", face),

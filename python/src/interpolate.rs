@@ -161,7 +161,10 @@ pub fn interpolate<'py>(
         scheme,
         way,
         options: asked.options(frame, of_vertices.marks())?,
-        order: asked.order(py, surface)?,
+        order: match way {
+            Way::Solver(_) | Way::TwoPhase => asked.order(py, surface)?,
+            Way::Auto | Way::Halstead | Way::Keeping(_) => Vec::new(),
+        },
         of_vertices: &of_vertices,
         request: request(&wishes, &of_vertices)?,
         phase: (wishes.ite_max, wishes.eps),

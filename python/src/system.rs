@@ -176,7 +176,7 @@ impl PySystem {
             start
         });
         let method = asked.solver(py)?;
-        let order = asked.order(py, self.surface())?;
+        let order = method.map_or_else(|| Ok(Vec::new()), |_| asked.order(py, self.surface()))?;
         let options = asked.options(&frame, None)?;
         let stop = options.stop(&points).map_err(|e| raised(py, e))?;
         let mut watch = Watch::new(asked.callback, frame.scale());
