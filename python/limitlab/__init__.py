@@ -1,8 +1,8 @@
 """Limit systems of interpolating subdivision surfaces, for NumPy and SciPy.
 
 A subdivision scheme takes control points V, (n, 3), to limit points A V. Here are the control points whose limit points are
-given ones (`interpolate`), the matrix A = diag(h) M in the forms of SciPy (`assemble`), all methods of the literature on it, those
-of your own beside them (`compare`), and what spectra say of them before (`spectrum`, `sweep_omega`, `splitting`).
+given ones (`interpolate`), the matrix A = diag(h) M in the forms of SciPy (`assemble`), all methods of the literature on it,
+those of your own beside them (`compare`), and what spectra say of them before (`spectrum`, `sweep_omega`, `splitting`).
 
 Meshes are arrays: `V, F = limitlab.read("spot.obj")`.
 
@@ -12,7 +12,7 @@ Meshes are arrays: `V, F = limitlab.read("spot.obj")`.
 True
 """
 
-from ._limitlab import VERSION as __version__
+from . import _limitlab
 from .analysis import (
     Comparison,
     OmegaSweep,
@@ -29,6 +29,8 @@ from .errors import ComputationError, ConvergenceError, FormatError, MeshError
 from .gallery import Problem, gallery
 from .meshes import Mesh, limit, mesh, normals, read, subdivide, write
 from .solving import Block, Blocks, Bounds, Interpolator, Solution, Step, System, assemble, interpolate
+
+__version__ = _limitlab.VERSION
 
 __all__ = [
     "Block",

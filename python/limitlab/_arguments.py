@@ -112,7 +112,7 @@ def marks(given: ArrayLike | None, n: int) -> NDArray[np.bool_] | None:
     if array.dtype == np.bool_:
         return np.ascontiguousarray(array)
     numbers = _integers(array.reshape(-1), "vertices")
-    if len(numbers) and not (0 <= numbers.min() and numbers.max() < n):
+    if len(numbers) and (numbers.min() < 0 or numbers.max() >= n):
         raise ValueError(f"vertices are numbered from 0 to {n - 1}")
     found = np.zeros(n, dtype=np.bool_)
     found[numbers] = True

@@ -30,11 +30,27 @@ __all__ = [
 ]
 
 OwnMethod = Callable[[csr_array, Floats, Floats], Any] | Iterable[ArrayLike]
-"""A method of one's own: called with A, h and P it gives an iterator of iterates, or the solution; or an iterable of iterates."""
+"""A method of one's own: called with A, h and P it gives iterates, or the solution; or an iterable of iterates."""
 
-METHODS = (
-    "lu cholesky ldlt jacobi thall gauss-seidel sor ssor pia w-pia chebyshev cg pcg-jacobi pcg-ssor pcg-ic0 anderson heavy-ball"
-).split()
+METHODS = [
+    "lu",
+    "cholesky",
+    "ldlt",
+    "jacobi",
+    "thall",
+    "gauss-seidel",
+    "sor",
+    "ssor",
+    "pia",
+    "w-pia",
+    "chebyshev",
+    "cg",
+    "pcg-jacobi",
+    "pcg-ssor",
+    "pcg-ic0",
+    "anderson",
+    "heavy-ball",
+]
 """All methods that solve a system, by name."""
 
 
@@ -154,7 +170,7 @@ class Comparison:
 
 
 def _named(method: OwnMethod, name: str | None) -> tuple[str, OwnMethod]:
-    return name or getattr(method, "__name__", type(method).__name__), method
+    return name or str(getattr(method, "__name__", type(method).__name__)), method
 
 
 def _runs(method: OwnMethod, A: csr_array, h: Floats) -> Callable[[Floats], Iterator[Floats]]:

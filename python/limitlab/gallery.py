@@ -25,7 +25,8 @@ class Problem(NamedTuple):
 
 def _quads(scheme: str, s: Floats, t: Floats) -> Floats:
     """The symbol on a torus of quads, by angles s and t along its two directions: a circulant in both."""
-    along, across = np.cos(s), np.cos(t)
+    along: Floats = np.cos(s)
+    across: Floats = np.cos(t)
     match scheme:
         case "catmull-clark":
             return (2 + along) * (2 + across) / 9
@@ -38,11 +39,12 @@ def _quads(scheme: str, s: Floats, t: Floats) -> Floats:
     raise ValueError(f'no symbol on quads of scheme "{scheme}": use catmull-clark, nasri, zheng-cai or mid-edge')
 
 
-def _triangles(scheme: str, s: Floats, t: Floats, third: int) -> Floats:
-    """The symbol on a torus of triangles, whose third direction is the sum or the difference of the others."""
+def _triangles(scheme: str, s: Floats, t: Floats) -> Floats:
+    """The symbol on a torus of triangles, whose third direction is the sum of the others."""
     if scheme not in ("loop", "sqrt3"):
         raise ValueError(f'no symbol on triangles of scheme "{scheme}": use loop or sqrt3')
-    return 0.5 + (np.cos(s) + np.cos(t) + np.cos(s + third * t)) / 6
+    values: Floats = 0.5 + (np.cos(s) + np.cos(t) + np.cos(s + t)) / 6
+    return values
 
 
 def gallery(name: str, n: int, m: int | None = None, scheme: str | None = None) -> Problem:
@@ -55,7 +57,8 @@ def gallery(name: str, n: int, m: int | None = None, scheme: str | None = None) 
     n, m
         Vertices along both directions, 3 or more; m = n unless given. The matrix has n·m rows.
     scheme
-        `catmull-clark` (unless told), `nasri`, `zheng-cai` or `mid-edge` on quads; `loop` (unless told) or `sqrt3` on triangles.
+        `catmull-clark` (unless told), `nasri`, `zheng-cai` or `mid-edge` on quads; `loop` (unless told) or `sqrt3` on
+        triangles.
         λ_max = 1 under all, λ_min for even n and m 1/9, 1/4, 1/2 and 0 on quads; on triangles about 1/4.
 
     Returns
@@ -80,5 +83,6 @@ def gallery(name: str, n: int, m: int | None = None, scheme: str | None = None) 
         values = _quads(scheme, s, t)
     else:
         scheme = scheme or "loop"
-        values = _triangles(scheme, s, t, 1)
-    return Problem(assemble(*mesh(f"{name}:{n}x{m}"), scheme).A, np.sort(values.ravel()))
+        values = _triangles(scheme, s, t)
+    V, F = mesh(f"{name}:{n}x{m}")
+    return Problem(assemble(V, F, scheme).A, np.sort(values.ravel()))

@@ -50,7 +50,8 @@ def sweep(found: OmegaSweep, ax: Any = None) -> Any:
             ax.plot(*zip(*seen, strict=True), "o", color=f"C{k}", markersize=4)
     ax.axhline(1.0, color="0.6", linewidth=1)
     ax.set_xlabel("ω")
-    ax.set_ylabel("factor per iteration: predicted (lines), observed (dots)")
+    ax.set_ylabel("factor per iteration")
+    ax.set_title("lines: predicted, dots: observed", fontsize="medium")
     ax.legend()
     return ax
 

@@ -184,8 +184,8 @@ def interpolate(
     method
         `auto` (Chebyshev in mixed precision without a stored matrix, conjugate gradients where that makes no progress, LDLᵀ
         where these do not), `lu`, `cholesky`, `ldlt`, `jacobi`, `thall`, `gauss-seidel`, `sor`, `ssor`, `pia`, `w-pia`,
-        `chebyshev`, `cg`, `pcg-jacobi`, `pcg-ssor`, `pcg-ic0`, `anderson`, `heavy-ball`; `two-phase` (Zheng and Cai's own sweeps),
-        `halstead` (the fairest surface, a control mesh two refinements down), `butterfly` and `labsik-greiner` (with
+        `chebyshev`, `cg`, `pcg-jacobi`, `pcg-ssor`, `pcg-ic0`, `anderson`, `heavy-ball`; `two-phase` (Zheng and Cai's own
+        sweeps), `halstead` (the fairest surface, a control mesh two refinements down), `butterfly` and `labsik-greiner` (with
         `subdivide`: schemes that pass through the vertices of triangles with no system).
     boundary
         `edge-and-corner` (unless told), `edge-only`, `as-interior` (`loop`, `sqrt3` and `mid-edge` only) or `refuse`.
@@ -239,8 +239,8 @@ def interpolate(
     Notes
     -----
     Linear in the vertices but for direct methods: a million vertices take some tenths of a second by `auto`. Other threads run
-    meanwhile, and Ctrl-C ends an iteration. After Thall (2003), Zheng and Cai (2005), PIA, Lin and Luo (2007), Halstead, Kass and
-    DeRose (1993).
+    meanwhile, and Ctrl-C ends an iteration. After Thall (2003), Zheng and Cai (2005), PIA, Lin and Luo (2007), Halstead, Kass
+    and DeRose (1993).
 
     Examples
     --------
@@ -323,8 +323,8 @@ def _csr(parts: tuple[NDArray[Any], ...]) -> csr_array:
 class System:
     """The limit system A V = P of a mesh: its matrices, products and solutions. Made by `assemble`.
 
-    The arrays of `A`, `M` and `h` lie in the memory of the library, which they keep alive; A and M share their indices. They are
-    read-only: products, factorizations and solvers of SciPy take them as they are, what changes a matrix in place needs
+    The arrays of `A`, `M` and `h` lie in the memory of the library, which they keep alive; A and M share their indices. They
+    are read-only: products, factorizations and solvers of SciPy take them as they are, what changes a matrix in place needs
     `A.copy()`.
     """
 
@@ -387,10 +387,13 @@ class System:
             return self._times(np.asarray(x))
 
         def transposed(x: NDArray[Any]) -> Floats:
+            image: Floats
             if len(self._blocks.smooth) < n:
-                return self._A.T @ x
-            h = self.h if np.ndim(x) == 1 else self.h[:, None]
-            return self._times(h * np.asarray(x)) / h
+                image = self._A.T @ x
+            else:
+                h = self.h if np.ndim(x) == 1 else self.h[:, None]
+                image = self._times(h * np.asarray(x)) / h
+            return image
 
         return LinearOperator(
             (n, n), matvec=times, matmat=times, rmatvec=transposed, rmatmat=transposed, dtype=np.dtype(np.float64)
@@ -406,7 +409,8 @@ class System:
 
         def times(x: ArrayLike) -> Floats:
             x = np.asarray(x)
-            return self._times(x) / (self.h if x.ndim == 1 else self.h[:, None])
+            image: Floats = self._times(x) / (self.h if x.ndim == 1 else self.h[:, None])
+            return image
 
         return LinearOperator((n, n), matvec=times, matmat=times, rmatvec=times, rmatmat=times, dtype=np.dtype(np.float64))
 

@@ -39,7 +39,7 @@ pub enum Way {
 }
 
 impl Asked {
-    /// The method by its name.
+    /// The method by its name; whether the order is one, too.
     pub fn way(&self, py: Python<'_>) -> PyResult<Way> {
         let mut all = vec![
             ("auto", Way::Auto),
@@ -51,6 +51,7 @@ impl Asked {
         all.extend(Method::ALL.map(|method| (method.name(), Way::Solver(method))));
         let aliases = Method::ALIASES.map(|(alias, method)| (alias, Way::Solver(method)));
         let way = names::find("method", &self.method, &all, &aliases).map_err(|e| raised(py, e))?;
+        self.parsed_order(py)?;
         match (way, self.omega) {
             (way, None) => Ok(way),
             (Way::Solver(method), Some(omega)) if omega > 0.0 && omega.is_finite() => {
@@ -75,9 +76,13 @@ impl Asked {
         }
     }
 
+    fn parsed_order(&self, py: Python<'_>) -> PyResult<Order> {
+        self.order.parse().map_err(|e| raised(py, e))
+    }
+
     /// The order of sweeps in place.
     pub fn order(&self, py: Python<'_>, surface: &Surface) -> PyResult<Vec<u32>> {
-        let order: Order = self.order.parse().map_err(|e| raised(py, e))?;
+        let order = self.parsed_order(py)?;
         Ok(py.detach(|| order.order(surface.mesh(), surface.incidence())))
     }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import pathlib
 import signal
@@ -37,7 +38,7 @@ def test_mixed_faces_come_and_go_as_offsets() -> None:
     V, F = ll.mesh("prism:5")
     corners, offsets = F
     assert corners.dtype == offsets.dtype == np.int32 and offsets[-1] == len(corners)
-    lists = [corners[a:b].tolist() for a, b in zip(offsets, offsets[1:], strict=False)]
+    lists = [corners[a:b].tolist() for a, b in itertools.pairwise(offsets)]
     assert sorted(map(len, lists)) == [4] * 5 + [5] * 2
     np.testing.assert_array_equal(ll.assemble(V, lists).A.toarray(), ll.assemble(V, F).A.toarray())
     assert "mixed" in repr(ll.mesh("prism:5"))
