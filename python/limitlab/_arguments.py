@@ -134,8 +134,7 @@ def surface(
 ) -> _limitlab.Surface:
     """A valid mesh."""
     given = None if V is None else points(V)
-    rule = boundary or "edge-and-corner"
-    return _limitlab.Surface(given, faces(F), rule, creases(creased), corners(cornered), crease_angle)
+    return _limitlab.Surface(given, faces(F), boundary, creases(creased), corners(cornered), crease_angle)
 
 
 def asked(

@@ -3,13 +3,15 @@
 use std::path::PathBuf;
 
 use glam::DVec3;
+use limitlab::error::{Error, Result};
 use limitlab::interpolate::limit_points;
-use limitlab::mesh::features::{Features, Rule, SHARP, Tags, creases_by_angle};
+use limitlab::mesh::features::{SHARP, Tags, creases_by_angle};
 use limitlab::mesh::file_tags::Subdivision;
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::io::{self, WriteOptions};
 use limitlab::mesh::noise::{Noise, add_noise};
 use limitlab::mesh::validate::Boundary;
+use limitlab::mesh::weld::seams;
 use limitlab::mesh::{Mesh, Surface, builtin};
 use limitlab::schemes::{Refinement, Scheme};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
@@ -85,12 +87,13 @@ impl PySurface {
         py: Python<'_>,
         vertices: Option<PyReadonlyArray2<'_, f64>>,
         faces: FaceParts<'_>,
-        boundary: &str,
+        boundary: Option<&str>,
         creases: Option<Creases<'_>>,
         corners: Option<Corners<'_>>,
         crease_angle: Option<f64>,
     ) -> PyResult<Self> {
-        let boundary: Boundary = boundary.parse().map_err(|e| raised(py, e))?;
+        let asked: Option<Boundary> = boundary.map(str::parse).transpose().map_err(|e| raised(py, e))?;
+        let boundary = asked.unwrap_or(Boundary::EdgeAndCorner);
         let faces = crate::arrays::faces(&faces.0, faces.1, faces.2.as_ref())?;
         let positions = match &vertices {
             Some(vertices) => points(vertices)?.to_vec(),
@@ -100,6 +103,9 @@ impl PySurface {
         let mut tags = tags(boundary, creases.as_ref(), corners.as_ref())?;
         let examined = py.detach(|| Surface::examined(Mesh::new(positions, faces), None, boundary));
         let mut surface = examined.map_err(|report| of_defects(py, &report))?;
+        if vertices.is_some() && asked.is_none() {
+            check_seams(&surface).map_err(|e| raised(py, e))?;
+        }
         if let Some(degrees) = crease_angle {
             if !(0.0..=180.0).contains(&degrees) {
                 return Err(PyValueError::new_err(format!(
@@ -126,11 +132,6 @@ impl PySurface {
     /// The scheme by name; without one Loop's on triangles, else Catmull-Clark.
     fn scheme(&self, py: Python<'_>, name: Option<&str>) -> PyResult<&'static str> {
         Ok(self.scheme_of(py, name)?.name())
-    }
-
-    /// What to know of the mesh, a sentence each.
-    fn remarks(&self, py: Python<'_>) -> Vec<String> {
-        py.detach(|| self.surface.remarks())
     }
 
     /// As `_limitlab.read` has meshes: after `levels` steps of a refinement.
@@ -171,11 +172,20 @@ impl PySurface {
         let rule = if surface.is_closed() { None } else { Some(tags.boundary) };
         described(py, surface.into_mesh(), &tags, rule)
     }
+}
 
-    /// The vertices that follow a rule.
-    pub fn with_rule(&self, rule: Rule) -> Vec<u32> {
-        let rules = self.surface.features().map_or(&[][..], Features::rules);
-        (0..).zip(rules).filter(|&(_, &r)| r == rule).map(|(v, _)| v).collect()
+/// Refuses a mesh of whose boundary nine tenths are a seam of duplicate vertices, no opening.
+fn check_seams(surface: &Surface) -> Result<()> {
+    let all = surface.boundary_edges();
+    match seams(surface).filter(|(edges, _)| 10 * edges >= 9 * all) {
+        None => Ok(()),
+        Some((edges, [a, b])) => Err(Error::mesh(
+            "a seam",
+            format!(
+                "{edges} of {all} boundary edges lie on each other (first: vertices {a} and {b}), where vertices were \
+                 duplicated at the same positions; make one of them, or say boundary=\"edge-and-corner\" to keep the seam open"
+            ),
+        )),
     }
 }
 

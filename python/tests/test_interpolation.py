@@ -136,6 +136,15 @@ def test_creases_and_corners_in_every_form(form: str) -> None:
         np.testing.assert_array_equal(ll.assemble(V, F, corners=corners).blocks.corners, [0, 3])
 
 
+def test_seams_of_duplicate_vertices_are_told() -> None:
+    V, F = ll.mesh("cube")
+    # Every face with vertices of its own.
+    apart = V[F.ravel()], np.arange(24).reshape(6, 4)
+    with pytest.raises(ll.MeshError, match="24 of 24 boundary edges lie on each other"):
+        ll.interpolate(*apart)
+    np.testing.assert_array_equal(ll.interpolate(*apart, boundary="edge-and-corner").vertices, apart[0])
+
+
 def test_semi_sharp_edges_differ_from_sharp_ones(sphere: ll.Mesh) -> None:
     V, F = sphere
     edge = edges(F)[:1]
@@ -453,6 +462,10 @@ def test_files_come_back_as_they_were(tmp_path: pathlib.Path, sheet: ll.Mesh) ->
             np.testing.assert_array_equal(np.sort(found.creases[0], axis=1), np.sort(sharp, axis=1))
             np.testing.assert_array_equal(found.creases[1], 3.5)
             np.testing.assert_array_equal(found.corners[0], [7])
+            # What was read goes on as arguments.
+            tagged = ll.limit(*found, "catmull-clark", **found.tags)
+            expected = ll.limit(V, F, "catmull-clark", creases=(sharp, 3.5), corners=[7], boundary=found.boundary)
+            np.testing.assert_allclose(tagged, expected, atol=1e-7)
         if ending == "usda":
             assert found.tags["boundary"] == "edge-only"
     ll.write(tmp_path / "normals.ply", V, F, normals=V)

@@ -99,7 +99,7 @@ fn lost_links(path: &Path) -> Vec<String> {
 
 #[test]
 fn links_of_the_pages_lead_to_files_and_places() {
-    for page in ["README.md", "CONTRIBUTING.md", "docs/guide.md", "docs/methods.md"] {
+    for page in ["README.md", "CONTRIBUTING.md", "docs/guide.md", "docs/methods.md", "python/README.md"] {
         let path = root().join(page);
         assert!(!links(&std::fs::read_to_string(&path).unwrap()).is_empty(), "{page}");
         assert_eq!(lost_links(&path), [""; 0]);
