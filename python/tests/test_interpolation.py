@@ -136,6 +136,14 @@ def test_creases_and_corners_in_every_form(form: str) -> None:
         np.testing.assert_array_equal(ll.assemble(V, F, corners=corners).blocks.corners, [0, 3])
 
 
+@pytest.mark.parametrize("method", ["auto", *METHODS])
+def test_a_mesh_without_smooth_vertices_is_known_at_once(method: str) -> None:
+    V, F = ll.mesh("cube")
+    np.testing.assert_array_equal(ll.interpolate(V, F, crease_angle=60, method=method).vertices, V)
+    if method == "auto":
+        assert all(row.status == "converged" for row in ll.compare(V, F, creases=edges(F)))
+
+
 def test_seams_of_duplicate_vertices_are_told() -> None:
     V, F = ll.mesh("cube")
     # Every face with vertices of its own.

@@ -60,7 +60,8 @@ const EXCESS: f64 = 1e-6;
 
 /// The method with its open parameters set by the spectrum: Jacobi and W-PIA to their best ω, the interval of the heavy
 /// ball to the estimated one, that of Chebyshev to the proven one where that is positive, else to the estimated one.
-/// `spectra` are asked for only where they are needed; an interval stays open where they are complex.
+/// `spectra` are asked for only where they are needed; an interval stays open where they are complex, and everything where
+/// nothing is unknown.
 ///
 /// # Errors
 /// Those of `spectra`.
@@ -69,6 +70,9 @@ pub fn with_spectrum<'a, K: Spectra>(
     method: Method<'a>,
     spectra: &dyn Fn() -> Result<K>,
 ) -> Result<Method<'a>> {
+    if system.is_empty() {
+        return Ok(method);
+    }
     let bounds = &system.bounds();
     let optimal = |form| Ok(Some(spectra()?.optimal_omega(form)));
     let estimated = || Ok(spectra()?.real().map(|spectrum| estimated(system, spectrum)));
@@ -152,7 +156,8 @@ fn variants<'a>(
         Method::SecondCholesky => ("nalgebra-sparse", Vec::new()),
         Method::Jacobi { .. } | Method::WPia { .. } => ("optimal", Vec::new()),
         Method::Chebyshev { .. } if system.bounds().lambda_min > 0.0 => {
-            let interval = spectra.real().map(|spectrum| estimated(system, spectrum));
+            let real = spectra.real().filter(|_| !system.is_empty());
+            let interval = real.map(|spectrum| estimated(system, spectrum));
             ("proven", vec![(Method::Chebyshev { interval }, "estimated")])
         }
         Method::Chebyshev { .. } | Method::HeavyBall { .. } => ("estimated", Vec::new()),
