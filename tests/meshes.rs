@@ -6,7 +6,9 @@ use std::path::Path;
 
 use crate::common::collection::collection;
 use chacha20::ChaCha8Rng;
+use glam::DVec3;
 use limitlab::mesh::io::{self, Loaded};
+use limitlab::mesh::repair::{RepairKind, repair};
 use limitlab::mesh::topology::IrregularEdge;
 use limitlab::mesh::validate::{Boundary, DefectKind, Validation, validate};
 use limitlab::mesh::{Faces, Mesh, Surface, Topology, builtin};
@@ -289,6 +291,17 @@ fn assert_paired_as_defined(faces: &Faces, vertices: usize) {
             assert_eq!(incidence.prev(faces, c as u32), at(i + size - 1));
         }
     }
+}
+
+/// On the boundary a face that is folded back has twins, and edges with other faces.
+#[test]
+fn a_doubled_face_on_the_boundary_is_dropped() {
+    let points: Vec<DVec3> = (0..4).map(|k| DVec3::new(f64::from(k), f64::from(k * k), 0.0)).collect();
+    let lists = [[0, 1, 2], [2, 1, 3], [1, 2, 3]];
+    let repaired = repair(&Mesh::new(points, Faces::from_lists(lists))).unwrap();
+    assert_eq!(repaired.mesh.faces, Faces::from_lists(&lists[..2]));
+    let [done] = &repaired.repairs[..] else { panic!("{:?}", repaired.repairs) };
+    assert_eq!((done.kind, done.count, done.face), (RepairKind::DoubledFaces, 1, Some(2)));
 }
 
 #[test]
