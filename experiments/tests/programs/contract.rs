@@ -256,8 +256,8 @@ fn names_are_taken_in_any_case_and_with_any_separator() {
     let object: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(object["scheme"], "catmull-clark");
     let methods: Vec<&str> = object["rows"].as_array().unwrap().iter().map(|r| r["method"].as_str().unwrap()).collect();
-    // cg has two rows.
-    assert_eq!(methods, ["gauss-seidel", "gauss-seidel", "cg", "cg"]);
+    // What is named twice runs once; cg has two rows.
+    assert_eq!(methods, ["gauss-seidel", "cg", "cg"]);
 }
 
 #[test]

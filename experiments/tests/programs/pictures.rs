@@ -232,7 +232,7 @@ fn methods_without_iterates_have_no_error_maps() {
     let folder = tempdir().unwrap();
     let flags = ["cube", "--scheme", "nasri", "--quiet", "--json", "--method", "lu,auto", "--errors-at", "1"];
     let line = assert_refused(&run(COMPARE, folder.path(), flags), "lu, auto");
-    assert!(line.contains("lu, auto") && line.contains("name a method that iterates"), "{line}");
+    assert!(line.contains("lu (faer), auto (") && line.contains("name a method that iterates"), "{line}");
     assert_done(&run(ASSEMBLE, folder.path(), ["torus:8x6", "--out", "d", "--quiet"]), "assemble");
     let line =
         assert_refused(&run(COMPARE, folder.path(), ["d", "--method", "pia", "--quiet", "--errors-at", "1"]), "folder");
