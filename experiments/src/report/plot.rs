@@ -411,7 +411,7 @@ fn draw_grid(canvas: &mut Canvas, frame: Rect, x: &[Tick], y: &[Tick]) {
 fn thinned(places: Vec<Point>, series: usize, dense: f64) -> Vec<Point> {
     let step = |w: &[Point]| (w[1].0 - w[0].0).hypot(w[1].1 - w[0].1);
     let length: f64 = places.windows(2).map(step).sum();
-    if length >= dense * places.len() as f64 {
+    if length >= dense * places.len().saturating_sub(1) as f64 {
         return places;
     }
     // Golden-section offsets keep any number of series apart.
@@ -427,6 +427,10 @@ fn thinned(places: Vec<Point>, series: usize, dense: f64) -> Vec<Point> {
             kept.push(at);
             next = walked + MARKER_GAP;
         }
+    }
+    if kept.is_empty() {
+        // A line without its marker is that of nobody.
+        kept.extend(places.last());
     }
     kept
 }
@@ -490,7 +494,12 @@ mod tests {
         let kept = thinned(dense.clone(), 0, MARKER_DENSE);
         assert_eq!(kept.len(), 11);
         assert!(kept.windows(2).all(|w| w[1].0 - w[0].0 >= MARKER_GAP));
-        assert_ne!(thinned(dense, 1, MARKER_DENSE)[0], kept[0]);
+        assert_ne!(thinned(dense.clone(), 1, MARKER_DENSE)[0], kept[0]);
+        // Whatever the series: a single point, a short line.
+        for series in 0..20 {
+            assert_eq!(thinned(vec![(3.0, 4.0)], series, 3.0 * MARKER_DENSE), [(3.0, 4.0)]);
+            assert_eq!(thinned(dense[..5].to_vec(), series, MARKER_DENSE).len(), 1);
+        }
     }
 
     #[test]
