@@ -83,12 +83,12 @@ fn against_butterfly(lab: &Lab) -> Result<Finding> {
 /// vertices on edges along that direction are to have the value of both ends; the blend gives them P − Δ²P.
 fn along_a_line(scheme: Refinement, name: &str) -> Result<f64> {
     let surface = exact(name)?.surface;
-    // A function of the first index on a torus of 12 by 7 alone: after a step one of the first index too.
+    // A function of the first index alone, on a torus of 12 by 7.
     let columns = random_points(12, 5);
     let values: Vec<DVec3> = (0..surface.len()).map(|v| columns[v / 7]).collect();
     let fine: Mesh = blend::refine(&surface.with_positions(values), scheme, 1.0)?;
     let (expected, _) = curve::refine(&columns, &[0.0; 12], Ends::Closed);
-    // Each new vertex has one of the 24 values.
+    // The nearest of the 24 values that vertices would have.
     let off = fine.positions.iter().map(|p| expected.iter().map(|e| e.distance(*p)).fold(f64::INFINITY, f64::min));
     Ok(largest(off))
 }
