@@ -385,16 +385,18 @@ fn best_omega(lab: &Lab) -> Result<Finding> {
     let of = |get: fn(&Tuning) -> f64| rows.iter().map(move |(_, tuning)| get(tuning));
     let costs = || of(|t| t.at_half / t.at_matrix);
     let is_faster = |t: &Tuning| t.at_half < t.at_matrix;
-    let fastest = rows.iter().min_by(|(_, a), (_, b)| {
+    // By its symmetry points of a dodecahedron excite few modes.
+    let name = "the dodecahedron".to_owned();
+    let dodecahedron = Tuning::new(&exact("dodecahedron")?)?.map(|tuning| (&name, tuning));
+    let with_it = || rows.iter().chain(&dodecahedron);
+    let slow_parts = |faster: bool| {
+        let these = with_it().filter(move |(_, t)| is_faster(t) == faster && !t.slow_part.is_nan());
+        these.map(|(_, t)| t.slow_part).collect::<Vec<f64>>()
+    };
+    let fastest = with_it().min_by(|(_, a), (_, b)| {
         let ratio = |t: &Tuning| t.at_half / t.at_matrix;
         ratio(a).total_cmp(&ratio(b))
     });
-    let slow_parts = |faster: bool| {
-        let these = rows.iter().filter(move |(_, t)| is_faster(t) == faster && !t.slow_part.is_nan());
-        these.map(|(_, t)| t.slow_part).collect::<Vec<f64>>()
-    };
-    // By its symmetry points of a dodecahedron excite few modes.
-    let counterexample = Tuning::new(&exact("dodecahedron")?)?;
     Ok(Finding::settled(vec![
         Evidence::at_most(
             "median of iterations at ω = ½ over those at the matrix's best ω, to 10⁻⁶ L",
@@ -405,7 +407,7 @@ fn best_omega(lab: &Lab) -> Result<Finding> {
         Evidence::shown("the smallest such ratio", smallest(costs())),
         Evidence::below(
             "the ratio on the dodecahedron itself",
-            counterexample.as_ref().map_or(f64::NAN, |t| t.at_half / t.at_matrix),
+            dodecahedron.as_ref().map_or(f64::NAN, |(_, t)| t.at_half / t.at_matrix),
             1.0,
         ),
         Evidence::shown("meshes on which ω = ½ is the faster", rows.iter().filter(|(_, t)| is_faster(t)).count()),
@@ -422,7 +424,7 @@ fn best_omega(lab: &Lab) -> Result<Finding> {
         ),
         Evidence::shown("the largest of these ratios", largest(of(|t| t.at_half / t.at_data))),
         Evidence::shown(
-            "part of the first error in modes that ½ shrinks by less than the spectral radius at that ω, largest where ½ is the faster",
+            "part of the first error in modes that ½ shrinks by less than the spectral radius at that ω, largest where ½ is the faster, the dodecahedron too",
             largest(slow_parts(true)),
         ),
         Evidence::shown("the same, median of the other meshes", median(slow_parts(false))),
@@ -497,7 +499,7 @@ fn no_larger_omega() -> Result<[Evidence; 3]> {
             ROUNDING,
         ),
         Evidence::shown("the largest of these", max),
-        Evidence::above("smallest eigenvalue of A on them", min, 1e-3),
+        Evidence::above("smallest eigenvalue of A on these maps", min, 1e-3),
     ])
 }
 
