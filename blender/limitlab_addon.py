@@ -111,16 +111,16 @@ class Package:
             found = limitlab.interpolate(
                 points,
                 (task.corners, task.offsets),
-                scheme="catmull-clark",
+                "catmull-clark",
                 boundary=task.boundary,
                 creases=task.creases,
                 corners=task.sharp_vertices,
-                subset=task.only,
+                vertices=task.only,
                 tol=tolerance,
             )
         except limitlab.MeshError as error:
             raise Refused(str(error), error.defects) from error
-        except limitlab.ConvergenceError as error:
+        except (limitlab.ConvergenceError, limitlab.ComputationError) as error:
             raise Refused(str(error)) from error
         return Answer(found.vertices, found.iterations, found.max_error, found.method)
 

@@ -20,17 +20,19 @@ pub fn of_failed(failed: &Failed, unit: f64) -> String {
             failed.verdict.set.condition().unwrap_or_default()
         );
     }
-    let reachable = unit * 2.0 * failed.max_error;
+    let reachable = unit * failed.reachable();
     match failed.outcome {
         Outcome::MaxIterations if failed.chosen => {
             "the iterations ran out: raise max_iter, or use method=\"auto\"".into()
         }
         Outcome::MaxIterations => "the iterations ran out: raise max_iter".into(),
-        Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown if failed.is_rounding() => format!(
-            "the error is the rounding of such coordinates, whose last digit is {:.1e}, and the tolerance lies below: use \
-             atol={reachable:.0e}",
-            unit * failed.last_digit
-        ),
+        Outcome::Rounding | Outcome::Stagnated | Outcome::Diverged | Outcome::Breakdown if failed.is_rounding() => {
+            format!(
+                "the error is the rounding of such coordinates, whose last digit is {:.1e}, and the tolerance lies below: \
+                 use atol={reachable:.0e}",
+                unit * failed.last_digit
+            )
+        }
         Outcome::Singular if failed.chosen => {
             "the matrix is singular, but these points have a control mesh: use method=\"auto\"".into()
         }

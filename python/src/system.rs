@@ -205,7 +205,12 @@ pub fn failed(
 ) -> Option<String> {
     match solution.report.outcome {
         Outcome::Converged | Outcome::Stopped => None,
-        Outcome::Diverged | Outcome::MaxIterations | Outcome::Stagnated | Outcome::Singular | Outcome::Breakdown => {
+        Outcome::Rounding
+        | Outcome::Diverged
+        | Outcome::MaxIterations
+        | Outcome::Stagnated
+        | Outcome::Singular
+        | Outcome::Breakdown => {
             let made = || Failed::new((&mesh.surface, scheme), None, chosen, &solution.report, stop);
             Some(advice::of_failed(&py.detach(made), mesh.frame.scale()))
         }
