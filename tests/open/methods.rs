@@ -34,6 +34,18 @@ fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
 }
 
 #[test]
+fn where_no_vertex_is_smooth_every_method_is_done_at_once() {
+    let corners = (0..8).map(|v| (v, 10.0)).collect();
+    let cube = Surface::new(built_in("cube")).unwrap();
+    let cube = cube.tagged(&Tags { corners, ..Tags::default() }).unwrap();
+    for method in Method::ALL {
+        let options = Options { method: Some(method), ..Options::default() };
+        let found = interpolate(&cube, Scheme::CatmullClark, &options).unwrap();
+        assert_eq!((found.report.outcome, found.points.as_slice()), (Outcome::Converged, cube.positions()), "{method}");
+    }
+}
+
+#[test]
 fn every_method_finds_what_elimination_finds() {
     let stop = Stop { tolerance: 1e-11, max_iterations: 20_000 };
     for scheme in Scheme::ALL {
