@@ -50,7 +50,8 @@ class Solution:
     scheme: str
     """The scheme whose surface passes through the points."""
     status: str
-    """`converged`, `rounding` (the tolerance lies below the last digits of the data), `diverged`, `max-iterations`, `stagnated`, `singular`, `breakdown`, or `stopped` by a callback."""
+    """`converged`, `rounding` (the tolerance lies below the last digits of the data), `diverged`, `max-iterations`,
+    `stagnated`, `singular`, `breakdown`, or `stopped` by a callback."""
     iterations: int
     """Updates of all vertices made."""
     history: Floats
