@@ -119,9 +119,9 @@ class Package:
                 tol=tolerance,
             )
         except limitlab.MeshError as error:
-            raise Refused(str(error), error.defects) from error
+            raise Refused(reason(str(error)), error.defects) from error
         except (limitlab.ConvergenceError, limitlab.ComputationError) as error:
-            raise Refused(str(error)) from error
+            raise Refused(reason(str(error))) from error
         return Answer(found.vertices, found.iterations, found.max_error, found.method)
 
 
@@ -151,7 +151,7 @@ class Program:
             done = self.run([*command, "-o", str(folder / "cage.ply"), "--json", "--quiet"])
             # Status 2 comes with an answer too, where no method met the tolerance: a cage that misses is no cage.
             if done.returncode != 0:
-                raise Refused(reason(done.stderr), self.defects(folder / "mesh.ply", task))
+                raise Refused(reason(said(done.stderr)), self.defects(folder / "mesh.ply", task))
             answer = json.loads(done.stdout)
             cage = read_ply_points(folder / "cage.ply", len(points))
             return Answer(cage, answer["iterations"], answer["max_error"], answer["method"])
@@ -176,13 +176,17 @@ class Program:
 
 
 def reason(text):
-    """The message of a program that failed: its last line, without the file's name and what speaks of flags."""
+    """What the library or the program says, without its advice in arguments or flags, which there are none of here."""
+    parts = text.split("; ")
+    return "; ".join(part for part in parts if "--" not in part and '="' not in part) or text
+
+
+def said(text):
+    """The message of a program that failed: its last line, without the file's name."""
     lines = [line for line in text.splitlines() if line.strip()]
     if not lines:
         return "the program interpolate failed without a word"
-    message = lines[-1].removeprefix("error: ").partition("mesh.ply: ")
-    parts = (message[2] or message[0]).split("; ")
-    return "; ".join(part for part in parts if "--" not in part) or lines[-1]
+    return lines[-1].removeprefix("error: ").rpartition("mesh.ply: ")[2]
 
 
 def write_ply(path, points, corners, offsets):
