@@ -123,7 +123,7 @@ fn a_seam_is_refused_and_can_be_welded() {
     assert_eq!((cage.len(), cage.faces.face(1)), (6, &[3, 4, 5][..]));
     assert_eq!((cage.positions[1], cage.positions[2]), (cage.positions[3], cage.positions[5]));
     // Tools join them if they are told to.
-    let output = run_on(INTERPOLATE, folder.path(), "seam.obj", &["--weld"]);
+    let output = run(INTERPOLATE, folder.path(), ["seam.obj", "--weld", "-o", "result.obj"]);
     assert!(super::text(&output.stderr).contains("join them first"), "{}", super::text(&output.stderr));
 }
 
@@ -171,8 +171,8 @@ fn missing_files_folders_and_unknown_names() {
     }
     let line = assert_all_refuse(&folder, "cub", &[]);
     assert!(line.contains("cube") && line.contains("quad-sphere:K"), "the names are listed: {line}");
-    fs::write(folder.path().join("mesh.stl"), "solid").unwrap();
-    let line = assert_all_refuse(&folder, "mesh.stl", &[]);
+    fs::write(folder.path().join("mesh.3ds"), "solid").unwrap();
+    let line = assert_all_refuse(&folder, "mesh.3ds", &[]);
     assert!(line.contains(".usda, .obj, .off or .ply"), "{line}");
     let line = assert_all_refuse(&folder, "cube", &["--scheme", "loop"]);
     assert!(line.contains("face 0 has 4 corners"), "{line}");

@@ -138,7 +138,7 @@ fn figures_come_in_the_formats_that_are_asked_for() {
     // The title has the file, and not the way to it.
     let svg = String::from_utf8(read("svg")).unwrap();
     assert!(svg.starts_with("<?xml") && svg.trim_end().ends_with("</svg>"));
-    assert!(svg.contains("aria-label=\"torus.obj under catmull-clark\""), "{svg}");
+    assert!(svg.contains("aria-label=\"torus.obj under catmull-clark, to 1e-10 of the diagonal\""), "{svg}");
     assert_eq!(sweep("gif", "other").status.code(), Some(2));
 }
 

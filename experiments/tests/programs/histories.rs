@@ -62,8 +62,12 @@ fn monitors_say_the_histories_and_change_nothing() {
         let history = &object["history"];
         assert_eq!(seen, lines(&format!("torus:8x6: {method}"), history), "{arguments}");
         let last = history.as_array().unwrap().last().unwrap();
-        for (field, of_run) in [("iteration", "iterations"), ("max_error", "max_error"), ("mean_error", "mean_error")] {
-            assert_eq!(last[field], object[of_run], "{arguments}");
+        assert_eq!(last["iteration"], object["iterations"], "{arguments}");
+        // Of some vertices the program measures what it writes; the run, the difference from the points, which is smaller.
+        let least = if arguments.contains("--vertices") { 8.0 * f64::EPSILON } else { 0.0 };
+        for field in ["max_error", "mean_error"] {
+            let [seen, written] = [last, &object].map(|of| of[field].as_f64().unwrap());
+            assert!((seen - written).abs() <= least, "{arguments}: {seen}, {written}");
         }
     }
     let arguments = ["torus:8x6", "--noise", "0.1", "--method", "jacobi,lu,auto"];
