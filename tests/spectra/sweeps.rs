@@ -36,6 +36,19 @@ fn spectral_radii_of_sweeps_agree_with_dense_ones() {
     }
 }
 
+/// Where over-relaxed sweeps have many eigenvalues of nearly the largest modulus.
+#[test]
+fn radii_are_found_where_eigenvalues_crowd_the_circle() {
+    let system = assemble(&named("torus:24x24"), Scheme::CatmullClark);
+    let zero = vec![DVec3::ZERO; system.len()];
+    for omega in [1.1, 1.5, 1.7, 1.9] {
+        let plain = |x: &mut [DVec3]| sweep(&system, &zero, omega, 0..zero.len(), x);
+        let exact = dense::spectral_radius(&system, plain).expect("small");
+        let found = spectral_radius(&system, plain).expect("a value");
+        assert!((found.value - exact).abs() < 1e-4 * exact, "SOR({omega}): {found:?} {exact}");
+    }
+}
+
 /// The Arnoldi process has few directions to go: the others are rounding.
 #[test]
 fn radii_are_found_where_eigenvalues_are_few() {
