@@ -77,9 +77,10 @@ def _mesh_of(found: dict[str, Any]) -> Mesh:
 
 
 def read(path: str | PathLike[str]) -> Mesh:
-    """Read a mesh file: .obj, .off, .ply or .usda.
+    """Read a mesh file: .obj, .off, .ply, .usda, .stl, .glb or .gltf.
 
     Positions are those of the file bit for bit; creases, corners and the rule of the boundary come from .usda and .obj.
+    Vertices of .stl, .glb and .gltf at one position are one.
 
     Raises
     ------

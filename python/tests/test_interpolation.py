@@ -497,11 +497,22 @@ def test_files_that_cannot_be(tmp_path: pathlib.Path) -> None:
     with pytest.raises(ValueError, match="vertex 8"):
         ll.write(tmp_path / "mesh.obj", V, F + 1)
     with pytest.raises(ll.FormatError, match="name must end"):
-        ll.read(tmp_path / "mesh.stl")
+        ll.read(tmp_path / "mesh.3ds")
     with pytest.raises(ValueError, match="torus"):
         ll.mesh("bagel")
     with pytest.raises(ValueError, match="noise"):
         ll.mesh("cube", noise=-1)
+
+
+def test_triangles_of_stl_are_joined(tmp_path: pathlib.Path) -> None:
+    V, F = ll.mesh("icosphere:1")
+    facets = ["facet normal 0 0 0 outer loop " + " ".join(f"vertex {x!r} {y!r} {z!r}" for x, y, z in V[f].tolist()) for f in F]
+    (tmp_path / "ball.stl").write_text(
+        "solid ball\n" + "\n".join(f + " endloop endfacet" for f in facets) + "\nendsolid ball\n"
+    )
+    found = ll.read(tmp_path / "ball.stl")
+    assert len(found.vertices) == len(V)
+    np.testing.assert_array_equal(found.vertices[found.faces], V[F])
 
 
 def test_refinement_of_meshes(sheet: ll.Mesh) -> None:
