@@ -44,8 +44,11 @@ pub enum Error {
         /// The scheme or the refinement by name.
         scheme: &'static str,
     },
-    /// A boundary, where whole faces around every vertex are needed.
-    #[error("{edges} boundary edges, and {scheme} needs whole faces around every vertex; close the holes")]
+    /// A boundary that is treated as interior, where whole faces around every vertex are needed.
+    #[error(
+        "{}, and {scheme} needs whole faces around every vertex; close the holes, or take the boundary as edge-and-corner",
+        counted(*edges, "boundary edge")
+    )]
     Open {
         /// The number of boundary edges.
         edges: usize,
@@ -188,6 +191,15 @@ pub fn short(x: f64) -> String {
     if plain { x.to_string() } else { format!("{x:e}") }
 }
 
+/// `1 face`, `2 faces`, `3 vertices`.
+pub fn counted(count: usize, one: &str) -> String {
+    match (count, one) {
+        (1, _) => format!("1 {one}"),
+        (_, "vertex") => format!("{count} vertices"),
+        _ => format!("{count} {one}s"),
+    }
+}
+
 /// `a, b or c`.
 pub fn one_of(names: &[&str]) -> String {
     match names.split_last() {
@@ -208,6 +220,14 @@ fn at_line(line: Option<usize>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_is_not_many() {
+        for (count, one, text) in [(1, "face", "1 face"), (0, "face", "0 faces"), (2, "vertex", "2 vertices")] {
+            assert_eq!(counted(count, one), text);
+        }
+        assert_eq!(counted(1, "vertex"), "1 vertex");
+    }
 
     #[test]
     fn numbers_are_short_and_exact() {

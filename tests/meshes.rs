@@ -8,6 +8,7 @@ use crate::common::collection::collection;
 use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use limitlab::mesh::io::{self, Loaded};
+use limitlab::mesh::origin::Numbers;
 use limitlab::mesh::repair::{RepairKind, repair};
 use limitlab::mesh::topology::IrregularEdge;
 use limitlab::mesh::validate::{Boundary, DefectKind, Validation, validate};
@@ -200,7 +201,7 @@ fn closed_meshes_are_valid_open_and_bad_ones_are_not() {
         match file.split('/').next().unwrap() {
             "closed" => {
                 assert!(refused.is_valid(), "{file}: {summary}");
-                assert_eq!(Surface::new(loaded.mesh).unwrap().remarks(), refused.remarks, "{file}");
+                assert_eq!(Surface::new(loaded.mesh).unwrap().remarks(&Numbers::default()), refused.remarks, "{file}");
             }
             "open" => {
                 assert_eq!(refused.defects[0].kind, DefectKind::BoundaryEdge, "{file}");
@@ -235,7 +236,7 @@ fn the_papers_boy_has_six_holes() {
         ]
     );
     let surface = Surface::examined(loaded.mesh, None, Boundary::AsInterior).unwrap();
-    assert_eq!(surface.remarks(), report.remarks);
+    assert_eq!(surface.remarks(&Numbers::default()), report.remarks);
     let mut loops: Vec<usize> = surface.topology().boundary_loops(surface.faces()).iter().map(Vec::len).collect();
     loops.sort_unstable();
     assert_eq!(loops, [4, 4, 4, 4, 5, 5]);

@@ -269,20 +269,11 @@ pub fn write(
     }
     let options = WriteOptions {
         normals,
-        subdivision: scheme.map_or(Subdivision::None, subdivision_of),
+        subdivision: scheme.map_or(Subdivision::None, Scheme::subdivision),
         tags: has_tags.then_some(&tags),
         ascii,
         comments: &comments,
         ..WriteOptions::default()
     };
     py.detach(|| io::write_control(&path, &mesh, &options)).map_err(|e| raised(py, e))
-}
-
-/// What the scheme is to a subdivision tool.
-fn subdivision_of(scheme: Scheme) -> Subdivision {
-    match scheme {
-        Scheme::CatmullClark => Subdivision::CatmullClark,
-        Scheme::Loop => Subdivision::Loop,
-        Scheme::Sqrt3 | Scheme::Nasri | Scheme::ZhengCai | Scheme::MidEdge => Subdivision::None,
-    }
 }

@@ -453,7 +453,8 @@ impl Interpolator {
     }
 
     /// With darts and semi-sharp vertices D beside the smooth ones S: `(A_DD − A_DS A_SS⁻¹ A_SD) V_D` is known by a solution
-    /// on S for each product, and V_D is found by GMRES. The watch sees all vertices at the end of each round.
+    /// on S for each product, and V_D is found by GMRES. The watch sees all vertices at the end of each round. All iterations
+    /// on S count, and what is left of the most that are allowed is all that a solution may take.
     fn solve_with(
         &mut self,
         stars: &StarRows,
@@ -475,13 +476,15 @@ impl Interpolator {
         if !control.is_empty() {
             stars.vertices().iter().for_each(|&v| held[v as usize] = control[v as usize]);
         }
-        let inner = Stop { tolerance: PART * stop.tolerance, ..*stop };
+        let within =
+            |tolerance: f64, made: usize| Stop { tolerance, max_iterations: stop.max_iterations.saturating_sub(made) };
         let mut history = Vec::new();
         let mut iterations = 0;
         let smooth = self.free.as_ref().map_or(points.len(), |free| free.iter().filter(|free| **free).count());
         let count = (smooth + wanted.len()) as f64;
         let mut round = 0;
         loop {
+            let inner = within(PART * stop.tolerance, iterations);
             let (method, found) = self.solve_block(&held, control, &inner, &mut unwatched);
             iterations += found.iterations;
             let residual: Vec<DVec3> = wanted.iter().zip(stars.product(control)).map(|(&p, ax)| p - ax).collect();
@@ -492,11 +495,13 @@ impl Interpolator {
             history.push(Recorded { iteration: iterations, errors });
             let told = watch(method, &Step { iteration: iterations, errors, points: control });
             let reached = stop.reached(errors.max, largest(points));
-            if reached.is_some() || no_progress(found.outcome) || told.is_break() || round == ROUNDS {
+            let is_over = iterations >= stop.max_iterations;
+            if reached.is_some() || no_progress(found.outcome) || told.is_break() || is_over || round == ROUNDS {
                 // Short of the part of the tolerance that the block was asked for, it may be met.
                 let outcome = match (reached, found.outcome) {
                     (Some(reached), _) => reached,
                     (None, Outcome::Converged | Outcome::Rounding) if told.is_break() => Outcome::Stopped,
+                    (None, Outcome::Converged | Outcome::Rounding) if is_over => Outcome::MaxIterations,
                     (None, Outcome::Converged | Outcome::Rounding) => Outcome::Stagnated,
                     (None, other) => other,
                 };
@@ -511,11 +516,12 @@ impl Interpolator {
                         held[v as usize] = x;
                     }
                     moved.clear();
-                    let inner = Stop { tolerance: DIRECTION, ..*stop };
+                    let inner = within(DIRECTION, iterations);
                     let (_, found) = self.solve_block(&held, &mut moved, &inner, &mut unwatched);
                     iterations += found.iterations;
                     let error = found.last().max;
-                    if no_progress(found.outcome) && (error.is_nan() || error > DIRECTION.sqrt()) {
+                    let is_rough = error.is_nan() || error > DIRECTION.sqrt();
+                    if (no_progress(found.outcome) || found.outcome == Outcome::MaxIterations) && is_rough {
                         return Err(());
                     }
                     Ok(stars.product(&moved))

@@ -150,8 +150,3 @@ impl fmt::Display for Defect {
         f.write_str(&parts.join(", "))
     }
 }
-
-/// `1 face`, `2 faces`.
-pub(super) fn counted(count: usize, one: &str) -> String {
-    format!("{count} {one}{}", if count == 1 { "" } else { "s" })
-}

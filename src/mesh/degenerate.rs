@@ -6,27 +6,28 @@ use glam::DVec3;
 use rayon::slice::ParallelSliceMut;
 
 use super::Faces;
-use super::defect::counted;
 use super::frame::magnitude;
+use super::origin::Numbers;
+use crate::error::counted;
 use crate::pages::large;
 use crate::parallel;
 use crate::prefetch::prefetch;
 
-/// A remark for each kind of oddity that occurs, with its count and first place.
+/// A remark for each kind of oddity that occurs, with its count and first place, in the [`Numbers`] of the file.
 ///
 /// # Panics
 /// If a face names a vertex that does not exist.
-pub(super) fn remarks(positions: &[DVec3], faces: &Faces) -> Vec<String> {
+pub(super) fn remarks(positions: &[DVec3], faces: &Faces, numbers: &Numbers) -> Vec<String> {
     let mut remarks = Vec::new();
     let copies = duplicate_positions(positions);
-    if let Some(&(v, original)) = copies.first() {
+    if let Some([v, original]) = copies.first().map(|&(v, w)| [v, w].map(|v| numbers.vertex(v))) {
         remarks.push(format!(
             "{} (first: vertex {v} lies on vertex {original})",
             counted(copies.len(), "duplicate position")
         ));
     }
     let copies = duplicate_faces(faces, positions.len(), &copies);
-    if let Some(&(f, original)) = copies.first() {
+    if let Some([f, original]) = copies.first().map(|&(f, g)| [f, g].map(|f| numbers.face(f))) {
         remarks.push(format!(
             "{} on the same positions as another (first: face {f} lies on face {original})",
             counted(copies.len(), "face")
@@ -35,7 +36,7 @@ pub(super) fn remarks(positions: &[DVec3], faces: &Faces) -> Vec<String> {
     let flat = zero_area_faces(positions, faces);
     if let Some(&f) = flat.first() {
         let faces = counted(flat.len(), "zero-area face");
-        remarks.push(format!("{faces} (first: face {f})"));
+        remarks.push(format!("{faces} (first: face {})", numbers.face(f)));
     }
     remarks
 }

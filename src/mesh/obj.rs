@@ -12,6 +12,7 @@ use super::file_tags::{CornerTag, CreaseTag, FileTags, check_sharpness};
 use super::io::{Builder, Lines, Loaded, WriteOptions, check_normals, write_rows};
 use super::magic::other_kind;
 use super::validate::Boundary;
+use crate::error::counted;
 use crate::text::{Scanner, continues_line, leading_digits, push_number, push_point, push_unsigned};
 use crate::{Error, Result};
 
@@ -81,12 +82,9 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     check_kind(bytes, path)?;
     let mut s = Scanner::new(bytes, path);
     let mut builder = Builder::new(Some(Lines::default()));
-    let mut dropped = [0usize; DROPPED.len()];
-    let (mut weighted, mut unequal, mut coloured) = (0usize, 0usize, 0usize);
+    let mut oddities = Oddities::default();
     let mut tags = TagLines::default();
     let mut attributes = Attributes::default();
-    let mut not_continued = None;
-    let mut unknown: Option<(usize, Error)> = None;
     loop {
         s.skip_space();
         skip_blanks(&mut s);
@@ -106,10 +104,10 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
                 match more_numbers(&mut s, vertex)? {
                     (0, _) => {}
                     (1, weight) => {
-                        weighted += 1;
-                        unequal += usize::from(weight != 1.0);
+                        oddities.weighted += 1;
+                        oddities.unequal += usize::from(weight != 1.0);
                     }
-                    _ => coloured += 1,
+                    _ => oddities.coloured += 1,
                 }
                 builder.vertex(position, line).map_err(at)?;
             }
@@ -138,72 +136,101 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
                 let unexpected = s.clone();
                 let (statement, ends_with_backslash) = skip_statement(&mut s, keyword);
                 if ends_with_backslash {
-                    not_continued.get_or_insert(line);
+                    oddities.not_continued.get_or_insert(line);
                 }
                 match (keyword, kind_of(keyword)) {
                     (b"vt", _) => attributes.texture.push(statement),
                     (b"vn", _) => attributes.normals.push(statement),
                     (_, Some(Kind::Kept)) => attributes.statements.push((builder.faces() as u32, statement.into())),
-                    (_, Some(Kind::Dropped(kind))) => dropped[kind] += 1,
-                    (_, None) => match &mut unknown {
+                    (_, Some(Kind::Dropped(kind))) => oddities.dropped[kind] += 1,
+                    (_, None) => match &mut oddities.unknown {
                         Some((count, _)) => *count += 1,
-                        None => unknown = Some((1, unexpected.unexpected("an OBJ statement"))),
+                        None => oddities.unknown = Some((1, unexpected.unexpected("an OBJ statement"))),
                     },
                 }
             }
         }
     }
     if builder.vertices() == 0 {
-        let (_, none) = unknown.unwrap_or_else(|| (0, s.unexpected("a vertex (v x y z)")));
+        let (_, none) = oddities.unknown.unwrap_or_else(|| (0, s.unexpected("a vertex (v x y z)")));
         return Err(none);
     }
 
-    let mut not_kept: Vec<String> = DROPPED
-        .iter()
-        .zip(dropped)
-        .filter(|&(_, count)| count > 0)
-        .map(|((what, _), count)| format!("{count} {what}"))
-        .collect();
-    if weighted > 0 {
-        let unequal = if unequal > 0 {
-            format!(" ({unequal} of them are not 1: the coordinates are not divided by them)")
-        } else {
-            String::new()
-        };
-        not_kept.push(format!("weights of {weighted} vertices{unequal}"));
-    }
-    if coloured > 0 {
-        not_kept.push(format!("colours of {coloured} vertices"));
-    }
-    let mut remarks = Vec::new();
-    if !not_kept.is_empty() {
-        remarks.push(format!("not kept: {}", not_kept.join(", ")));
-    }
-    if let Some((count, first)) = unknown {
-        remarks.push(format!("{count} unknown statements passed over, the first at {first}"));
-    }
-    if let Some(line) = not_continued {
-        remarks.push(format!(
-            "a backslash ends line {line}, whose statement is not one of numbers: the next line is read for itself"
-        ));
-    }
-    if tags.boundary_is_none {
-        remarks.push(
-            "the tag interpolateboundary is 0, by which faces at a boundary have no surface: another rule is taken"
-                .into(),
-        );
-    }
-    if s.ends_within_a_line() {
-        remarks.push("the last line has no end: was the file cut off?".into());
-    }
     let corners = builder.corners();
-    let missing = attributes.texture.finish(corners) + attributes.normals.finish(corners);
-    if missing > 0 {
-        remarks.push(format!("{missing} references of corners to texture coordinates or normals that the file lacks"));
-    }
+    oddities.missing = attributes.texture.finish(corners) + attributes.normals.finish(corners);
+    oddities.is_cut_off = s.ends_within_a_line();
+    oddities.boundary_is_none = tags.boundary_is_none;
     tags.found.check_vertices(path, builder.vertices())?;
-    let loaded = builder.finish(path, None, remarks);
+    let loaded = builder.finish(path, None, oddities.remarks());
     Ok(Loaded { tags: tags.found, attributes, ..loaded })
+}
+
+/// What a file holds that its mesh does not keep, or that is odd.
+#[derive(Default)]
+struct Oddities {
+    dropped: [usize; DROPPED.len()],
+    weighted: usize,
+    /// Of the weights those that are not 1.
+    unequal: usize,
+    coloured: usize,
+    /// How many statements are unknown, and the first of them.
+    unknown: Option<(usize, Error)>,
+    /// The first line with a backslash that continues nothing.
+    not_continued: Option<usize>,
+    boundary_is_none: bool,
+    is_cut_off: bool,
+    missing: usize,
+}
+
+impl Oddities {
+    /// One for each kind that occurs.
+    fn remarks(self) -> Vec<String> {
+        let mut not_kept: Vec<String> = DROPPED
+            .iter()
+            .zip(self.dropped)
+            .filter(|&(_, count)| count > 0)
+            .map(|((what, _), count)| format!("{count} {what}"))
+            .collect();
+        if self.weighted > 0 {
+            let unequal = if self.unequal > 0 {
+                format!(" ({} not 1: the coordinates are not divided by them)", self.unequal)
+            } else {
+                String::new()
+            };
+            not_kept.push(format!("weights of {}{unequal}", counted(self.weighted, "vertex")));
+        }
+        if self.coloured > 0 {
+            not_kept.push(format!("colours of {}", counted(self.coloured, "vertex")));
+        }
+        let mut remarks = Vec::new();
+        if !not_kept.is_empty() {
+            remarks.push(format!("not kept: {}", not_kept.join(", ")));
+        }
+        if let Some((count, first)) = self.unknown {
+            remarks.push(format!("{} passed over, the first at {first}", counted(count, "unknown statement")));
+        }
+        if let Some(line) = self.not_continued {
+            remarks.push(format!(
+                "a backslash ends line {line}, whose statement is not one of numbers: the next line is read for itself"
+            ));
+        }
+        if self.boundary_is_none {
+            remarks.push(
+                "the tag interpolateboundary is 0, by which faces at a boundary have no surface: another rule is taken"
+                    .into(),
+            );
+        }
+        if self.is_cut_off {
+            remarks.push("the last line has no end: was the file cut off?".into());
+        }
+        if self.missing > 0 {
+            remarks.push(format!(
+                "{} of corners to texture coordinates or normals that the file lacks",
+                counted(self.missing, "reference")
+            ));
+        }
+        remarks
+    }
 }
 
 /// Refuses the first bytes of a file, whole lines, if all that they hold is no OBJ.
@@ -592,8 +619,8 @@ mod tests {
             loaded.remarks,
             [
                 "not kept: 1 lines (l), 1 points (p), 2 free-form and display statements, \
-                 weights of 1 vertices (1 of them are not 1: the coordinates are not divided by them), \
-                 colours of 1 vertices",
+                 weights of 1 vertex (1 not 1: the coordinates are not divided by them), \
+                 colours of 1 vertex",
                 "2 unknown statements passed over, the first at a.obj, line 17: \"blob\" is not an OBJ statement",
                 "the last line has no end: was the file cut off?",
             ]

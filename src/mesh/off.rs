@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::Mesh;
 use super::io::{Builder, Lines, Loaded, WriteOptions, check_normals, write_text_rows};
 use super::magic::other_kind;
+use crate::error::counted;
 use crate::text::{Scanner, quoted};
 use crate::{Error, Result};
 

@@ -27,6 +27,33 @@ pub struct Origin {
     faces: Faces,
 }
 
+/// What the vertices and faces of a mesh are called in its file; by default as in the mesh.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Numbers {
+    /// By vertex of the mesh, where the numbers are others.
+    pub vertices: Option<Vec<u32>>,
+    /// By face of the mesh, where the numbers are others.
+    pub faces: Option<Vec<u32>>,
+}
+
+impl Numbers {
+    /// The number of a vertex in the file.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    pub fn vertex(&self, v: u32) -> u32 {
+        self.vertices.as_ref().map_or(v, |numbers| numbers[v as usize])
+    }
+
+    /// The number of a face in the file.
+    ///
+    /// # Panics
+    /// If there is no such face.
+    pub fn face(&self, f: u32) -> u32 {
+        self.faces.as_ref().map_or(f, |numbers| numbers[f as usize])
+    }
+}
+
 impl Origin {
     /// Of `mesh`, whose corners came from `corners` of the file's; the same ones where this is `None`.
     /// O(corners), and O(s log s) for the s corners at vertices that became several.
@@ -78,6 +105,18 @@ impl Origin {
     /// The vertex of the mesh for each that is written, `None` for one that no face has.
     pub fn places(&self) -> impl ExactSizeIterator<Item = Option<u32>> + '_ {
         self.place.iter().map(|&there| (there != NONE).then_some(there))
+    }
+
+    /// The first number under which each vertex of the mesh is written, which tells copies from what they were cut from;
+    /// 2³² − 1 for one that no face has.
+    pub fn numbers(&self) -> Vec<u32> {
+        let mut numbers = vec![NONE; self.sources.len()];
+        for (there, number) in self.places().zip(0..) {
+            let Some(there) = there else { continue };
+            let slot = &mut numbers[there as usize];
+            *slot = number.min(*slot);
+        }
+        numbers
     }
 
     /// The first vertex of the file for each of the mesh; 2³² − 1 for one that no face has.

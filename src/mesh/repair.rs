@@ -6,10 +6,10 @@ use std::fmt;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::defect::counted;
 use super::topology::{NONE, Topology};
 use super::validate::visit_orientations;
 use super::{Faces, Mesh};
+use crate::error::counted;
 
 /// What was done to a mesh, in the order in which it is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -82,11 +82,7 @@ impl fmt::Display for Repair {
             RepairKind::SplitVertices => ("vertex", "added, one for each further sheet at a vertex"),
             RepairKind::IsolatedVertices => ("vertex", "of no face left out"),
         };
-        let things = match (one, self.count) {
-            ("vertex", count) if count != 1 => format!("{count} vertices"),
-            (one, count) => counted(count, one),
-        };
-        write!(f, "{things} {done}")?;
+        write!(f, "{} {done}", counted(self.count, one))?;
         match (self.face, &self.vertices[..]) {
             (Some(face), _) => write!(f, " (first: face {face})"),
             (None, [a, b]) => write!(f, " (first: vertices {a} and {b})"),

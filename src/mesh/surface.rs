@@ -5,12 +5,13 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 
 use super::boundary::Boundary;
-use super::defect::counted;
 use super::features::{Features, Rule, SHARP, Tags};
 use super::numbering::Numbering;
+use super::origin::Numbers;
 use super::space_filling::{along_curve, is_scattered};
 use super::validate::{Validation, boundary_remark, validate};
 use super::{Faces, Incidence, Mesh, Topology, degenerate};
+use crate::error::counted;
 use crate::{Error, Result, parallel};
 
 /// From this many vertices on, a scattered mesh is renumbered. Tuned.
@@ -296,7 +297,8 @@ impl Surface {
     }
 
     /// Oddities that no method minds, as in [`Validation::remarks`]: duplicate positions, faces without area, a boundary.
-    pub fn remarks(&self) -> Vec<String> {
+    /// Places are told in the `numbers` of the file.
+    pub fn remarks(&self, numbers: &Numbers) -> Vec<String> {
         let mut remarks = Vec::new();
         if !self.is_closed() {
             let (edges, loops) = (self.boundary_edges(), self.boundary_loops());
@@ -319,11 +321,11 @@ impl Surface {
         if let Some(renumbered) = self.renumbered() {
             // Looking for what is not there is many times faster so. What is there needs the file's own numbers.
             let positions = renumbered.numbering.there(self.positions());
-            if degenerate::remarks(&positions, &renumbered.faces).is_empty() {
+            if degenerate::remarks(&positions, &renumbered.faces, &Numbers::default()).is_empty() {
                 return remarks;
             }
         }
-        remarks.extend(degenerate::remarks(self.positions(), self.faces()));
+        remarks.extend(degenerate::remarks(self.positions(), self.faces(), numbers));
         remarks
     }
 

@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
 pub use super::boundary::Boundary;
-use super::defect::counted;
 pub use super::defect::{Defect, DefectKind};
 use super::incidence::{Incidence, next_in, prev_in};
+use super::origin::Numbers;
 use super::repair::repair;
 use super::topology::{NONE, Topology, join};
 use super::{Faces, Mesh, degenerate};
+use crate::error::counted;
 use crate::parallel;
 
 /// Vertices or corners of one task.
@@ -221,7 +222,7 @@ fn examine(mesh: &Mesh, boundary: Boundary) -> Validation {
                 return Vec::new();
             }
             let topology = || examine_topology(mesh, boundary, &mut report);
-            rayon::join(topology, || degenerate::remarks(&mesh.positions, &mesh.faces)).1
+            rayon::join(topology, || degenerate::remarks(&mesh.positions, &mesh.faces, &Numbers::default())).1
         },
     );
     report.remarks.extend(remarks);

@@ -1,5 +1,6 @@
 //! Welding of vertices at the same position, and the seams that ask for it.
 
+use glam::DVec3;
 use rayon::slice::ParallelSliceMut;
 
 use super::{Faces, Mesh, Surface};
@@ -11,6 +12,11 @@ pub struct Welded {
     pub mesh: Mesh,
     /// The new number of every old vertex.
     pub place: Vec<u32>,
+}
+
+/// Equal for equal positions: zeros of either sign are one.
+fn bits(position: DVec3) -> [u64; 3] {
+    position.to_array().map(|x| (x + 0.0).to_bits())
 }
 
 /// Joins vertices whose coordinates are equal, zeros of either sign alike. A face may name a vertex twice then: the validator
@@ -29,7 +35,7 @@ pub struct Welded {
 /// # Panics
 /// If a face names a vertex that is not there.
 pub fn weld(mesh: &Mesh) -> Welded {
-    let key = |v: u32| mesh.positions[v as usize].to_array().map(|x| (x + 0.0).to_bits());
+    let key = |v: u32| bits(mesh.positions[v as usize]);
     let mut sorted: Vec<u32> = (0..mesh.len() as u32).collect();
     sorted.par_sort_unstable_by_key(|&v| (key(v), v));
     let mut first = vec![0u32; mesh.len()];
@@ -68,11 +74,9 @@ pub fn seams(surface: &Surface) -> Option<(usize, [u32; 2])> {
         return None;
     }
     let (incidence, faces, points) = (surface.incidence(), surface.faces(), surface.positions());
-    // Zeros of either sign are one.
-    let key = |v: u32| points[v as usize].to_array().map(|x| (x + 0.0).to_bits());
     let side = |&c: &u32| {
         let ends = [c, incidence.next(faces, c)].map(|c| faces.corners()[c as usize]);
-        let [a, b] = ends.map(key);
+        let [a, b] = ends.map(|v| bits(points[v as usize]));
         (a.min(b), a.max(b), c, ends)
     };
     let mut sides: Vec<_> = surface.boundary_half_edges().iter().map(side).collect();

@@ -9,6 +9,7 @@ use super::local_limit::StarRule;
 use super::{Refinement, catmull_clark, loop_scheme, mid_edge, nasri, sqrt3, zheng_cai};
 use crate::error::Error;
 use crate::mesh::Faces;
+use crate::mesh::file_tags::Subdivision;
 use crate::names;
 
 /// What a scheme tells the assembler. `M = diag(d(n)) + w·Adj + Σ_F circulant(|F|)`, `H = diag(h(n))`, `A = H·M`.
@@ -205,6 +206,15 @@ impl Scheme {
     /// The refinement whose surface the limit points A V lie on.
     pub fn refinement(self) -> Refinement {
         self.definition().refinement
+    }
+
+    /// What the scheme is to a subdivision tool, in a USD file: the faces themselves where tools do not have it.
+    pub fn subdivision(self) -> Subdivision {
+        match self {
+            Scheme::CatmullClark => Subdivision::CatmullClark,
+            Scheme::Loop => Subdivision::Loop,
+            Scheme::Sqrt3 | Scheme::Nasri | Scheme::ZhengCai | Scheme::MidEdge => Subdivision::None,
+        }
     }
 
     pub(crate) fn star_rule(self) -> Option<StarRule> {

@@ -126,7 +126,8 @@ pub struct Report {
     /// Updates of all vertices made.
     pub iterations: usize,
     /// The errors of every iterate; entry 0 is the start, so there are `iterations + 1`. A method that knows its
-    /// errors every few iterations only ([`mixed`](super::mixed)) has an entry for each time.
+    /// errors every few iterations only ([`mixed`](super::mixed)) has an entry for each time; so has `auto` at darts and
+    /// semi-sharp vertices, where entry 0 comes after the first solution for the others.
     pub history: Vec<Recorded>,
     /// What was found where the outcome needs a reason.
     pub detail: Option<String>,

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 use limitlab::Result;
 use limitlab::assemble::LimitSystem;
-use limitlab::interpolate::{Interpolator, Options, Tolerance, interpolate, interpolate_watched};
+use limitlab::interpolate::{Interpolator, Options, Tolerance, interpolate, interpolate_watched, limit_points};
 use limitlab::mesh::features::Tags;
 use limitlab::mesh::generate::permute_vertices;
 use limitlab::mesh::order::Order;
@@ -156,6 +156,28 @@ fn a_watch_sees_what_is_recorded_and_changes_nothing() {
         assert_eq!(stopped.report.history, of(methods[0])[..enough], "{what}");
         assert_eq!(stopped.report.iterations, stopped.report.history[enough - 1].iteration, "{what}");
     }
+}
+
+/// With a dart there are iterations within each step of GMRES: all count.
+#[test]
+fn the_most_iterations_hold_for_all_at_a_dart() {
+    let tags = Tags { creases: vec![([0, 1], 10.0)], ..Tags::default() };
+    let dart = noisy("torus:8x9").into_tagged(&tags).unwrap();
+    let run = |max_iterations| {
+        let options = Options { max_iterations, ..options(None) };
+        let found = interpolate(&dart, Scheme::CatmullClark, &options).unwrap();
+        let limits = limit_points(&dart.with_positions(found.points), Scheme::CatmullClark).unwrap();
+        (found.report, distance(&limits, dart.positions()))
+    };
+    let (free, _) = run(10_000);
+    assert!(free.outcome == Outcome::Converged && free.history.len() > 1, "{:?}", free.history);
+    for most in 0..free.iterations {
+        let (report, error) = run(most);
+        assert_eq!((report.outcome, report.iterations), (Outcome::MaxIterations, most));
+        assert!((report.last().max - error).abs() < 1e-13, "{most}: {:e}, {error:e}", report.last().max);
+        assert_eq!(report.history.last().map(|last| last.iteration), Some(most));
+    }
+    assert_eq!(run(free.iterations).0, free);
 }
 
 /// So many iterations alone come to the same errors.

@@ -3,7 +3,7 @@
 use limitlab::analysis::failed::Failed;
 use limitlab::error::{Error, one_of};
 use limitlab::mesh::Surface;
-use limitlab::mesh::validate::{Boundary, Validation};
+use limitlab::mesh::validate::Validation;
 use limitlab::schemes::{Scheme, SingularSet};
 use limitlab::solvers::Outcome;
 
@@ -56,9 +56,7 @@ pub fn of_error(error: &Error, surface: &Surface) -> String {
         Error::NotTriangles { .. } if surface.is_closed() => {
             with(format!(" or use --scheme {}", names(|s| !s.needs_triangles())))
         }
-        Error::Open { .. } if surface.boundary() == Boundary::AsInterior => {
-            with(", or use --boundary edge-and-corner".into())
-        }
+        Error::Open { .. } => with(": --boundary edge-and-corner".into()),
         Error::NotOffered { what, schemes } => format!("{what}: use --scheme {}", one_of(schemes)),
         Error::TooFewLevels { needed, .. } => with(format!(": use --subdivide {needed} or more")),
         other => other.to_string(),
@@ -138,12 +136,12 @@ mod tests {
         assert!(line.ends_with("stitch the faces, or leave out --boundary refuse"), "{line}");
         let open = Surface::examined(opened("icosphere:1"), None, Boundary::AsInterior).unwrap();
         let line = refused(&open, Scheme::CatmullClark);
-        assert!(line.ends_with("close the holes, or use --boundary edge-and-corner"), "{line}");
+        assert!(line.ends_with("or take the boundary as edge-and-corner: --boundary edge-and-corner"), "{line}");
         assert!(LimitSystem::new(&open, Scheme::Loop).is_ok());
 
         // Of quads: no other scheme would do as interior, and none is named.
         let open = Surface::examined(opened("torus:5x4"), None, Boundary::AsInterior).unwrap();
-        assert!(refused(&open, Scheme::CatmullClark).ends_with("or use --boundary edge-and-corner"));
+        assert!(refused(&open, Scheme::CatmullClark).ends_with(": --boundary edge-and-corner"));
         assert!(refused(&open, Scheme::Loop).ends_with("triangulate the mesh"));
     }
 }

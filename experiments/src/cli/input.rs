@@ -12,7 +12,7 @@ use super::{CommonFlags, StopFlags, advice, print_results};
 use crate::report::Provenance;
 use crate::report::provenance::Source;
 use limitlab::assemble::Stages;
-use limitlab::error::{Error, Result, short};
+use limitlab::error::{Error, Result, counted, short};
 use limitlab::interpolate::solver::require_memory;
 use limitlab::mesh::attributes::Attributes;
 use limitlab::mesh::features::{Features, Rule, SHARP, Tags, creases_by_angle};
@@ -20,7 +20,7 @@ use limitlab::mesh::file_tags::{FileTags, Subdivision};
 use limitlab::mesh::frame::Frame;
 use limitlab::mesh::io::{self, Format, Loaded, has_mesh_ending};
 use limitlab::mesh::noise::{Noise, move_vertices};
-use limitlab::mesh::origin::Origin;
+use limitlab::mesh::origin::{Numbers, Origin};
 use limitlab::mesh::repair::{Repair, Repaired, repair};
 use limitlab::mesh::usd::StageMetadata;
 use limitlab::mesh::validate::{Boundary, validate};
@@ -96,6 +96,14 @@ pub struct Input {
     pub read_seconds: f64,
     /// Validation and topology.
     pub check_seconds: f64,
+}
+
+/// A mesh after --weld and --repair.
+struct Mended {
+    mesh: Mesh,
+    origin: Option<Origin>,
+    repairs: Vec<Repair>,
+    numbers: Numbers,
 }
 
 /// What stands for standard input and output where a file may be named.
@@ -181,7 +189,7 @@ impl MeshFlags {
         let mut results = Vec::with_capacity(names.len());
         for name in names {
             let loaded = self.loaded(name.as_ref(), common)?;
-            results.push(json!(validate(&loaded.mesh, numbers(&loaded.lines), self.rule(&loaded.tags))));
+            results.push(json!(validate(&loaded.mesh, in_lines(&loaded.lines), self.rule(&loaded.tags))));
         }
         print_results(results, provenance)?;
         Ok(true)
@@ -210,14 +218,22 @@ impl MeshFlags {
         let Loaded { name, mesh, mut lines, tags, mut attributes, subdivision, stage, checksum, .. } = loaded;
         let name = &name[..];
         let rule = self.rule(&tags);
-        let (mesh, origin, repairs) = self.mended(name, mesh, &mut lines, &mut attributes, rule, common);
-        let surface = Surface::examined(mesh, numbers(&lines), rule).map_err(|report| {
+        let Mended { mesh, origin, repairs, numbers } =
+            self.mended(name, mesh, &mut lines, &mut attributes, rule, common);
+        let surface = Surface::examined(mesh, in_lines(&lines), rule).map_err(|mut report| {
+            // What is repaired is valid; faces have their numbers yet.
+            for defect in &mut report.defects {
+                [&mut defect.vertex, &mut defect.other_vertex]
+                    .into_iter()
+                    .flatten()
+                    .for_each(|v| *v = numbers.vertex(*v));
+            }
             report.remarks.iter().for_each(|remark| common.remark(format_args!("{name}: {remark}")));
             Error::mesh(name, advice::of_defects(&report))
         })?;
-        self.check_seams(name, &surface, &repairs, common)?;
+        self.check_seams(name, &surface, &repairs, &numbers, common)?;
         let (mut surface, tags) = self.with_tags(name, surface, &tags, origin.as_ref())?;
-        for remark in surface.remarks() {
+        for remark in surface.remarks(&numbers) {
             common.remark(format_args!("{name}: {remark}"));
         }
         let frame = self.place(&mut surface).map_err(|(v, what)| {
@@ -230,8 +246,7 @@ impl MeshFlags {
             common.remark(format_args!("{name}: scheme {scheme} (choose with --scheme)"));
             scheme
         });
-        if let Some(asked) = subdivision.filter(|&asked| asked != Subdivision::None && asked != subdivision_of(scheme))
-        {
+        if let Some(asked) = subdivision.filter(|&asked| asked != Subdivision::None && asked != scheme.subdivision()) {
             common.remark(format_args!("{name}: the file asks for {asked} (choose with --scheme)"));
         }
         let label = match self.noise {
@@ -265,15 +280,19 @@ impl MeshFlags {
         attributes: &mut Attributes,
         rule: Boundary,
         common: &CommonFlags,
-    ) -> (Mesh, Option<Origin>, Vec<Repair>) {
+    ) -> Mended {
         let n = file.len();
         let is_asked = self.weld || self.repair;
         if !is_asked || file.faces.corners().iter().any(|&v| v as usize >= n) {
-            return (file, None, Vec::new());
+            return Mended { mesh: file, origin: None, repairs: Vec::new(), numbers: Numbers::default() };
         }
         let welded = self.weld.then(|| weld(&file));
         if let Some(welded) = &welded {
-            common.remark(format_args!("{name}: {n} vertices at {} positions", welded.mesh.len()));
+            common.remark(format_args!(
+                "{name}: {} at {}",
+                counted(n, "vertex"),
+                counted(welded.mesh.len(), "position")
+            ));
         }
         // The first vertex at each position.
         let first = welded.as_ref().map(|welded| {
@@ -284,7 +303,7 @@ impl MeshFlags {
         let mesh = welded.as_ref().map_or(&file, |welded| &welded.mesh);
         let is_mended = |r: &Repaired| !r.repairs.is_empty() && validate(&r.mesh, None, rule).is_valid();
         let repaired = self.repair.then(|| repair(mesh)).flatten().filter(is_mended);
-        let (mesh, corners, repairs) = match repaired {
+        let (mesh, kept, repairs) = match repaired {
             None => (welded.map_or_else(|| file.clone(), |welded| welded.mesh), None, Vec::new()),
             Some(Repaired { mesh, faces, corners, mut repairs }) => {
                 if let Some(first) = &first {
@@ -294,13 +313,13 @@ impl MeshFlags {
                 if let Some(lines) = lines {
                     lines.faces = faces.iter().map(|&f| lines.faces[f as usize]).collect();
                 }
-                (mesh, Some(corners), repairs)
+                (mesh, Some((faces, corners)), repairs)
             }
         };
         for repair in &repairs {
             common.remark(format_args!("{name}: repaired: {repair}"));
         }
-        let origin = Origin::new(&file, &mesh, corners.as_deref());
+        let origin = Origin::new(&file, &mesh, kept.as_ref().map(|(_, corners)| &corners[..]));
         if let Some(lines) = lines {
             // Every vertex of a repaired mesh has a face; a welded one may have defects to be told.
             let sources = if repairs.is_empty() { first.as_deref() } else { Some(origin.sources()) };
@@ -308,7 +327,11 @@ impl MeshFlags {
                 lines.vertices = sources.iter().map(|&v| lines.vertices[v as usize]).collect();
             }
         }
-        (mesh, Some(origin), repairs)
+        let numbers = match kept {
+            None => Numbers { vertices: first, faces: None },
+            Some((faces, _)) => Numbers { vertices: Some(origin.numbers()), faces: Some(faces) },
+        };
+        Mended { mesh, origin: Some(origin), repairs, numbers }
     }
 
     /// What boundary edges are: by the flag, by the file, or as the programs take them.
@@ -318,11 +341,19 @@ impl MeshFlags {
 
     /// Refuses a mesh of whose boundary nine tenths are a seam, unless the flag says that it is wanted, or sheets were cut
     /// apart: files say what boundaries are whether there are any or not.
-    fn check_seams(&self, name: &str, surface: &Surface, repairs: &[Repair], common: &CommonFlags) -> Result<()> {
+    fn check_seams(
+        &self,
+        name: &str,
+        surface: &Surface,
+        repairs: &[Repair],
+        numbers: &Numbers,
+        common: &CommonFlags,
+    ) -> Result<()> {
         if self.boundary.is_some() || repairs.iter().any(Repair::is_cut) {
             return Ok(());
         }
-        let Some((edges, [a, b])) = seams(surface) else { return Ok(()) };
+        let Some((edges, ends)) = seams(surface) else { return Ok(()) };
+        let [a, b] = ends.map(|v| numbers.vertex(v));
         let all = surface.boundary_edges();
         let of = if edges == all { format!("all {all}") } else { format!("{edges} of {all}") };
         // Real openings have seams at their ends now and then.
@@ -387,15 +418,6 @@ impl MeshFlags {
     }
 }
 
-/// What the scheme is to a subdivision tool: the faces themselves where tools do not have it.
-pub fn subdivision_of(scheme: Scheme) -> Subdivision {
-    match scheme {
-        Scheme::CatmullClark => Subdivision::CatmullClark,
-        Scheme::Loop => Subdivision::Loop,
-        Scheme::Sqrt3 | Scheme::Nasri | Scheme::ZhengCai | Scheme::MidEdge => Subdivision::None,
-    }
-}
-
 /// [`Input::file_mesh`] of its parts.
 pub(super) fn file_mesh(surface: &Surface, frame: &Frame, origin: Option<&Origin>) -> Mesh {
     let mut points = surface.positions().to_vec();
@@ -412,7 +434,7 @@ pub(super) fn file_values(origin: Option<&Origin>, values: &[f64]) -> Vec<f64> {
 }
 
 /// The lines of vertices and faces.
-fn numbers(lines: &Option<io::Lines>) -> Option<(&[u32], &[u32])> {
+fn in_lines(lines: &Option<io::Lines>) -> Option<(&[u32], &[u32])> {
     lines.as_ref().map(|l| (l.vertices.as_slice(), l.faces.as_slice()))
 }
 
@@ -552,7 +574,8 @@ impl Input {
 
     /// The mesh as it was given, for the provenance of files about it.
     pub fn source(&self) -> Source {
-        let size = format!("{} vertices, {} faces", self.surface.len(), self.surface.faces().len());
+        let (vertices, faces) = (self.surface.len(), self.surface.faces().len());
+        let size = format!("{}, {}", counted(vertices, "vertex"), counted(faces, "face"));
         Source { name: self.label.clone(), size, checksum: self.checksum }
     }
 

@@ -9,7 +9,7 @@ mod process;
 mod progress;
 mod provenance;
 
-pub use input::{Input, MeshFlags, STAND_IN_NOISE, STANDARD_STREAM, subdivision_of};
+pub use input::{Input, MeshFlags, STAND_IN_NOISE, STANDARD_STREAM};
 use json::print_json;
 pub use monitor::MonitorFlags;
 pub use problem::{Given, Matrix, Problem, Subject};

@@ -23,6 +23,7 @@ use limitlab::analysis::complex_spectrum::ComplexSpectrum;
 use limitlab::analysis::dense;
 use limitlab::analysis::spectrum::{Spectra, spectrum};
 use limitlab::analysis::symmetric::SymmetricForm;
+use limitlab::error::counted;
 use limitlab::mesh::order::Order;
 use limitlab::output::check_target;
 use limitlab::solvers::{Errors, Method, Step, System};
@@ -338,8 +339,9 @@ fn error_maps(
         let last = row.solution.report.iterations;
         if maps.is_some() && at.iter().any(|&k| k > last) {
             common.remark(format_args!(
-                "{subject}: {} ended after {last} iterations: no errors beyond",
-                row.method.name()
+                "{subject}: {} ended after {}: no errors beyond",
+                row.method.name(),
+                counted(last, "iteration")
             ));
         }
     }

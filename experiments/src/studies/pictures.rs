@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use crate::report::{Colour, ColourScale, Figure, Picture, Points, Provenance, ShadedMesh, View};
 use limitlab::Result;
+use limitlab::error::counted;
 use limitlab::interpolate::surface::{SurfaceMesh, SurfaceOptions, surface};
 use limitlab::mesh::ply::{Scalars, write_painted_to};
 use limitlab::mesh::{Mesh, Surface, bounding_box, diagonal};
@@ -194,7 +195,7 @@ pub fn interpolation(
     let framed: Vec<DVec3> = points.iter().chain(control.positions()).copied().collect();
     let view = view(DVec3::Y, 30.0, 25.0);
     let panel = |caption: String, shaded| Picture::new(caption, view).surface(shaded).frame(&framed);
-    let counts = format!("given: {} vertices, {} faces", given.len(), given.faces().len());
+    let counts = format!("given: {}, {}", counted(given.len(), "vertex"), counted(given.faces().len(), "face"));
     let mesh = panel(counts, cage(given.mesh(), GIVEN));
     let cage = panel("control mesh".into(), cage(control.mesh(), CONTROL));
     let size = given.faces().corners().len();

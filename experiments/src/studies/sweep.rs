@@ -4,7 +4,7 @@ use super::style;
 use crate::cli::{Grid, Progress};
 use crate::report::{Column, Columns, Figure, LinePlot, Rule, Scale, Series, Table, readable};
 use limitlab::analysis::sweep::{OmegaSweep, SweepEvent, SweepRow};
-use limitlab::error::short;
+use limitlab::error::{counted, short};
 use limitlab::solvers::{Method, Outcome, Step};
 
 /// The grids unless told: Jacobi's reaches beyond 2/λ_max(D⁻¹A) on regular quads, the others over all of (0, 2].
@@ -49,7 +49,11 @@ pub fn table(id: String, title: String, about: String, sweep: &OmegaSweep) -> Ta
             );
         }
         if let Some(best) = sweep.best(t.method) {
-            text += &format!("; best on the grid: ω = {} with {} iterations", short(best.omega), best.iterations);
+            text += &format!(
+                "; best on the grid: ω = {} with {}",
+                short(best.omega),
+                counted(best.iterations, "iteration")
+            );
         }
         table.note(text + ".");
     }
@@ -62,9 +66,9 @@ pub fn best(methods: &[Method<'static>], sweep: &OmegaSweep) -> String {
         let mut line = match sweep.best(method) {
             None => format!("{method}: no run converged"),
             Some(best) => format!(
-                "{method}: best ω = {} with {} iterations, predicted ρ = {}",
+                "{method}: best ω = {} with {}, predicted ρ = {}",
                 short(best.omega),
-                best.iterations,
+                counted(best.iterations, "iteration"),
                 readable(best.predicted_rho, 4)
             ),
         };

@@ -211,6 +211,54 @@ fn repair_is_advised_exactly_where_it_helps() {
     }
 }
 
+/// What is left to tell of a welded or repaired mesh is told in the numbers of its file.
+#[test]
+fn places_of_a_mended_mesh_are_those_of_its_file() {
+    let folder = tempdir().unwrap();
+    // Four triangles and a fin with vertices of their own, whose edge is that of 2 and 5, and a vertex of no face.
+    let [o, x, y, z] = ["0 0 0", "1 0 0", "0 1 0", "0 0 1"];
+    let points = [o, y, x, o, x, z, x, y, z, y, o, z, z, x, "2 2 2", "9 9 9"];
+    let points: String = points.iter().map(|p| format!("v {p}\n")).collect();
+    let soup = format!("{points}f 1 2 3\nf 4 5 6\nf 7 8 9\nf 10 11 12\nf 13 14 15\n");
+    fs::write(folder.path().join("soup.obj"), soup).unwrap();
+    let line = assert_refused(&run_on(INTERPOLATE, folder.path(), "soup.obj", &["--weld"]), "welded");
+    for place in ["(face 1, line 18, vertices 2 and 5, 3 face sides)", "(vertex 15, line 16)"] {
+        assert!(line.contains(place), "{line}");
+    }
+    // Vertex 4 has no face, face 4 is a double, face 5 a flat fin at the edge 0–1: its ends are cut off as 6 and 7.
+    let faces = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 2 3 1\nf 1 2 6\n";
+    fs::write(folder.path().join("fin.obj"), format!("{TETRAHEDRON}v 5 5 5\nv 3 0 0\n{faces}")).unwrap();
+    let output = run_on(INTERPOLATE, folder.path(), "fin.obj", &["--repair", "--scheme", "catmull-clark"]);
+    assert_done(&output, "repaired");
+    let remarks = text(&output.stderr);
+    for remark in ["2 duplicate positions (first: vertex 6 lies on vertex 0)", "1 zero-area face (first: face 5)"] {
+        assert!(remarks.contains(remark), "{remarks}");
+    }
+}
+
+/// Flags that have no part in what is asked for are named, and no others.
+#[test]
+fn flags_without_their_method_are_remarked() {
+    let folder = tempdir().unwrap();
+    let said = |flags: &str| {
+        let output = run_on(INTERPOLATE, folder.path(), "icosahedron", &flags.split(' ').collect::<Vec<_>>());
+        assert_done(&output, flags);
+        text(&output.stderr).lines().filter(|line| line.ends_with("not used")).collect::<Vec<_>>().join("; ")
+    };
+    for (flags, expected) in [
+        ("--ite-max 3 --eps 0.1", "--ite-max, --eps without --method two-phase: not used"),
+        ("--method two-phase --ite-max 30 --eps 0.1", ""),
+        ("--scheme catmull-clark --membrane 2", "--membrane without --method halstead: not used"),
+        ("--method halstead --membrane 2 --thin-plate 0.5", ""),
+        (
+            "--format off",
+            "--format without a mesh on standard input or output (-), for names tell their formats: not used",
+        ),
+    ] {
+        assert_eq!(said(flags), expected, "{flags}");
+    }
+}
+
 #[test]
 fn a_repaired_mesh_comes_back_in_the_numbers_of_its_file() {
     let folder = tempdir().unwrap();

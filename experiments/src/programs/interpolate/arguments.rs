@@ -117,18 +117,18 @@ pub struct ShapeFlags {
     /// or a file with lines `vertex number` (others 0); with --vertices, those have α = 1
     #[arg(long, value_name = "A|FILE", allow_negative_numbers = true, conflicts_with_all = ["normals", "shape_handle"])]
     pub alpha: Option<String>,
-    /// Sweeps of --method two-phase at most
-    #[arg(long, value_name = "K", default_value_t = 5)]
-    pub ite_max: usize,
-    /// --method two-phase stops at a largest update of this part of the bounding box's diagonal
-    #[arg(long, value_name = "T", default_value_t = 0.003, value_parser = cli::positive)]
-    pub eps: f64,
-    /// Weight of the thin-plate energy in --method halstead, 0 or more
-    #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true)]
-    pub thin_plate: f64,
-    /// Weight of the membrane energy in --method halstead, positive
-    #[arg(long, value_name = "W", default_value_t = 1.0, value_parser = cli::positive)]
-    pub membrane: f64,
+    /// Sweeps of --method two-phase at most, 5 unless told
+    #[arg(long, value_name = "K")]
+    pub ite_max: Option<usize>,
+    /// --method two-phase stops at a largest update of this part of the bounding box's diagonal, 0.003 unless told
+    #[arg(long, value_name = "T", value_parser = cli::positive)]
+    pub eps: Option<f64>,
+    /// Weight of the thin-plate energy in --method halstead, 0 or more and 1 unless told
+    #[arg(long, value_name = "W", allow_negative_numbers = true)]
+    pub thin_plate: Option<f64>,
+    /// Weight of the membrane energy in --method halstead, positive and 1 unless told
+    #[arg(long, value_name = "W", value_parser = cli::positive)]
+    pub membrane: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

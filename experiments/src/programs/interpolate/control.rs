@@ -8,7 +8,7 @@ use glam::DVec3;
 use limitlab::Result;
 use limitlab::analysis::failed::Failed;
 use limitlab::assemble::Operator;
-use limitlab::error::Error;
+use limitlab::error::{Error, counted};
 use limitlab::interpolate::zheng_cai::{self, PhaseOne, Sweep};
 use limitlab::interpolate::{Options, Tolerance, interpolate_watched, limit_points};
 use limitlab::mesh::colours::in_colours;
@@ -164,11 +164,9 @@ fn by_colour(
 fn two_phase(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -> Result<Control> {
     let start = Instant::now();
     let order = arguments.order.order(input.surface.mesh(), input.surface.incidence());
-    let phase = PhaseOne {
-        sweep: Sweep::GaussSeidel(Some(&order)),
-        max_iterations: arguments.shape.ite_max,
-        eps: arguments.shape.eps,
-    };
+    let eps = arguments.shape.eps.unwrap_or(0.003);
+    let phase =
+        PhaseOne { sweep: Sweep::GaussSeidel(Some(&order)), max_iterations: arguments.shape.ite_max.unwrap_or(5), eps };
     let surface = &input.surface;
     let marks = per_vertex.interpolated.as_deref();
     let mut history = Vec::new();
@@ -189,7 +187,7 @@ fn two_phase(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -
         points: found.surface.into_mesh().positions,
         iterations: found.updates.len(),
         status: if found.passed { "converged" } else { "max-iterations" },
-        tolerance: arguments.shape.eps * surface.diagonal(),
+        tolerance: eps * surface.diagonal(),
         seconds: Seconds { assemble: input.check_seconds, solve: start.elapsed().as_secs_f64(), ..Seconds::default() },
     })
 }
@@ -230,10 +228,10 @@ fn check(
     Err(Error::mesh(
         &input.name,
         format!(
-            "{method} under {} ended as {} after {} iterations with max error {:.3e} against {:.3e}{detail}; {}",
+            "{method} under {} ended as {} after {} with max error {:.3e} against {:.3e}{detail}; {}",
             input.scheme,
             report.outcome,
-            report.iterations,
+            counted(report.iterations, "iteration"),
             unit * report.last().max,
             unit * stop.tolerance,
             advice::of_failed(&failed(arguments, input, per_vertex, report, stop), unit)

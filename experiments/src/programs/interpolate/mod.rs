@@ -11,7 +11,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use crate::cli::{self, Input, STANDARD_STREAM, subdivision_of};
+use crate::cli::{self, Input, STANDARD_STREAM};
 use crate::report::{self, Provenance};
 use crate::studies::pictures;
 
@@ -99,6 +99,31 @@ fn is_file_of(input: &str, output: &Path) -> bool {
     input.is_some_and(|input| output.is_some_and(|output| input == output && input.is_file()))
 }
 
+/// Says which flags have no part in what is asked for.
+fn remark_on_idle(arguments: &Arguments) {
+    let Arguments { shape, mesh, method, .. } = arguments;
+    let idle = |flags: &[(&str, bool)], what: &str| {
+        let given: Vec<&str> = flags.iter().filter(|flag| flag.1).map(|flag| flag.0).collect();
+        if !given.is_empty() {
+            arguments.common.remark(format_args!("{} without {what}: not used", given.join(", ")));
+        }
+    };
+    if *method != Choice::TwoPhase {
+        let flags = [("--ite-max", shape.ite_max.is_some()), ("--eps", shape.eps.is_some())];
+        idle(&flags, "--method two-phase");
+    }
+    if *method != Choice::Halstead {
+        let flags = [("--thin-plate", shape.thin_plate.is_some()), ("--membrane", shape.membrane.is_some())];
+        idle(&flags, "--method halstead");
+    }
+    if arguments.input != STANDARD_STREAM && arguments.output.as_os_str() != STANDARD_STREAM {
+        idle(
+            &[("--format", mesh.format.is_some())],
+            "a mesh on standard input or output (-), for names tell their formats",
+        );
+    }
+}
+
 /// Whether the output is a control mesh that is not refined, as tools take it.
 fn is_control(arguments: &Arguments) -> bool {
     !arguments.shape.limit && arguments.shape.subdivide == 0
@@ -162,6 +187,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     if arguments.mesh.print_defects(&[&arguments.input], &arguments.common, provenance)? {
         return Ok(());
     }
+    remark_on_idle(arguments);
     let target = Target::of(arguments)?;
     let in_place = target.file.is_some_and(|file| is_file_of(&arguments.input, file));
     if let Some(file) = target.file {
@@ -223,7 +249,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     let comments = if target.is_stream() { Vec::new() } else { provenance.about(&input.source()).lines() };
     let options = WriteOptions {
         normals: made.normals.as_deref(),
-        subdivision: if is_control { subdivision_of(input.scheme) } else { Subdivision::None },
+        subdivision: if is_control { input.scheme.subdivision() } else { Subdivision::None },
         tags: Some(&tags),
         attributes: keeps_faces.then_some(&input.attributes),
         stage: input.stage,

@@ -5,6 +5,7 @@ use crate::report::Provenance;
 use crate::studies::histories;
 use glam::DVec3;
 use limitlab::Result;
+use limitlab::error::counted;
 use serde_json::{Value, json};
 
 use super::arguments::{Arguments, Choice};
@@ -23,28 +24,29 @@ pub fn print_summary(
     let common = &arguments.common;
     if !made.not_flattened.is_empty() {
         common.remark(format_args!(
-            "{}: the faces of {} vertices have no average normal and were moved, not flattened (first: vertex {})",
+            "{}: the faces of {} have no average normal and were moved, not flattened (first: vertex {})",
             input.name,
-            made.not_flattened.len(),
+            counted(made.not_flattened.len(), "vertex"),
             made.not_flattened[0]
         ));
     }
     let without = made.normals.iter().flatten().filter(|n| **n == DVec3::ZERO).count();
     if without > 0 {
         common.remark(format_args!(
-            "{}: the surface has no normal at {without} vertices; (0, 0, 0) is written",
-            input.name
+            "{}: the surface has no normal at {}; (0, 0, 0) is written",
+            input.name,
+            counted(without, "vertex")
         ));
     }
     common.remark(format_args!(
-        "{}: {} by {}, {} iterations, max error {:.3e}, mean {:.3e} (mesh units)",
+        "{}: {} by {}, {}, max error {:.3e}, mean {:.3e} (mesh units)",
         arguments.output_name(),
         match arguments.method {
             Choice::Keeping(scheme) => scheme.name(),
             _ => input.scheme.name(),
         },
         result.method,
-        result.iterations,
+        counted(result.iterations, "iteration"),
         errors.max,
         errors.mean
     ));

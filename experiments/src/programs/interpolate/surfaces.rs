@@ -73,7 +73,7 @@ pub fn fairest(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions)
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
     let start = Instant::now();
     let flags = &arguments.shape;
-    let weights = Weights { thin_plate: flags.thin_plate, membrane: flags.membrane };
+    let weights = Weights { thin_plate: flags.thin_plate.unwrap_or(1.0), membrane: flags.membrane.unwrap_or(1.0) };
     let points = input.surface.positions();
     let found = fit(&fairness, points, &per_vertex.constraints(), weights)?;
     let solve = start.elapsed().as_secs_f64();

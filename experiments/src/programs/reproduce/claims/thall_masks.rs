@@ -361,9 +361,10 @@ fn other_schemes(lab: &Lab) -> Result<Finding> {
         evidence.push(Evidence::equal(format!("runs at ω = ½ under {scheme} that did not converge"), stuck, 0.0));
     }
     Ok(Finding::settled(evidence).remark(
-        "λ_max(D⁻¹A) ≤ max 1/a_ii ≤ 4 for all five schemes, and λ_min(A) ≥ min (3β_n − 1)/2 > 0 under Loop and √3 (1/10 and \
+        "λ_max(D⁻¹A) ≤ max 1/a_ii ≤ 4 under these five schemes, and λ_min(A) ≥ min (3β_n − 1)/2 > 0 under Loop and √3 (1/10 and \
          1/16 at valence 3), ¼ under Nasri, ½ under Zheng-Cai; under Catmull-Clark A is as in P7. So ω = ½ converges \
-         whenever the matrix is non-singular, as it always is but under Catmull-Clark. Runs from random points; Catmull-Clark where λ_min(D⁻¹A) > 10⁻³.",
+         whenever the matrix is non-singular, as it always is but under Catmull-Clark. \
+         So it is under mid-edge, where a_ii = ½ and A is singular on bipartite components alone. Runs from random points; Catmull-Clark where λ_min(D⁻¹A) > 10⁻³.",
     ))
 }
 
