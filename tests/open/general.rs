@@ -232,6 +232,21 @@ fn the_errors_of_auto_with_darts_are_those_of_limit_points() {
     assert!(converged > 20, "{converged}");
 }
 
+/// The directions of GMRES are solved to rounding as well, so that the rounds end at the last digits of the data, and not at LU.
+#[test]
+fn with_darts_a_tolerance_below_the_last_digits_ends_the_chain_at_its_first_step() {
+    let mut mesh = built_in("torus:6x5");
+    add_noise(&mut mesh, 0.1, 1);
+    let tags = Tags { creases: vec![([0, 1], 10.0), ([7, 8], 1.5)], ..Tags::default() };
+    let surface = Surface::new(mesh).unwrap().tagged(&tags).unwrap();
+    let some: Vec<bool> = (0..surface.len()).map(|v| v % 3 != 0).collect();
+    for interpolated in [None, Some(&some[..])] {
+        let options = Options { tolerance: Tolerance::Relative(1e-18), interpolated, ..Options::default() };
+        let found = interpolate(&surface, Scheme::CatmullClark, &options).unwrap();
+        assert_eq!((found.report.outcome, found.method), (Outcome::Rounding, "chebyshev"), "{:?}", found.report.last());
+    }
+}
+
 fn least_real_part(surface: &Surface) -> f64 {
     let system = Stages::new(surface, Scheme::CatmullClark, None).unwrap().whole();
     ComplexSpectrum::new(&system).unwrap().ends(SymmetricForm::A).min

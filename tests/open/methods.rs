@@ -38,7 +38,11 @@ fn where_no_vertex_is_smooth_every_method_is_done_at_once() {
     let corners = (0..8).map(|v| (v, 10.0)).collect();
     let cube = Surface::new(built_in("cube")).unwrap();
     let cube = cube.tagged(&Tags { corners, ..Tags::default() }).unwrap();
+    let stages = Stages::new(&cube, Scheme::CatmullClark, None).unwrap();
     for method in Method::ALL {
+        // Nothing is known of no rows: what is open stays so.
+        let open = with_spectrum(stages.block(), method, &|| spectrum(stages.block())).unwrap();
+        assert_eq!(open, method);
         let options = Options { method: Some(method), ..Options::default() };
         let found = interpolate(&cube, Scheme::CatmullClark, &options).unwrap();
         assert_eq!((found.report.outcome, found.points.as_slice()), (Outcome::Converged, cube.positions()), "{method}");

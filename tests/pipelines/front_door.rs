@@ -89,6 +89,11 @@ fn a_tolerance_below_the_last_digits_ends_the_chain_at_its_first_step() {
             let options = Options { tolerance: Tolerance::Relative(1e-18), interpolated, ..Options::default() };
             let found = interpolate(surface, scheme, &options).unwrap();
             assert_eq!((found.report.outcome, found.method), (Outcome::Rounding, "chebyshev"), "{what}");
+            // Differences are of size 1 here and have smaller last digits than the tolerance, the data have larger ones.
+            let far = surface.positions().iter().map(|p| *p + DVec3::splat(1000.0)).collect();
+            let options = Options { tolerance: Tolerance::Absolute(1e-13), ..options };
+            let found = interpolate(&surface.with_positions(far), scheme, &options).unwrap();
+            assert_eq!((found.report.outcome, found.method), (Outcome::Rounding, "chebyshev"), "far {what}");
         }
     });
 }
