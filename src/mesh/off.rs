@@ -124,7 +124,7 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
             .push("normals, which cannot be told from the colours (write them as NOFF, without colours)".to_string());
     }
     if coloured > 0 {
-        not_kept.push(format!("colours of {coloured} faces"));
+        not_kept.push(format!("colours of {}", counted(coloured, "face")));
     }
     let mut remarks = Vec::new();
     if !not_kept.is_empty() {
@@ -400,9 +400,9 @@ mod tests {
             assert_eq!(remarks, Vec::from_iter(remark), "{header}");
         }
         let text = format!("OFF{}{face} 255 0 0\n", rows(""));
-        assert_eq!(parse(&text).unwrap().remarks, ["not kept: colours of 1 faces"]);
+        assert_eq!(parse(&text).unwrap().remarks, ["not kept: colours of 1 face"]);
         let text = format!("OFF{}{face} 1\n", rows(""));
-        assert_eq!(parse(&text).unwrap().remarks, ["not kept: colours of 1 faces"]);
+        assert_eq!(parse(&text).unwrap().remarks, ["not kept: colours of 1 face"]);
     }
 
     #[test]

@@ -174,11 +174,14 @@ fn the_most_iterations_hold_for_all_at_a_dart() {
         let limits = limit_points(&dart.with_positions(found.points), Scheme::CatmullClark).unwrap();
         (found.report, distance(&limits, dart.positions()))
     };
+    let tolerance = options(None).stop(dart.positions()).unwrap().tolerance;
     let (free, _) = run(10_000);
     assert!(free.outcome == Outcome::Converged && free.history.len() > 1, "{:?}", free.history);
     for most in 0..free.iterations {
         let (report, error) = run(most);
-        assert_eq!((report.outcome, report.iterations), (Outcome::MaxIterations, most));
+        // Short of what the block is asked for, the tolerance may be met.
+        let outcome = if report.last().max <= tolerance { Outcome::Converged } else { Outcome::MaxIterations };
+        assert_eq!((report.outcome, report.iterations), (outcome, most));
         assert!((report.last().max - error).abs() < 1e-13, "{most}: {:e}, {error:e}", report.last().max);
         assert_eq!(report.history.last().map(|last| last.iteration), Some(most));
     }

@@ -440,8 +440,7 @@ fn hints_about_a_boundary_fit_the_mesh() {
     io::write(&folder.path().join("x.obj"), &quads, None).unwrap();
     let line = assert_all_refuse(&folder, "x.obj", &["--boundary", "refuse"]);
     assert!(line.contains("leave out --boundary refuse") && !line.contains("as-interior"), "{line}");
-    for (scheme, way_out) in [("catmull-clark", "or use --boundary edge-and-corner"), ("loop", "triangulate the mesh")]
-    {
+    for (scheme, way_out) in [("catmull-clark", ": --boundary edge-and-corner"), ("loop", "triangulate the mesh")] {
         let line = assert_all_refuse(&folder, "x.obj", &["--boundary", "as-interior", "--scheme", scheme]);
         assert!(!line.contains("--scheme") && line.ends_with(way_out), "{line}");
     }

@@ -228,7 +228,8 @@ fn places_of_a_mended_mesh_are_those_of_its_file() {
     // Vertex 4 has no face, face 4 is a double, face 5 a flat fin at the edge 0–1: its ends are cut off as 6 and 7.
     let faces = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 2 3 1\nf 1 2 6\n";
     fs::write(folder.path().join("fin.obj"), format!("{TETRAHEDRON}v 5 5 5\nv 3 0 0\n{faces}")).unwrap();
-    let output = run_on(INTERPOLATE, folder.path(), "fin.obj", &["--repair", "--scheme", "catmull-clark"]);
+    let flags = ["fin.obj", "-o", "cage.obj", "--repair", "--scheme", "catmull-clark"];
+    let output = run(INTERPOLATE, folder.path(), flags);
     assert_done(&output, "repaired");
     let remarks = text(&output.stderr);
     for remark in ["2 duplicate positions (first: vertex 6 lies on vertex 0)", "1 zero-area face (first: face 5)"] {
@@ -241,7 +242,8 @@ fn places_of_a_mended_mesh_are_those_of_its_file() {
 fn flags_without_their_method_are_remarked() {
     let folder = tempdir().unwrap();
     let said = |flags: &str| {
-        let output = run_on(INTERPOLATE, folder.path(), "icosahedron", &flags.split(' ').collect::<Vec<_>>());
+        let always = ["icosahedron", "-o", "cage.obj"];
+        let output = run(INTERPOLATE, folder.path(), always.into_iter().chain(flags.split(' ')));
         assert_done(&output, flags);
         text(&output.stderr).lines().filter(|line| line.ends_with("not used")).collect::<Vec<_>>().join("; ")
     };
