@@ -232,7 +232,7 @@ fn the_errors_of_auto_with_darts_are_those_of_limit_points() {
     assert!(converged > 20, "{converged}");
 }
 
-/// The directions of GMRES are solved to rounding as well, so that the rounds end at the last digits of the data, and not at LU.
+/// The directions of GMRES are solved to rounding too, so that its rounds end there, and not at LU.
 #[test]
 fn with_darts_a_tolerance_below_the_last_digits_ends_the_chain_at_its_first_step() {
     let mut mesh = built_in("torus:6x5");

@@ -77,6 +77,9 @@ fn sizes_known_before_are_refused_with_the_numbers() {
     }
     let line = limited(300_000, INTERPOLATE, "torus:1000x5000 -o a.obj");
     assert!(line.contains("20000000 corners") && line.contains("MB of memory"), "{line}");
+    // Room for the mesh, and none for what is done with it.
+    let line = limited(1_100_000, INTERPOLATE, "torus:1000x5000 -o a.obj");
+    assert!(line.contains("the work on 5000000 vertices") && line.contains("MB of memory"), "{line}");
     assert_no_files(folder.path(), "refused");
 }
 

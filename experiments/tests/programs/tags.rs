@@ -318,6 +318,12 @@ fn a_mesh_without_smooth_vertices_is_one_of_which_all_is_known() {
         assert_done(&output, program);
         assert!(!text(&output.stdout).contains("NaN"), "{program}: {}", text(&output.stdout));
     }
+    // Of no rows there is no spectrum that a parameter could come from.
+    let methods = ["quad.off", "--method", "jacobi,chebyshev,heavy-ball", "--json", "--quiet"];
+    let found = json(&run(COMPARE, folder.path(), methods));
+    let parameters: Vec<&str> =
+        found["rows"].as_array().unwrap().iter().map(|row| row["parameter"].as_str().unwrap()).collect();
+    assert_eq!(parameters, ["optimal", "proven", "estimated", "estimated"]);
     let found = json(&run(SPECTRUM, folder.path(), ["quad.off", "--json", "--quiet"]));
     assert_eq!(
         (&found["lambda_min"], &found["lambda_max"], &found["rho"]["pia"]),
