@@ -31,7 +31,7 @@ pub enum LocalScheme {
         /// The blend parameter α, from 0 to 2.
         alpha: f64,
     },
-    /// The same [blend](crate::schemes::blend) of another scheme; with α = 0 it is that scheme.
+    /// The same [blend] of another scheme; with α = 0 it is that scheme.
     Blend {
         /// The scheme that is blended.
         of: Blended,
