@@ -406,18 +406,29 @@ pub fn told<'py>(
     let Solution { mut points, method, report, setup_seconds, solve_seconds, fill } = solution;
     let unit = mesh.frame.scale();
     mesh.frame.leave(&mut points);
-    let told = PyDict::new(py);
+    let told = of_run(py, (method, report), unit, tolerance)?;
     told.set_item("vertices", array_of(py, points))?;
+    told.set_item("setup_seconds", setup_seconds)?;
+    told.set_item("solve_seconds", solve_seconds)?;
+    told.set_item("fill", fill)?;
+    told.set_item("failed", failed)?;
+    Ok(told)
+}
+
+/// What a run by a method came to, as a dictionary; `unit` is what a length of one measures in the units of the points.
+pub fn of_run<'py>(
+    py: Python<'py>,
+    (method, report): (&str, Report),
+    unit: f64,
+    tolerance: f64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let told = PyDict::new(py);
     told.set_item("method", method)?;
     told.set_item("status", report.outcome.name())?;
     told.set_item("iterations", report.iterations)?;
     told.set_item("history", history(py, &report.history, unit))?;
     told.set_item("detail", report.detail)?;
     told.set_item("tolerance", unit * tolerance)?;
-    told.set_item("setup_seconds", setup_seconds)?;
-    told.set_item("solve_seconds", solve_seconds)?;
-    told.set_item("fill", fill)?;
-    told.set_item("failed", failed)?;
     Ok(told)
 }
 

@@ -12,8 +12,9 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{history, of_vertices, points_of};
+use crate::arrays::{of_vertices, points_of};
 use crate::errors::raised;
+use crate::interpolate::of_run;
 use crate::options::Asked;
 use crate::surface::PySurface;
 use crate::watch::Watch;
@@ -87,14 +88,7 @@ impl PyInterpolator {
         // The lock is taken without the interpreter: who holds it may wait for that in a callback.
         let solved = py.detach(|| self.solved(points, out, warm, asked));
         let (method, report, unit, tolerance) = solved?;
-        let found = PyDict::new(py);
-        found.set_item("method", method)?;
-        found.set_item("status", report.outcome.name())?;
-        found.set_item("iterations", report.iterations)?;
-        found.set_item("history", history(py, &report.history, unit))?;
-        found.set_item("detail", report.detail)?;
-        found.set_item("tolerance", unit * tolerance)?;
-        Ok(found)
+        of_run(py, (method, report), unit, tolerance)
     }
 }
 
