@@ -3,6 +3,7 @@
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
+use std::sync::OnceLock;
 
 use glam::DVec3;
 use nalgebra::DMatrix;
@@ -218,8 +219,20 @@ pub fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// All of `subjects` in parallel, in their order.
-pub fn each<T: Send>(subjects: &[Subject], work: impl Fn(&Subject) -> Result<T> + Sync + Send) -> Result<Vec<T>> {
-    subjects.par_iter().map(work).collect()
+///
+/// What divides the work is compiled once, not for each of the claims.
+pub fn each<T: Send + Sync>(
+    subjects: &[Subject],
+    work: impl Fn(&Subject) -> Result<T> + Sync + Send,
+) -> Result<Vec<T>> {
+    fn run(count: usize, task: &(dyn Fn(usize) + Sync)) {
+        (0..count).into_par_iter().with_max_len(1).for_each(task);
+    }
+    let results: Vec<OnceLock<Result<T>>> = subjects.iter().map(|_| OnceLock::new()).collect();
+    run(subjects.len(), &|k| {
+        results[k].get_or_init(|| work(&subjects[k]));
+    });
+    results.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
 /// The limit mask by repetition alone: the first row of S^64.
