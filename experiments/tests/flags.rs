@@ -164,6 +164,7 @@ const PROGRAMS: &[Program] = &[
             ("--sizes", "0|7|x||100"),
             ("--profile", "0"),
             ("--gains", "0"),
+            ("--frames", "0|100"),
             ("--steps", "0|100"),
             ("--runs", "1|0"),
         ],

@@ -316,7 +316,8 @@ pub fn require_memory(mesh: &Mesh) -> Result<()> {
 }
 
 /// Interpolation for points that move: the operator, the order of its rows and all arrays are kept from one set of points
-/// to the next.
+/// to the next. Where points move smoothly, the nearest start is the last control mesh moved as they were,
+/// V + P − P_before: the error is then (A − I)(P − P_before), by which A hardly changes smooth points.
 ///
 /// ```
 /// use limitlab::interpolate::Interpolator;

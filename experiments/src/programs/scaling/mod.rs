@@ -1,8 +1,9 @@
 //! Time and memory against mesh size: `scaling` writes `scaling.{md,csv,png}`, `scaling-threads`, `scaling-profile`,
-//! `scaling-edits`, `scaling-steps` and `scaling-decay.{md,csv}`.
+//! `scaling-edits`, `scaling-frames`, `scaling-steps` and `scaling-decay.{md,csv}`.
 
 mod baseline;
 mod edits;
+mod frames;
 mod machine;
 mod profile;
 mod steps;
@@ -35,14 +36,14 @@ use limitlab::solvers::gauss_seidel::{by_colours, in_waves};
 use limitlab::solvers::{Method, Report, Stop, run};
 
 /// In its help.
-const EXAMPLES: [&str; 1] = ["scaling --sizes 1000,10000,100000 --profile 0 --gains 0 --steps 0"];
+const EXAMPLES: [&str; 1] = ["scaling --sizes 1000,10000,100000 --profile 0 --gains 0 --frames 0 --steps 0"];
 
 /// Measures time, memory and iterations of the methods over growing meshes.
 ///
 /// Runs go from faces in memory to control points, and everything is counted.
 ///
 /// As it stands this takes about twenty minutes on two cores, most of them for Cholesky and incomplete Cholesky of a million
-/// vertices, and 5 GB of memory; --sizes 1000,10000,100000 --profile 0 --gains 0 --steps 0 takes one. Each row is said on standard
+/// vertices, and 5 GB of memory; --sizes 1000,10000,100000 --profile 0 --gains 0 --frames 0 --steps 0 takes one. Each row is said on standard
 /// error and written as soon as it is measured, and what is there stays when the program is stopped.
 #[derive(Parser)]
 #[command(name = "scaling", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE, None))]
@@ -77,6 +78,9 @@ pub struct Arguments {
     /// Vertices of the meshes for one thread beside all; 0 for none
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     gains: usize,
+    /// Vertices of the meshes for frames on the same faces; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    frames: usize,
     /// Vertices of the meshes for the steps around the solve; 0 for none
     #[arg(long, value_name = "N", default_value_t = 300_000)]
     steps: usize,
@@ -95,8 +99,15 @@ pub struct Arguments {
 }
 
 /// The names of its files.
-const STEMS: [&str; 6] =
-    ["scaling", "scaling-threads", "scaling-profile", "scaling-edits", "scaling-steps", "scaling-decay"];
+const STEMS: [&str; 7] = [
+    "scaling",
+    "scaling-threads",
+    "scaling-profile",
+    "scaling-edits",
+    "scaling-frames",
+    "scaling-steps",
+    "scaling-decay",
+];
 /// The smallest mesh that every generator makes.
 const LEAST: usize = 100;
 /// Vertices of the mesh that the interval of Chebyshev iterations is estimated on.
@@ -147,6 +158,16 @@ fn measure(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         figure.write(&arguments.out, "scaling", arguments.figures.formats(), provenance)?;
     }
     local_edits(arguments, &progress, &mut printer, provenance)?;
+    if arguments.frames >= LEAST {
+        let mut rows = Vec::new();
+        for scheme in [Scheme::CatmullClark, Scheme::Loop] {
+            let name = family(scheme, arguments.frames);
+            progress.message(format!("frames: {name}, {scheme}"));
+            frames::frames(&name, noisy(&name)?, scheme, &mut rows)?;
+            frames::frames_table(&rows).write(&arguments.out, provenance)?;
+        }
+        printer.table(&frames::frames_table(&rows))?;
+    }
     if arguments.steps >= LEAST {
         steps::steps(arguments.steps, &arguments.out, &progress, &mut printer, provenance)?;
     }
