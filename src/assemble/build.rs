@@ -115,19 +115,18 @@ impl<'a> RowSource<'a> {
     /// More than 2³² − 1 neighbours.
     pub(super) fn offsets(&self, kinds: &[RowKind]) -> Result<Vec<u32>> {
         let among_polygons = u32::from(self.scheme.edge_weight() != 0.0);
-        let mut offsets = large(Vec::with_capacity(kinds.len() + 1));
-        offsets.push(0);
-        let mut end = 0u32;
-        for (kind, n) in kinds.iter().zip(&self.valences) {
-            let length = match kind {
+        let lengths = || {
+            kinds.iter().zip(&self.valences).map(|(kind, n)| match kind {
                 RowKind::Quads => 2 * n,
                 RowKind::Edges => *n,
                 RowKind::Polygons => among_polygons * n,
-            };
-            end = end.checked_add(length).ok_or_else(|| Error::TooLarge {
-                what: "the operator would have more than 2³² − 1 neighbours".into(),
-                advice: "use a smaller mesh",
-            })?;
+            })
+        };
+        let mut offsets = large(Vec::with_capacity(kinds.len() + 1));
+        offsets.push(0);
+        let mut end = 0u32;
+        for length in lengths() {
+            end = end.checked_add(length).ok_or_else(|| too_many(lengths().map(u64::from).sum(), kinds.len()))?;
             offsets.push(end);
         }
         Ok(offsets)
@@ -218,5 +217,33 @@ impl<'a> RowSource<'a> {
         // Fixed rows.
         all.edges[0] = RowWeights::new(0.0, 0.0, 0.0);
         all
+    }
+}
+
+/// More neighbours than 32-bit numbers count: from 5.4·10⁸ vertices on among quads of valence 4, 7.1·10⁸ among triangles.
+fn too_many(neighbours: u64, rows: usize) -> Error {
+    Error::TooLarge {
+        what: format!("the operator would have {neighbours} neighbours in {rows} rows, more than 2³² − 1"),
+        advice: "use a smaller mesh",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Surface, builtin};
+
+    /// As many edges as a mesh of half a billion vertices has, of which there is no room for here.
+    #[test]
+    fn more_neighbours_than_32_bits_count_are_refused_with_their_number() {
+        let surface = Surface::new(builtin::builtin("cube").unwrap()).unwrap();
+        let (faces, incidence) = (surface.faces(), surface.incidence());
+        let mut source = RowSource::new(faces, (incidence, None), Scheme::CatmullClark, (None, None));
+        source.valences.fill(1 << 28);
+        let kinds = source.kinds();
+        let message = source.offsets(&kinds).unwrap_err().to_string();
+        assert!(message.contains("4294967296 neighbours in 8 rows, more than 2³² − 1"), "{message}");
+        source.valences[3] -= 1;
+        assert_eq!(source.offsets(&kinds).unwrap().last(), Some(&(u32::MAX - 1)));
     }
 }

@@ -463,7 +463,7 @@ impl Builder {
 
     pub fn vertex(&mut self, position: DVec3, line: usize) -> std::result::Result<(), String> {
         if self.positions.len() == u32::MAX as usize {
-            return Err("more vertices than 32-bit indices can name".into());
+            return Err("more vertices than 32-bit indices can name, 4294967295".into());
         }
         self.positions.push(position);
         if let Some(lines) = &mut self.lines {
@@ -483,7 +483,7 @@ impl Builder {
             return Err(few_corners(self.faces(), size));
         }
         let Ok(end) = u32::try_from(self.corners.len()) else {
-            return Err("more face corners than 32-bit indices can name".into());
+            return Err("more face corners than 32-bit indices can name, 4294967295".into());
         };
         self.offsets.push(end);
         if let Some(lines) = &mut self.lines {
