@@ -73,6 +73,7 @@ const PROGRAMS: &[Program] = &[
                 ("--eps", "1e-9|1|0"),
                 ("--thin-plate", "0|1|1e9|-1|nan"),
                 ("--membrane", "1|1e-9|0"),
+                ("--solution", "no-such.petsc|closed.off"),
                 ("--picture", "p.png|p.svg|p.pdf|p.gif|no/p.png"),
             ],
         ],
@@ -81,7 +82,12 @@ const PROGRAMS: &[Program] = &[
         name: "assemble",
         meshes: 1,
         needed: &[("--out", "out|new/folder|closed.off")],
-        groups: &[COMMON, JSON, ON_MESHES],
+        groups: &[
+            COMMON,
+            JSON,
+            ON_MESHES,
+            &[("--format", "petsc|matrix-market|off|no-such"), ("--order", ORDERS), ("--index", "32|64|16")],
+        ],
     },
     Program {
         name: "compare-solvers",

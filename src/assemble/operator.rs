@@ -76,22 +76,26 @@ impl Operator {
         numbering: Option<&Numbering>,
         free: Option<&[bool]>,
     ) -> Result<Self> {
-        check(surface, scheme)?;
         let rows = (numbering, free);
         match surface.renumbered() {
-            Some(inside) => Self::build(&inside.faces, (&inside.incidence, None), scheme, rows),
-            None => {
-                let is_whole = surface.is_closed() || surface.features().is_some();
-                let open = if is_whole { None } else { Some(surface.topology()) };
-                Self::build(surface.faces(), (surface.incidence(), open), scheme, rows)
+            Some(inside) => {
+                check(surface, scheme)?;
+                Self::build(&inside.faces, (&inside.incidence, None), scheme, rows)
             }
+            None => Self::with_fixed(surface, scheme, rows),
         }
     }
 
-    /// As [`inside`](Self::inside), in the order of a surface whose rows that are not free are all that is not smooth.
-    pub(super) fn with_fixed(surface: &Surface, scheme: Scheme, free: &[bool]) -> Result<Self> {
+    /// As [`inside`](Self::inside), of the vertices of the surface, however they are numbered inside.
+    pub(super) fn with_fixed(
+        surface: &Surface,
+        scheme: Scheme,
+        rows: (Option<&Numbering>, Option<&[bool]>),
+    ) -> Result<Self> {
         check(surface, scheme)?;
-        Self::build(surface.faces(), (surface.incidence(), None), scheme, (None, Some(free)))
+        let is_whole = surface.is_closed() || surface.features().is_some();
+        let open = if is_whole { None } else { Some(surface.topology()) };
+        Self::build(surface.faces(), (surface.incidence(), open), scheme, rows)
     }
 
     fn build(
@@ -160,7 +164,7 @@ impl Operator {
     }
 
     /// h_i.
-    fn weight(&self, i: usize) -> f64 {
+    pub(super) fn weight(&self, i: usize) -> f64 {
         self.h[self.stencil.valence(i)]
     }
 

@@ -34,7 +34,7 @@ impl StagedOperator {
         let features = surface.features();
         let is_free = |v: usize| features.is_none_or(|f| f.is_smooth(v));
         let free: Vec<bool> = parallel::collect(surface.len(), is_free);
-        let operator = Operator::with_fixed(surface, scheme, &free)?;
+        let operator = Operator::with_fixed(surface, scheme, (None, Some(&free)))?;
         let fixed: Vec<u32> = (0..surface.len()).filter(|&v| !free[v]).map(|v| v as u32).collect();
         let mut triplets = Vec::new();
         let (faces, incidence) = (surface.faces(), surface.incidence());

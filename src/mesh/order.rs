@@ -62,7 +62,12 @@ impl FromStr for Order {
                 .parse()
                 .map(Order::Random)
                 .map_err(|_| Error::Unknown(format!("unknown vertex order \"{text}\": the seed is a whole number"))),
-            _ => names::find("vertex order", text, &NAMES, &[("multicolor", Order::Multicolour)]),
+            _ => names::find(
+                "vertex order",
+                text,
+                &NAMES,
+                &[("multicolor", Order::Multicolour), ("curve", Order::Morton)],
+            ),
         }
     }
 }

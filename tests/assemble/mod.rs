@@ -6,5 +6,6 @@ mod convert;
 mod files;
 mod formulas;
 mod matrix_market;
+mod petsc;
 mod refusals;
 mod spectra;

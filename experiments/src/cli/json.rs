@@ -13,11 +13,19 @@ use limitlab::error::{Error, Result};
 /// # Errors
 /// As [`print()`](super::print).
 pub fn print_json(value: &impl Serialize) -> Result<()> {
+    print(&String::from_utf8_lossy(&json_text(value)?))
+}
+
+/// One value, indented.
+///
+/// # Errors
+/// If the value has no JSON.
+pub(super) fn json_text(value: &impl Serialize) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     value
         .serialize(&mut Serializer::with_formatter(&mut bytes, Plain(PrettyFormatter::new())))
         .map_err(|e| Error::Computation(format!("JSON: {e}")))?;
-    print(&String::from_utf8_lossy(&bytes))
+    Ok(bytes)
 }
 
 /// serde_json's layout, without the sign of positive exponents.

@@ -15,7 +15,7 @@ pub use monitor::MonitorFlags;
 pub use problem::{Given, Matrix, Problem, Subject};
 pub use process::{exit, say};
 pub use progress::Progress;
-pub use provenance::{parse, print_object, provenance};
+pub use provenance::{MANIFEST, object_text, parse, print_object, provenance};
 
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};

@@ -7,6 +7,7 @@ use clap::{ArgAction, ArgMatches, Command, Parser};
 use serde_json::Value;
 
 use super::input::all_fields;
+use super::json::json_text;
 use super::print_json;
 use crate::report::provenance::{Provenance, Run, quoted};
 use limitlab::error::Result;
@@ -85,6 +86,22 @@ pub fn print_object(fields: Value, provenance: &Provenance) -> Result<()> {
     let mut object = all_fields(provenance.fields(), fields);
     object["replaced"] = limitlab::output::replaced().iter().map(|path| Value::from(path.to_string_lossy())).collect();
     print_json(&object)
+}
+
+/// The file beside a system for other programs: what it is of, and how it came about.
+pub const MANIFEST: &str = "manifest.json";
+
+/// The JSON of a file about what a program wrote: `fields`, and how they came about.
+///
+/// # Errors
+/// If a value has no JSON.
+///
+/// # Panics
+/// If `fields` is not an object.
+pub fn object_text(fields: &Value, provenance: &Provenance) -> Result<Vec<u8>> {
+    let mut text = json_text(&all_fields(provenance.fields(), fields.clone()))?;
+    text.push(b'\n');
+    Ok(text)
 }
 
 #[cfg(test)]

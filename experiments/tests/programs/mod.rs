@@ -9,6 +9,7 @@ mod guide;
 mod histories;
 mod metadata;
 mod page;
+mod petsc;
 mod pictures;
 #[cfg(target_os = "linux")]
 mod process;

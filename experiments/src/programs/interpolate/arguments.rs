@@ -50,6 +50,10 @@ pub struct Arguments {
     /// does
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice)]
     pub method: Choice,
+    /// Solve nothing, and take the solution of the system that `assemble --format petsc` wrote: a PETSc vector in the folder of that
+    /// system, of the same mesh and flags. It is checked by the limit points of all vertices, against --tol
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["method", "order", "max_iter", "vertices", "alpha", "monitor"])]
+    pub solution: Option<PathBuf>,
     /// Vertex order of in-place sweeps: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED.
     /// By colours, gauss-seidel and sor of all vertices run on all threads without a stored matrix
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]

@@ -1,13 +1,16 @@
 //! Control points of the given points, by the method asked for.
 
+use std::fs;
+use std::io::ErrorKind;
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::time::Instant;
 
-use crate::cli::{Input, Progress, advice};
+use crate::cli::{Input, MANIFEST, Progress, advice};
 use glam::DVec3;
 use limitlab::Result;
 use limitlab::analysis::failed::Failed;
-use limitlab::assemble::Operator;
+use limitlab::assemble::{Operator, petsc};
 use limitlab::error::{Error, counted};
 use limitlab::interpolate::zheng_cai::{self, PhaseOne, Sweep};
 use limitlab::interpolate::{Options, Tolerance, interpolate_watched, limit_points};
@@ -15,6 +18,7 @@ use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::order::Order;
 use limitlab::solvers::gauss_seidel::by_colours_watched;
 use limitlab::solvers::{Errors, Method, Outcome, Recorded, Report, Step, Stop};
+use serde_json::Value;
 
 use super::arguments::{Arguments, Choice};
 use super::vertex_options::VertexOptions;
@@ -82,6 +86,9 @@ pub fn control_mesh(arguments: &Arguments, input: &Input, per_vertex: &VertexOpt
 }
 
 fn solved(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -> Result<Control> {
+    if let Some(path) = &arguments.solution {
+        return given(arguments, input, path);
+    }
     if arguments.method == Choice::TwoPhase {
         return two_phase(arguments, input, per_vertex);
     }
@@ -125,6 +132,66 @@ fn solved(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -> R
         },
         points: found.points,
     })
+}
+
+/// The solution in a file, held against the limit points of all vertices.
+fn given(arguments: &Arguments, input: &Input, path: &Path) -> Result<Control> {
+    let stop = input.stop(&arguments.stop)?;
+    let start = Instant::now();
+    check_manifest(&path.with_file_name(MANIFEST), input)?;
+    let points = petsc::read_control(path, &input.surface, input.scheme).map_err(|e| match e {
+        Error::Io { .. } | Error::Parse { .. } | Error::Memory { .. } => e,
+        other => input.named(other),
+    })?;
+    let errors = limit_errors(input, None, &points)?;
+    let unit = input.frame.scale();
+    // What is not finite is no solution either, and a maximum does not see it.
+    if errors.max > stop.tolerance || !errors.mean.is_finite() {
+        let what = format!(
+            "the limit points of this control mesh miss the vertices of {} by {:.3e} at the most, {:.3e} on the average, against \
+             {:.3e}: solve to a smaller tolerance, or take a larger one (--tol, --tol-absolute)",
+            input.name,
+            unit * errors.max,
+            unit * errors.mean,
+            unit * stop.tolerance
+        );
+        return Err(Error::parse(path, None, what));
+    }
+    Ok(Control {
+        method: "petsc",
+        points,
+        iterations: 0,
+        status: Outcome::Converged.name(),
+        errors,
+        history: Vec::new(),
+        tolerance: stop.tolerance,
+        seconds: Seconds { assemble: input.check_seconds, solve: start.elapsed().as_secs_f64(), ..Seconds::default() },
+    })
+}
+
+/// Refuses a system of another mesh, or under another scheme.
+fn check_manifest(path: &Path, input: &Input) -> Result<()> {
+    let text = fs::read(path).map_err(|e| match e.kind() {
+        ErrorKind::NotFound => {
+            let what = "there is no such file: a solution is read in the folder of the system that was solved";
+            Error::parse(path, None, what)
+        }
+        _ => Error::io(path, "read", e),
+    })?;
+    let manifest: Value = serde_json::from_slice(&text)
+        .map_err(|e| Error::parse(path, Some(e.line()), format!("no JSON: {e}; assemble the system anew")))?;
+    let here = [("hash", input.source().hash()), ("scheme", input.scheme.name().to_owned())];
+    for (field, value) in here {
+        if manifest[field] != value.as_str() {
+            let what = format!(
+                "the {field} is {} in this manifest, and {value} of the mesh given: name the same mesh and flags as when the system \
+                 was assembled",
+                manifest[field]
+            );
+            return Err(Error::parse(path, None, what));
+        }
+    }
+    Ok(())
 }
 
 /// All vertices, by sweeps that relax those of one colour at once, without a stored matrix.
