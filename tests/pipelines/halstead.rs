@@ -2,18 +2,19 @@
 //! differences, affine maps, singular meshes, errors per iteration.
 
 use std::collections::BTreeSet;
+use std::ops::ControlFlow;
 
 use chacha20::ChaCha8Rng;
 use glam::DVec3;
 use limitlab::assemble::LimitSystem;
-use limitlab::interpolate::halstead::{Fairness, LEVELS, Weights, fit, follow};
+use limitlab::interpolate::halstead::{Fairness, LEVELS, Solver, Weights, fit, fit_watched, follow};
 use limitlab::interpolate::zheng_cai::Constraints;
 use limitlab::interpolate::{Options, interpolate};
 use limitlab::mesh::features::{Rule, Tags};
 use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Faces, Mesh, Surface, builtin};
 use limitlab::schemes::{Refinement, Scheme, catmull_clark};
-use limitlab::solvers::{Method, Outcome, Recorded, Stop};
+use limitlab::solvers::{Method, Outcome, Recorded, Step, Stop};
 use rand::{RngExt, SeedableRng};
 
 use crate::common::pipelines::{distance, noisy, noisy_surface};
@@ -246,6 +247,7 @@ fn the_fit_is_the_fairest() {
     ];
     for ((name, surface), weights) in many_surfaces().into_iter().zip(weights.into_iter().cycle()) {
         let fairness = Fairness::new(&surface).unwrap();
+        let forms = fairness.forms().unwrap();
         let best = fit(&fairness, surface.positions(), &ALL, weights).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(11);
         for _ in 0..5 {
@@ -268,7 +270,7 @@ fn the_fit_is_the_fairest() {
             let gradient = |k: &limitlab::assemble::Csr| -> f64 {
                 (0..step.len()).map(|i| step.positions()[i].dot(k.row_times(i, best.surface.positions()))).sum()
             };
-            let (thin, membrane) = (gradient(&fairness.thin_plate), gradient(&fairness.membrane));
+            let [thin, membrane] = forms.each_ref().map(gradient);
             let slope = weights.thin_plate * thin + weights.membrane * membrane;
             let scale = best.energies.weighted(weights) + fairness.energies(step.positions()).weighted(weights);
             assert!(slope.abs() < SOLVED * scale, "{name} {slope:e} {scale:e}");
@@ -419,4 +421,86 @@ fn every_iterate_is_measured_and_the_last_is_the_control_mesh() {
     let fair = fit(&fairness, surface.positions(), &ALL, weights).unwrap();
     assert!(last.energies.weighted(weights) > rows[0].energies.weighted(weights));
     assert!(fair.energies.weighted(weights) < last.energies.weighted(weights));
+}
+
+/// The sum over elements is the product with the matrix of all entries, which knows no kinds of elements and no blocks.
+#[test]
+fn elements_are_the_matrix() {
+    let large = ["quad-sphere:4", "icosphere:3", "bipyramid:40", "prism:30"];
+    let large = large.map(|name| (name.to_owned(), noisy_surface(name)));
+    for (name, surface) in many_surfaces().into_iter().chain(large) {
+        let fairness = Fairness::new(&surface).unwrap();
+        let forms = fairness.forms().unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let x: Vec<DVec3> = (0..fairness.fine.len())
+            .map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0))))
+            .collect();
+        for (thin_plate, membrane, k) in [(1.0, 0.0, &forms[0]), (0.0, 1.0, &forms[1])] {
+            let found = fairness.gradient(&x, Weights { thin_plate, membrane });
+            let expected: Vec<DVec3> = (0..x.len()).map(|i| k.row_times(i, &x)).collect();
+            let size = expected.iter().map(|p| p.length()).fold(0.0, f64::max);
+            assert!(distance(&found, &expected) < 1e-13 * size, "{name}");
+        }
+    }
+}
+
+/// Two ways to one minimiser, under all conditions: the energy to 1e-8 of itself and better, the control points as well as the
+/// factorization's refinement tells them.
+#[test]
+fn iterations_and_the_factorization_find_the_same() {
+    let larger = ["quad-sphere:3", "bipyramid:9"].map(|name| (name.to_owned(), noisy_surface(name)));
+    for (number, (name, surface)) in many_surfaces().into_iter().chain(larger).enumerate() {
+        let fairness = Fairness::new(&surface).unwrap();
+        let n = surface.len();
+        let mut rng = ChaCha8Rng::seed_from_u64(number as u64);
+        let marks: Vec<bool> = (0..n).map(|v| v == 0 || rng.random_bool(0.7)).collect();
+        let normal = |v: usize, rng: &mut ChaCha8Rng| {
+            let may = rule(&surface, v) == Rule::Smooth && rng.random_bool(0.5);
+            may.then(|| DVec3::from_array(std::array::from_fn(|_| rng.random_range(0.1..1.0))))
+        };
+        let normals: Vec<Option<DVec3>> = (0..n).map(|v| normal(v, &mut rng)).collect();
+        let fewer: Vec<Option<DVec3>> = (0..n).map(|v| normals[v].filter(|_| marks[v])).collect();
+        // A component without a mark has no place.
+        let held = {
+            let (component, count) = surface.topology().components(surface.faces());
+            (0..count as u32).all(|c| (0..n).any(|v| component[v] == c && marks[v]))
+        };
+        let mut wishes = vec![ALL, Constraints { normals: Some(&normals), ..ALL }];
+        if held {
+            wishes.push(Constraints { interpolated: Some(&marks), ..ALL });
+            wishes.push(Constraints { interpolated: Some(&marks), normals: Some(&fewer), ..ALL });
+        }
+        let weights = Weights { thin_plate: 1.0, membrane: [1.0, 0.1][number % 2] };
+        for (k, wishes) in wishes.iter().enumerate() {
+            let stop = Stop { tolerance: 1e-12, max_iterations: 10_000 };
+            let [iterated, factored] = [Solver::Iterations, Solver::Factorization].map(|solver| {
+                let mut watch = |_: &Step| ControlFlow::Continue(());
+                fit_watched(&fairness, surface.positions(), wishes, weights, solver, &stop, &mut watch).unwrap()
+            });
+            assert_eq!(iterated.report.outcome, Outcome::Converged, "{name} {k}");
+            let [found, expected] = [&iterated, &factored].map(|fit| fit.energies.weighted(weights));
+            assert!((found / expected - 1.0).abs() < 1e-10, "{name} {k}: {found} {expected}");
+            let off = distance(iterated.surface.positions(), factored.surface.positions());
+            assert!(off < 1e-9, "{name} {k}: {off:e}");
+        }
+    }
+}
+
+/// All sums are over blocks, in their order.
+#[test]
+fn the_fit_does_not_depend_on_the_number_of_threads() {
+    let surface = noisy_surface("quad-sphere:5");
+    let found = [1, 2, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let fairness = Fairness::new(&surface).unwrap();
+            fit(&fairness, surface.positions(), &ALL, Weights::default()).unwrap()
+        })
+    });
+    assert!(found[0].report.iterations > 10);
+    for other in &found[1..] {
+        assert_eq!(found[0].surface.positions(), other.surface.positions());
+        assert_eq!(found[0].energies, other.energies);
+        assert_eq!(found[0].report, other.report);
+    }
 }

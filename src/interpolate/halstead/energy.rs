@@ -21,6 +21,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::LEVELS;
+use super::elements::{self, Elements};
 use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
 use crate::memory::require;
@@ -68,67 +69,85 @@ impl Energies {
 pub struct Fairness {
     /// The mesh refined [`LEVELS`] times: the connectivity, and the positions of the plain surface.
     pub fine: Surface,
-    /// Quadratic forms in the fine control points, on one pattern.
-    pub thin_plate: Csr,
-    /// The form of the membrane energy, symmetric and positive semi-definite as the other.
-    pub membrane: Csr,
+    pub(super) elements: Elements,
 }
 
 impl Fairness {
-    /// Refines a mesh and assembles the forms. Time and memory O(16·corners), times the 256 entries of a patch; O(n³) beside
-    /// for each vertex of a great valence n.
+    /// Refines a mesh and lists the elements of the forms: which vertices a spline takes, and one small matrix for all
+    /// that look alike. Time and memory O(16·corners), about 2 KB a vertex; O(n³) beside for each vertex of a great valence n.
     ///
     /// # Errors
     /// A boundary that is treated as interior, a dart, a semi-sharp edge or vertex; a mesh that is too large for memory or for
     /// 32-bit numbers.
     pub fn new(surface: &Surface) -> Result<Self> {
         require_curves(surface, "fair interpolation")?;
-        let fine = Refinement::CatmullClark.refined_n(surface, LEVELS)?;
-        let finer = Refinement::CatmullClark.refined(&fine)?;
-        let masks = StepMasks::new(&fine);
+        Refinement::CatmullClark.check_size(surface, LEVELS)?;
+        // The levels in between are asked which vertex a new one is near.
+        let mut fine = surface.clone();
+        let mut owner: Vec<u32> = (0..surface.len() as u32).collect();
+        for _ in 0..LEVELS {
+            owner = elements::owners(&fine, owner);
+            fine = Refinement::CatmullClark.refined(&fine)?;
+        }
+        let elements = Elements::new(surface, &fine, owner)?;
+        Ok(Fairness { fine, elements })
+    }
+
+    /// The two quadratic forms, thin plate and membrane, as sparse matrices on one pattern, symmetric and positive
+    /// semi-definite. Some 10 KB a vertex, and ten times as much meanwhile.
+    ///
+    /// # Errors
+    /// More entries than memory has room for, or than 32-bit numbers count.
+    pub fn forms(&self) -> Result<[Csr; 2]> {
+        let fine = &self.fine;
+        let masks = StepMasks::new(fine);
         let grams: Vec<[Gram; 2]> = (0..16).map(patch_grams).collect();
-        let mut triplets = Vec::with_capacity(entries(surface, &fine, &finer, &masks)?);
-        for_each_patch(&fine, &finer, &masks, |part| {
+        let mut triplets = Vec::with_capacity(entries(fine, &masks)?);
+        for_each_patch(fine, &masks, |part| {
             match part {
-                // Halving the parameters' sides: second derivatives ×4, their squares ×16, areas ×¼.
                 Part::Whole(patch) => {
                     let [thin_plate, membrane] = &grams[patch.sharp];
                     for (i, row) in patch.points() {
                         for (j, column) in patch.points() {
-                            triplets.push((row, column, [4.0 * thin_plate[i][j], membrane[i][j]]));
+                            triplets.push((row, column, [WHOLE * thin_plate[i][j], membrane[i][j]]));
                         }
                     }
                 }
-                Part::Quarter(patch, local) => {
-                    let [thin_plate, membrane] = &grams[patch.sharp];
+                Part::Quarter(sharp, local) => {
                     for &(row, ref own) in local {
                         for &(column, ref other) in local {
-                            let form = |gram: &Gram| -> f64 {
-                                let rows = own.iter().zip(gram);
-                                rows.map(|(a, g)| a * other.iter().zip(g).map(|(b, g)| b * g).sum::<f64>()).sum()
-                            };
-                            triplets.push((row, column, [16.0 * form(thin_plate), form(membrane)]));
+                            let form = |gram: &Gram| pulled_back(gram, own, other);
+                            let [thin_plate, membrane] = &grams[sharp];
+                            triplets.push((row, column, [QUARTER * form(thin_plate), form(membrane)]));
                         }
                     }
                 }
             }
             Ok(())
         })?;
-        let [thin_plate, membrane] = sum_triplets(fine.len(), &triplets);
-        Ok(Fairness { fine, thin_plate, membrane })
+        Ok(sum_triplets(fine.len(), &triplets))
     }
 
-    /// The energies of a surface, from its control points at the fine level.
+    /// The energies of a surface, from its control points at the fine level. In parallel, the same for any number of threads.
     ///
     /// # Panics
     /// If there is not one point a fine vertex.
     pub fn energies(&self, points: &[DVec3]) -> Energies {
         assert_eq!(points.len(), self.fine.len(), "one point a fine vertex");
-        let form = |k: &Csr| -> f64 {
-            let rows = points.iter().enumerate();
-            rows.map(|(i, p)| p.dot(k.row_times(i, points))).sum()
-        };
-        Energies { thin_plate: form(&self.thin_plate), membrane: form(&self.membrane) }
+        let [thin_plate, membrane] = self.elements.energies(&self.elements.there(points));
+        Energies { thin_plate, membrane }
+    }
+
+    /// K x, half the gradient of the weighted energies, at the control points x of the fine level.
+    ///
+    /// # Panics
+    /// As [`energies`](Self::energies).
+    pub fn gradient(&self, points: &[DVec3], weights: Weights) -> Vec<DVec3> {
+        assert_eq!(points.len(), self.fine.len(), "one point a fine vertex");
+        let forms = self.elements.weighted(weights);
+        let mut product = vec![DVec3::ZERO; points.len()];
+        self.elements.apply(&forms, &self.elements.there(points), &mut product, |_, _, _| ());
+        self.elements.back(&product)
     }
 
     /// The energies of the surface of a control mesh with the given mesh's own connectivity.
@@ -144,47 +163,55 @@ impl Fairness {
     }
 }
 
+/// Halving the parameters' sides: second derivatives ×4, their squares ×16, areas ×¼; the first energy stays. Twice for
+/// quarters of faces.
+pub(super) const WHOLE: f64 = 4.0;
+pub(super) const QUARTER: f64 = 16.0;
+
+/// One entry of WᵀGW, from two columns of W.
+pub(super) fn pulled_back(gram: &Gram, own: &[f64; 16], other: &[f64; 16]) -> f64 {
+    let rows = own.iter().zip(gram);
+    rows.map(|(a, g)| a * other.iter().zip(g).map(|(b, g)| b * g).sum::<f64>()).sum()
+}
+
 /// A part of the surface that is a bicubic spline.
 enum Part<'a> {
     /// Over a fine face.
     Whole(&'a Patch),
-    /// Over a quarter of one, in terms of the fine vertices that matter: each with its weights in the control points.
-    Quarter(&'a Patch, &'a [(u32, [f64; 16])]),
+    /// Over a quarter of one with these sharp sides, in terms of the fine vertices that matter: each with its weights in
+    /// the control points.
+    Quarter(usize, &'a [Weighted]),
 }
 
+/// A fine vertex with its weights in the control points of a patch.
+pub(super) type Weighted = (u32, [f64; 16]);
+
 /// Visits the patches over the fine faces, and where a face has none those over its quarters.
-fn for_each_patch(
-    fine: &Surface,
-    finer: &Surface,
-    masks: &StepMasks,
-    mut visit: impl FnMut(Part) -> Result<()>,
-) -> Result<()> {
+fn for_each_patch(fine: &Surface, masks: &StepMasks, mut visit: impl FnMut(Part) -> Result<()>) -> Result<()> {
     let mut local = Vec::new();
     for f in 0..fine.faces().len() {
         if let Some(patch) = regular_patch(fine, f) {
             visit(Part::Whole(&patch))?;
             continue;
         }
-        // A quarter of a fine face has the number of the corner that it lies at.
-        for quarter in fine.faces().range(f) {
-            let Some(patch) = regular_patch(finer, quarter) else {
-                continue;
-            };
-            masks.pull_back(&patch, &mut local);
-            visit(Part::Quarter(&patch, &local))?;
+        for c in fine.faces().range(f) {
+            local.clear();
+            if let Some(sharp) = masks.quarter(c as u32, &mut local) {
+                visit(Part::Quarter(sharp, &local))?;
+            }
         }
     }
     Ok(())
 }
 
 /// The number of entries of all patches: few enough for 32-bit numbers, and memory has room for them.
-fn entries(surface: &Surface, fine: &Surface, finer: &Surface, masks: &StepMasks) -> Result<usize> {
+fn entries(fine: &Surface, masks: &StepMasks) -> Result<usize> {
     /// A triplet, its place among those of a row, and its part of a sum.
     const BYTES: u64 = 24 + 8 + 8;
     const ADVICE: &str = "use a coarser mesh, or one of smaller valences";
-    let what = || format!("the energy of the surface of {} vertices", surface.len());
+    let what = || format!("the matrix of the energy of {} control points", fine.len());
     let mut entries = 0u64;
-    for_each_patch(fine, finer, masks, |part| {
+    for_each_patch(fine, masks, |part| {
         let points = match part {
             Part::Whole(patch) => patch.points().count(),
             Part::Quarter(_, local) => local.len(),
@@ -199,7 +226,7 @@ fn entries(surface: &Surface, fine: &Surface, finer: &Surface, masks: &StepMasks
     Ok(entries as usize)
 }
 
-type Gram = [[f64; 16]; 16];
+pub(super) type Gram = [[f64; 16]; 16];
 
 /// The cubic B-spline's four pieces on [0, 1] as coefficients of 1, t, t², t³.
 const PIECES: [[f64; 4]; 4] = [
@@ -244,7 +271,7 @@ fn line_gram(order: usize, ends: [bool; 2]) -> [[f64; 4]; 4] {
 }
 
 /// The two energies of a unit patch with these [sharp sides](Patch::sharp).
-fn patch_grams(sharp: usize) -> [Gram; 2] {
+pub(super) fn patch_grams(sharp: usize) -> [Gram; 2] {
     let [below, after, above, before] = std::array::from_fn(|side| sharp >> side & 1 == 1);
     let [u, v] = [[before, after], [below, above]].map(|ends| [0, 1, 2].map(|order| line_gram(order, ends)));
     let form = |entry: &dyn Fn([usize; 2], [usize; 2]) -> f64| -> Gram {
@@ -263,50 +290,87 @@ const PLACES: [[usize; 4]; 4] =
     [[4 + 1, 1, 0, 4], [8 + 1, 8, 12, 12 + 1], [8 + 2, 12 + 2, 12 + 3, 8 + 3], [4 + 2, 4 + 3, 3, 2]];
 
 /// The control points of a bicubic spline over a face.
-struct Patch {
+pub(super) struct Patch {
     /// Point (i, j) of u and v has number 4i + j; [`NONE`] beyond sharp sides.
     points: [u32; 16],
     /// Bit k: side k is sharp; u goes along side 0, from corner 0 to 1.
-    sharp: usize,
+    pub(super) sharp: usize,
 }
 
 impl Patch {
     /// The numbers of those that there are, with their vertices.
-    fn points(&self) -> impl Iterator<Item = (usize, u32)> + '_ {
+    pub(super) fn points(&self) -> impl Iterator<Item = (usize, u32)> + '_ {
         self.points.iter().copied().enumerate().filter(|point| point.1 != NONE)
     }
 }
 
+/// The faces about a vertex as far as no sharp edge lies between them.
+#[derive(Clone, Copy)]
+pub(super) struct Sectors<'a> {
+    pub(super) surface: &'a Surface,
+}
+
+impl Sectors<'_> {
+    fn is_smooth(self, side: u32) -> bool {
+        self.surface.features().is_none_or(|features| !features.is_sharp(self.surface.topology(), side))
+    }
+
+    fn prev(self, c: u32) -> u32 {
+        self.surface.incidence().prev(self.surface.faces(), c)
+    }
+
+    fn next(self, c: u32) -> u32 {
+        self.surface.incidence().next(self.surface.faces(), c)
+    }
+
+    pub(super) fn counter_clockwise(self, c: u32) -> Option<u32> {
+        self.surface.topology().counter_clockwise(self.surface.faces(), c).filter(|_| self.is_smooth(self.prev(c)))
+    }
+
+    pub(super) fn clockwise(self, c: u32) -> Option<u32> {
+        self.surface.topology().clockwise(self.surface.faces(), c).filter(|_| self.is_smooth(c))
+    }
+
+    pub(super) fn rule(self, c: u32) -> Rule {
+        let v = self.surface.faces().corners()[c as usize] as usize;
+        self.surface.features().map_or(Rule::Smooth, |features| features.rules()[v])
+    }
+
+    /// Whether the surface is a spline at a corner.
+    pub(super) fn is_regular(self, c: u32) -> bool {
+        let rule = self.rule(c);
+        match (self.counter_clockwise(c), self.clockwise(c)) {
+            (Some(_), Some(_)) => {
+                let v = self.surface.faces().corners()[c as usize] as usize;
+                rule == Rule::Smooth && self.surface.incidence().face_count(v) == 4
+            }
+            (Some(beside), None) => rule == Rule::Crease && self.counter_clockwise(beside).is_none(),
+            (None, Some(below)) => rule == Rule::Crease && self.clockwise(below).is_none(),
+            (None, None) => rule == Rule::Corner,
+        }
+    }
+}
+
 /// The patch over face `f` of a mesh of quads if it is a bicubic spline.
-fn regular_patch(surface: &Surface, f: usize) -> Option<Patch> {
-    let (faces, topology, features) = (surface.faces(), surface.topology(), surface.features());
+pub(super) fn regular_patch(surface: &Surface, f: usize) -> Option<Patch> {
+    let faces = surface.faces();
     let corners = faces.corners();
-    let range = |c: u32| faces.range(topology.incidence.face_of(c));
-    // Around a vertex as far as the same smooth surface goes.
-    let is_smooth = |side: u32| features.is_none_or(|features| !features.is_sharp(topology, side));
-    let counter_clockwise = |c: u32| topology.counter_clockwise(faces, c).filter(|_| is_smooth(prev_in(&range(c), c)));
-    let clockwise = |c: u32| topology.clockwise(faces, c).filter(|_| is_smooth(c));
+    let sectors = Sectors { surface };
+    let range = |c: u32| faces.range(surface.topology().incidence.face_of(c));
     let mut patch = Patch { points: [NONE; 16], sharp: 0 };
     for (side, (c, places)) in faces.range(f).zip(&PLACES).enumerate() {
-        let (c, v) = (c as u32, corners[c] as usize);
-        let rule = features.map_or(Rule::Smooth, |features| features.rules()[v]);
-        let (beside, below) = (counter_clockwise(c), clockwise(c));
-        let is_regular = match (beside, below) {
-            (Some(_), Some(_)) => rule == Rule::Smooth && topology.incidence.face_count(v) == 4,
-            (Some(beside), None) => rule == Rule::Crease && counter_clockwise(beside).is_none(),
-            (None, Some(below)) => rule == Rule::Crease && clockwise(below).is_none(),
-            (None, None) => rule == Rule::Corner,
-        };
-        if !is_regular {
+        let c = c as u32;
+        if !sectors.is_regular(c) {
             return None;
         }
-        patch.points[places[0]] = v as u32;
+        let (beside, below) = (sectors.counter_clockwise(c), sectors.clockwise(c));
+        patch.points[places[0]] = corners[c as usize];
         if let Some(c) = beside {
             patch.points[places[1]] = corners[prev_in(&range(c), c) as usize];
         }
         if let Some(c) = below {
             patch.points[places[3]] = corners[next_in(&range(c), c) as usize];
-            if let Some(c) = clockwise(c).filter(|_| beside.is_some()) {
+            if let Some(c) = sectors.clockwise(c).filter(|_| beside.is_some()) {
                 patch.points[places[2]] = corners[next_in(&range(c), next_in(&range(c), c)) as usize];
             }
         } else {
@@ -356,69 +420,117 @@ impl<'a> SharpMasks<'a> {
 }
 
 /// The Catmull-Clark step of a quad mesh as masks of single new vertices.
-struct StepMasks<'a> {
+pub(super) struct StepMasks<'a> {
     surface: &'a Surface,
-    /// The first half-edge of every edge.
-    edges: Vec<u32>,
     sharp: SharpMasks<'a>,
 }
 
+/// What a step makes a vertex of.
+#[derive(Clone, Copy)]
+enum New {
+    Vertex(u32),
+    /// By one of its half-edges.
+    Edge(u32),
+    Face(usize),
+}
+
 impl<'a> StepMasks<'a> {
-    fn new(surface: &'a Surface) -> Self {
-        StepMasks { surface, edges: surface.topology().edge_sides().collect(), sharp: SharpMasks::new(surface) }
+    pub(super) fn new(surface: &'a Surface) -> Self {
+        StepMasks { surface, sharp: SharpMasks::new(surface) }
     }
 
-    /// Calls `add` with the old vertices and weights of new vertex `w`, numbered as the refinement numbers it.
-    /// A vertex may come more than once.
-    fn mask(&self, w: usize, add: &mut impl FnMut(u32, f64)) {
+    /// Calls `add` with the old vertices and weights of a new vertex. A vertex may come more than once.
+    fn mask(&self, new: New, add: &mut impl FnMut(u32, f64)) {
         let (faces, topology) = (self.surface.faces(), self.surface.topology());
         let incidence = &topology.incidence;
         let corners = faces.corners();
-        let (v, e) = (self.surface.len(), self.edges.len());
         let mut face = |f: usize, weight: f64| {
             for &x in faces.face(f) {
                 add(x, weight / faces.face(f).len() as f64);
             }
         };
-        if w >= v + e {
-            return face(w - v - e, 1.0);
-        }
-        if w >= v {
-            let c = self.edges[w - v];
-            if self.sharp.is_sharp(topology, c) {
-                return [c, incidence.next(faces, c)].into_iter().for_each(|c| add(corners[c as usize], 0.5));
+        match new {
+            New::Face(f) => face(f, 1.0),
+            New::Edge(c) if self.sharp.is_sharp(topology, c) => {
+                [c, incidence.next(faces, c)].into_iter().for_each(|c| add(corners[c as usize], 0.5));
             }
-            let sides = [Some(c), topology.twin(c)];
-            for c in sides.into_iter().flatten() {
-                face(incidence.face_of(c), 0.25);
+            New::Edge(c) => {
+                let sides = [Some(c), topology.twin(c)];
+                for c in sides.into_iter().flatten() {
+                    face(incidence.face_of(c), 0.25);
+                }
+                for c in sides.into_iter().flatten() {
+                    add(corners[c as usize], 0.25);
+                }
             }
-            for c in sides.into_iter().flatten() {
-                add(corners[c as usize], 0.25);
+            New::Vertex(v) => {
+                if let Some(mask) = self.sharp.of(v as usize, 0.125) {
+                    return mask.into_iter().for_each(|(x, weight)| add(x, weight));
+                }
+                let star = incidence.corners_at(v as usize);
+                let n = star.len() as f64;
+                for &c in star {
+                    face(incidence.face_of(c), 1.0 / (n * n));
+                }
+                for &c in star {
+                    add(corners[incidence.next(faces, c) as usize], 1.0 / (n * n));
+                }
+                add(v, (n - 2.0) / n);
             }
-            return;
         }
-        if let Some(mask) = self.sharp.of(w, 0.125) {
-            return mask.into_iter().for_each(|(x, weight)| add(x, weight));
-        }
-        let star = incidence.corners_at(w);
-        let n = star.len() as f64;
-        for &c in star {
-            face(incidence.face_of(c), 1.0 / (n * n));
-        }
-        for &c in star {
-            let range = faces.range(incidence.face_of(c));
-            add(corners[next_in(&range, c) as usize], 1.0 / (n * n));
-        }
-        add(w as u32, (n - 2.0) / n);
     }
 
-    /// The control points of a patch of the refined mesh in terms of old ones: each old vertex that matters with
-    /// its weights in the 16.
-    fn pull_back(&self, patch: &Patch, local: &mut Vec<(u32, [f64; 16])>) {
-        local.clear();
-        for (k, w) in patch.points() {
-            self.mask(w as usize, &mut |x, weight| {
-                // Some thirty vertices: looking through them beats any table.
+    /// The quarter of a face at corner `c`, where it is a bicubic spline: its sharp sides, u along the half-edge that leaves
+    /// the corner, and its control points in terms of old vertices, each that matters with its weights in the 16. They
+    /// are added to `local`, whose order stays.
+    pub(super) fn quarter(&self, c: u32, local: &mut Vec<Weighted>) -> Option<usize> {
+        let sectors = Sectors { surface: self.surface };
+        if !sectors.is_regular(c) {
+            return None;
+        }
+        let (faces, topology) = (self.surface.faces(), self.surface.topology());
+        let vertex = |c: u32| New::Vertex(faces.corners()[c as usize]);
+        let face = |c: u32| New::Face(topology.incidence.face_of(c));
+        let (next, prev) = (sectors.next(c), sectors.prev(c));
+        let opposite = sectors.next(next);
+        let mut points = [None; 16];
+        let mut place = |i: usize, j: usize, new: New| points[4 * i + j] = Some(new);
+        place(1, 1, vertex(c));
+        place(2, 1, New::Edge(c));
+        place(3, 1, vertex(next));
+        place(1, 2, New::Edge(prev));
+        place(1, 3, vertex(prev));
+        place(2, 2, face(c));
+        place(3, 2, New::Edge(next));
+        place(2, 3, New::Edge(opposite));
+        place(3, 3, vertex(opposite));
+        let mut sharp = 0;
+        // The corner of the face across the leaving side, and of that across the entering one, at the same vertex.
+        let (below, beside) = (sectors.clockwise(c), sectors.counter_clockwise(c));
+        match below {
+            Some(c) => {
+                place(1, 0, New::Edge(c));
+                place(2, 0, face(c));
+                // Its entering side is the shared one; the one before that enters the far end.
+                place(3, 0, New::Edge(sectors.prev(sectors.prev(c))));
+            }
+            None => sharp |= 1,
+        }
+        match beside {
+            Some(c) => {
+                place(0, 1, New::Edge(sectors.prev(c)));
+                place(0, 2, face(c));
+                place(0, 3, New::Edge(sectors.next(c)));
+            }
+            None => sharp |= 1 << 3,
+        }
+        if let (Some(below), Some(_)) = (below, beside) {
+            place(0, 0, face(sectors.clockwise(below)?));
+        }
+        for (k, new) in points.into_iter().enumerate() {
+            let Some(new) = new else { continue };
+            self.mask(new, &mut |x, weight| {
+                // Some twenty vertices: looking through them beats any table.
                 match local.iter_mut().find(|(y, _)| *y == x) {
                     Some((_, weights)) => weights[k] += weight,
                     None => {
@@ -429,6 +541,7 @@ impl<'a> StepMasks<'a> {
                 }
             });
         }
+        Some(sharp)
     }
 }
 

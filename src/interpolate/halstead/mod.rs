@@ -8,12 +8,15 @@
 //! makes the energy as a quadratic form, [`mod@fit`] minimises it under the constraints, [`mod@follow`] holds the
 //! iterative methods against it.
 
+mod direct;
+mod elements;
 pub mod energy;
 pub mod fit;
 pub mod follow;
+mod projected;
 
 pub use energy::{Energies, Fairness, Weights};
-pub use fit::{Fit, fit};
+pub use fit::{Fit, Solver, fit, fit_watched};
 pub use follow::{FairnessRow, follow};
 
 /// Refinements between the given mesh and the unknowns.

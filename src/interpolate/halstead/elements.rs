@@ -1,0 +1,505 @@
+//! The energies as a sum over elements: a small matrix, which depends on nothing but how the faces about a fine face lie,
+//! and the fine vertices that it acts on.
+//!
+//! A matrix for all entries takes 10 KB a vertex of the given mesh, the elements under 1 KB. Vertices are renumbered, so
+//! that those near one another are a block of memory, which a thread takes as a whole with those around it: it works through all
+//! elements that touch the block and keeps what they add to the block. An element at the edge of blocks is worked through for
+//! each of them, in exchange no two threads write to one place, and sums do not depend on how many there are.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::energy::{
+    Gram, QUARTER, Sectors, StepMasks, WHOLE, Weighted, Weights, patch_grams, pulled_back, regular_patch,
+};
+use crate::mesh::Surface;
+use crate::mesh::order::{Numbering, Order};
+use crate::parallel;
+use crate::{Error, Result};
+
+/// Vertices of a block, about: with those around it, which are a tenth, a block and its product stay in the second-level cache.
+const BLOCK: usize = 4096;
+/// Fine faces of one task.
+const CHUNK: usize = 8192;
+/// Rows of a matrix are filled up to a multiple of this: the numbers that a processor of any kind takes at once.
+const LANES: usize = 4;
+
+/// The elements of one mesh. Points are in the order of the [numbering](Self::there) within.
+#[derive(Clone, Debug)]
+pub(crate) struct Elements {
+    /// For each fine vertex, in the order of the mesh, one of the given mesh.
+    owner: Vec<u32>,
+    numbering: Numbering,
+    kinds: Vec<Kind>,
+    blocks: Vec<Block>,
+}
+
+/// Elements whose surroundings look alike.
+#[derive(Clone, Debug)]
+struct Kind {
+    points: usize,
+    /// Thin plate and membrane: `points` rows of [`stride`] numbers.
+    forms: [Vec<f64>; 2],
+}
+
+/// Numbers of a row of a matrix.
+fn stride(points: usize) -> usize {
+    points.next_multiple_of(LANES)
+}
+
+/// Vertices with consecutive numbers, and the elements that touch one of them.
+#[derive(Clone, Debug)]
+struct Block {
+    vertices: Range<usize>,
+    /// Other vertices of the elements, ascending.
+    around: Vec<u32>,
+    /// Kinds with the number of elements of each.
+    runs: Vec<(u32, u32)>,
+    /// The vertices of the elements, in the order of the runs: places in the block, and then in `around`.
+    places: Vec<u16>,
+}
+
+/// The vertex of the given mesh that each vertex of the next level belongs to: its own, or that of the least end of its edge
+/// or corner of its face. So the 1-ring of a given vertex belongs to it two levels down.
+pub(super) fn owners(surface: &Surface, owner: Vec<u32>) -> Vec<u32> {
+    let (faces, topology) = (surface.faces(), surface.topology());
+    let corners = faces.corners();
+    let mut new = owner.clone();
+    topology.edge_numbers().extend(&mut new, |c| {
+        let ends = [c, topology.incidence.next(faces, c)].map(|c| corners[c as usize]);
+        owner[ends[0].min(ends[1]) as usize]
+    });
+    parallel::extend(&mut new, faces.len(), |_| |f| owner[faces.face(f).iter().copied().min().unwrap_or(0) as usize]);
+    new
+}
+
+/// What the surroundings of an element look like: how many faces meet at its corners, in numbers of its vertices.
+type Signature = Vec<u32>;
+
+/// What tells the element over a fine face.
+#[derive(Default)]
+struct Probe {
+    /// Of an element that is no patch.
+    signature: Signature,
+    vertices: Vec<u32>,
+}
+
+impl Probe {
+    /// Lists the vertices of the element over face `f`. Returns the sharp sides of a patch; else the signature is made.
+    fn look(&mut self, fine: &Surface, f: usize) -> Option<usize> {
+        self.vertices.clear();
+        if let Some(patch) = regular_patch(fine, f) {
+            self.vertices.extend(patch.points().map(|point| point.1));
+            return Some(patch.sharp);
+        }
+        self.signature.clear();
+        let sectors = Sectors { surface: fine };
+        let range = fine.faces().range(f);
+        // From the corner that is not regular: every vertex of that valence then looks alike.
+        let first = range.clone().position(|c| !sectors.is_regular(c as u32)).unwrap_or(0);
+        for k in 0..range.len() {
+            let start = (range.start + (first + k) % range.len()) as u32;
+            let mut corner = start;
+            while let Some(c) = sectors.clockwise(corner) {
+                corner = c;
+                if c == start {
+                    break;
+                }
+            }
+            self.signature.extend([sectors.rule(start) as u32, u32::MAX]);
+            let from = corner;
+            loop {
+                let [v, next, opposite, prev] = ring(fine, corner);
+                self.mention(v);
+                self.mention(next);
+                self.mention(opposite);
+                match sectors.counter_clockwise(corner) {
+                    Some(c) if c == from => {
+                        self.signature.push(u32::MAX);
+                        break;
+                    }
+                    Some(c) => corner = c,
+                    None => {
+                        self.mention(prev);
+                        break;
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    fn mention(&mut self, v: u32) {
+        let place = self.vertices.iter().position(|&w| w == v).unwrap_or_else(|| {
+            self.vertices.push(v);
+            self.vertices.len() - 1
+        });
+        self.signature.push(place as u32);
+    }
+}
+
+/// The corners of a quad from corner `c` on.
+fn ring(fine: &Surface, c: u32) -> [u32; 4] {
+    let (faces, incidence) = (fine.faces(), fine.incidence());
+    let mut c = c;
+    std::array::from_fn(|_| {
+        let v = faces.corners()[c as usize];
+        c = incidence.next(faces, c);
+        v
+    })
+}
+
+impl Kind {
+    fn new(points: usize, entry: impl Fn(usize, usize) -> [f64; 2]) -> Self {
+        let mut forms = [(); 2].map(|()| vec![0.0; points * stride(points)]);
+        for i in 0..points {
+            for j in 0..points {
+                for (form, value) in forms.iter_mut().zip(entry(i, j)) {
+                    form[i * stride(points) + j] = value;
+                }
+            }
+        }
+        Kind { points, forms }
+    }
+
+    fn patch(sharp: usize) -> Self {
+        let [thin_plate, membrane] = patch_grams(sharp);
+        // Points beyond a sharp side have no piece of the spline.
+        let there: Vec<usize> = (0..16).filter(|&k| membrane[k][k] != 0.0).collect();
+        Kind::new(there.len(), |i, j| [WHOLE * thin_plate[there[i]][there[j]], membrane[there[i]][there[j]]])
+    }
+
+    /// Of a face that is no patch, from the vertices in the order of its [`Probe`].
+    fn quarters(fine: &Surface, masks: &StepMasks, f: usize, vertices: &[u32], grams: &[[Gram; 2]]) -> Self {
+        let none: Vec<Weighted> = vertices.iter().map(|&v| (v, [0.0; 16])).collect();
+        let mut quarters = Vec::new();
+        for c in fine.faces().range(f) {
+            let mut local = none.clone();
+            if let Some(sharp) = masks.quarter(c as u32, &mut local) {
+                debug_assert_eq!(local.len(), none.len(), "a quarter takes vertices about its face");
+                quarters.push((sharp, local));
+            }
+        }
+        Kind::new(vertices.len(), |i, j| {
+            let mut sums = [0.0; 2];
+            for (sharp, local) in &quarters {
+                let [thin_plate, membrane] = &grams[*sharp];
+                sums[0] += QUARTER * pulled_back(thin_plate, &local[i].1, &local[j].1);
+                sums[1] += pulled_back(membrane, &local[i].1, &local[j].1);
+            }
+            sums
+        })
+    }
+}
+
+impl Elements {
+    /// `owner`: for each vertex of `fine` one of the given mesh.
+    ///
+    /// # Errors
+    /// A vertex whose faces have more vertices than fit a block, or whose matrices memory has no room for.
+    pub(super) fn new(given: &Surface, fine: &Surface, owner: Vec<u32>) -> Result<Self> {
+        let (numbering, ranges) = numbered(given, &owner);
+        let block_of = {
+            let mut block_of = vec![0u32; fine.len()];
+            for (k, range) in ranges.iter().enumerate() {
+                numbering.order()[range.clone()].iter().for_each(|&v| block_of[v as usize] = k as u32);
+            }
+            block_of
+        };
+        let masks = StepMasks::new(fine);
+        let grams: Vec<[Gram; 2]> = (0..16).map(patch_grams).collect();
+        // Where each kind occurs first, and which blocks each element touches.
+        let found = parallel::map(fine.faces().len(), CHUNK, |range| {
+            let mut probe = Probe::default();
+            let mut firsts: HashMap<Signature, usize> = HashMap::new();
+            let mut touched: Vec<(u32, u32)> = Vec::new();
+            for f in range {
+                if probe.look(fine, f).is_none() && !firsts.contains_key(&probe.signature) {
+                    firsts.insert(probe.signature.clone(), f);
+                }
+                let start = touched.len();
+                for &v in &probe.vertices {
+                    let block = block_of[v as usize];
+                    if touched[start..].iter().all(|t| t.0 != block) {
+                        touched.push((block, f as u32));
+                    }
+                }
+            }
+            (firsts, touched)
+        });
+        let mut kinds: Vec<Kind> = (0..16).map(Kind::patch).collect();
+        let mut known: HashMap<Signature, u32> = HashMap::new();
+        let mut faces_of = vec![Vec::new(); ranges.len()];
+        let mut probe = Probe::default();
+        for (firsts, touched) in found {
+            let mut firsts: Vec<usize> = firsts.into_values().collect();
+            firsts.sort_unstable();
+            for f in firsts {
+                probe.look(fine, f);
+                if !known.contains_key(&probe.signature) {
+                    require_room(probe.vertices.len())?;
+                    known.insert(probe.signature.clone(), kinds.len() as u32);
+                    kinds.push(Kind::quarters(fine, &masks, f, &probe.vertices, &grams));
+                }
+            }
+            for (block, f) in touched {
+                faces_of[block as usize].push(f);
+            }
+        }
+        let blocks = parallel::map(ranges.len(), 1, |k| {
+            let (vertices, faces) = (ranges[k.start].clone(), &faces_of[k.start]);
+            Block::new(fine, vertices, faces, &known, &kinds, &numbering)
+        });
+        Ok(Elements { owner, numbering, kinds, blocks: blocks.into_iter().collect::<Result<_>>()? })
+    }
+
+    /// Values in the order within.
+    pub(super) fn there<T: Copy + Send + Sync>(&self, values: &[T]) -> Vec<T> {
+        self.numbering.there(values)
+    }
+
+    /// Values in the order of the mesh.
+    pub(super) fn back<T: Copy + Send + Sync>(&self, values: &[T]) -> Vec<T> {
+        self.numbering.back(values)
+    }
+
+    /// For each fine vertex the point of the given vertex that it belongs to.
+    pub(super) fn spread(&self, points: &[DVec3]) -> Vec<DVec3> {
+        parallel::collect(self.owner.len(), |w| points[self.owner[w] as usize])
+    }
+
+    /// The place of each vertex in the order within.
+    pub(super) fn place(&self) -> &[u32] {
+        self.numbering.place()
+    }
+
+    /// The vertices of the blocks, in the order within.
+    pub(super) fn blocks(&self) -> impl ExactSizeIterator<Item = Range<usize>> + '_ {
+        self.blocks.iter().map(|block| block.vertices.clone())
+    }
+
+    /// The matrices of all kinds for one energy.
+    pub(super) fn weighted(&self, weights: Weights) -> Vec<Vec<f64>> {
+        let kinds = self.kinds.iter();
+        kinds
+            .map(|kind| {
+                let [thin_plate, membrane] = &kind.forms;
+                let entries = thin_plate.iter().zip(membrane);
+                entries.map(|(t, m)| weights.thin_plate * t + weights.membrane * m).collect()
+            })
+            .collect()
+    }
+
+    /// y = K x. When a block of y is done, `then` sees its number, x and the block, and what it makes of them comes back in
+    /// the order of the blocks.
+    pub(super) fn apply<R: Send>(
+        &self,
+        forms: &[Vec<f64>],
+        x: &[DVec3],
+        y: &mut [DVec3],
+        then: impl Fn(usize, &[DVec3], &mut [DVec3]) -> R + Sync,
+    ) -> Vec<R> {
+        parallel::parts(self.parts(y), |k, part| {
+            let block = &self.blocks[k.start];
+            let local = block.gather(x);
+            let mut sums = vec![[0.0; 3]; local.len()];
+            self.each_element(block, |kind, places| match places.len() {
+                16 => multiply::<16>(&forms[kind], places, &local, &mut sums),
+                points => multiply_any(points, &forms[kind], places, &local, &mut sums),
+            });
+            part.iter_mut().zip(&sums).for_each(|(y, sum)| *y = DVec3::from_array(*sum));
+            then(k.start, x, part)
+        })
+    }
+
+    /// xᵀKx of thin plate and membrane, the elements of faces counted once.
+    pub(super) fn energies(&self, x: &[DVec3]) -> [f64; 2] {
+        [[1.0, 0.0], [0.0, 1.0]].map(|[thin_plate, membrane]| {
+            let forms = self.weighted(Weights { thin_plate, membrane });
+            let mut product = vec![DVec3::ZERO; x.len()];
+            let sums = self.apply(&forms, x, &mut product, |k, x, y| {
+                let x = &x[self.blocks[k].vertices.clone()];
+                x.iter().zip(&*y).map(|(x, y)| x.dot(*y)).sum::<f64>()
+            });
+            sums.into_iter().sum()
+        })
+    }
+
+    /// The diagonal of K.
+    pub(super) fn diagonal(&self, forms: &[Vec<f64>]) -> Vec<f64> {
+        let mut diagonal = vec![0.0; self.numbering.order().len()];
+        parallel::parts(self.parts(&mut diagonal), |k, part| {
+            let block = &self.blocks[k.start];
+            self.each_element(block, |kind, places| {
+                for (i, &place) in places.iter().enumerate() {
+                    if let Some(d) = part.get_mut(place as usize) {
+                        *d += forms[kind][i * stride(places.len()) + i];
+                    }
+                }
+            });
+        });
+        diagonal
+    }
+
+    /// An array in the order within as the parts of the blocks, with their numbers.
+    pub(super) fn parts<'a, T>(&self, mut values: &'a mut [T]) -> Vec<(Range<usize>, &'a mut [T])> {
+        let mut parts = Vec::with_capacity(self.blocks.len());
+        for (k, block) in self.blocks.iter().enumerate() {
+            let (part, rest) = values.split_at_mut(block.vertices.len());
+            parts.push((k..k + 1, part));
+            values = rest;
+        }
+        parts
+    }
+
+    /// Calls `visit` with the kind and the places of each element that touches a block.
+    fn each_element(&self, block: &Block, mut visit: impl FnMut(usize, &[u16])) {
+        let mut places = block.places.as_slice();
+        for &(kind, count) in &block.runs {
+            let points = self.kinds[kind as usize].points;
+            let (of_run, rest) = places.split_at(count as usize * points);
+            of_run.chunks_exact(points).for_each(|places| visit(kind as usize, places));
+            places = rest;
+        }
+    }
+}
+
+impl Block {
+    fn new(
+        fine: &Surface,
+        vertices: Range<usize>,
+        faces: &[u32],
+        known: &HashMap<Signature, u32>,
+        kinds: &[Kind],
+        numbering: &Numbering,
+    ) -> Result<Self> {
+        let mut probe = Probe::default();
+        let mut elements: Vec<(u32, u32)> = Vec::with_capacity(faces.len());
+        let mut all = Vec::new();
+        for &f in faces {
+            let kind = match probe.look(fine, f as usize) {
+                Some(sharp) => sharp as u32,
+                None => known[&probe.signature],
+            };
+            elements.push((kind, all.len() as u32));
+            all.extend(probe.vertices.iter().map(|&v| numbering.place()[v as usize]));
+        }
+        let is_inside = |v: u32| vertices.contains(&(v as usize));
+        let mut around: Vec<u32> = all.iter().copied().filter(|&v| !is_inside(v)).collect();
+        around.sort_unstable();
+        around.dedup();
+        if vertices.len() + around.len() > usize::from(u16::MAX) {
+            return Err(too_great());
+        }
+        elements.sort_by_key(|e| e.0);
+        let mut runs: Vec<(u32, u32)> = Vec::new();
+        let mut places = Vec::with_capacity(all.len());
+        for (kind, start) in elements {
+            match runs.last_mut() {
+                Some((last, count)) if *last == kind => *count += 1,
+                _ => runs.push((kind, 1)),
+            }
+            let own = &all[start as usize..start as usize + kinds[kind as usize].points];
+            places.extend(own.iter().map(|&v| {
+                let place = match is_inside(v) {
+                    true => v as usize - vertices.start,
+                    false => vertices.len() + around.partition_point(|&w| w < v),
+                };
+                place as u16
+            }));
+        }
+        Ok(Block { vertices, around, runs, places })
+    }
+
+    fn gather(&self, x: &[DVec3]) -> Vec<[f64; 3]> {
+        let mut local = Vec::with_capacity(self.vertices.len() + self.around.len());
+        local.extend(x[self.vertices.clone()].iter().map(|p| p.to_array()));
+        local.extend(self.around.iter().map(|&v| x[v as usize].to_array()));
+        local
+    }
+}
+
+/// The order within, and the blocks: the vertices that belong to given ones, which lie along a space-filling curve.
+fn numbered(given: &Surface, owner: &[u32]) -> (Numbering, Vec<Range<usize>>) {
+    let order = Order::Morton.order(given.mesh(), given.incidence());
+    let mut starts = vec![0u32; given.len()];
+    owner.iter().for_each(|&v| starts[v as usize] += 1);
+    let mut ranges = Vec::new();
+    let (mut first, mut next) = (0, 0);
+    for v in order {
+        let count = starts[v as usize] as usize;
+        if next > first && next + count - first > BLOCK {
+            ranges.push(first..next);
+            first = next;
+        }
+        starts[v as usize] = next as u32;
+        next += count;
+    }
+    ranges.push(first..next);
+    let mut order = vec![0; owner.len()];
+    for (w, &v) in (0..).zip(owner) {
+        let slot = &mut starts[v as usize];
+        order[*slot as usize] = w;
+        *slot += 1;
+    }
+    (Numbering::new(order), ranges)
+}
+
+fn too_great() -> Error {
+    Error::TooLarge {
+        what: "the energy about a vertex or face takes more than 65 535 control points".into(),
+        advice: "split the face or the vertex of the greatest valence",
+    }
+}
+
+fn require_room(points: usize) -> Result<()> {
+    if points > usize::from(u16::MAX) {
+        return Err(too_great());
+    }
+    // Two forms, and their weighted sum.
+    let bytes = 24 * (points * stride(points)) as u64;
+    crate::memory::require(
+        bytes,
+        || format!("the energy about a vertex whose faces have {points} control points"),
+        "use a mesh of smaller valences",
+    )
+}
+
+/// Adds K x of one element.
+#[inline(always)]
+fn multiply<const POINTS: usize>(form: &[f64], places: &[u16], x: &[[f64; 3]], sums: &mut [[f64; 3]]) {
+    let mut own = [[0.0; 3]; POINTS];
+    for (own, &place) in own.iter_mut().zip(places) {
+        *own = x[place as usize];
+    }
+    product(POINTS, form, &own, places, sums);
+}
+
+fn multiply_any(points: usize, form: &[f64], places: &[u16], x: &[[f64; 3]], sums: &mut [[f64; 3]]) {
+    let own: Vec<[f64; 3]> = places.iter().map(|&place| x[place as usize]).collect();
+    product(points, form, &own, places, sums);
+}
+
+/// Four rows at once, by columns: the matrix is symmetric.
+#[inline(always)]
+fn product(points: usize, form: &[f64], own: &[[f64; 3]], places: &[u16], sums: &mut [[f64; 3]]) {
+    for (block, rows) in places.chunks(LANES).enumerate() {
+        let mut sum = [[0.0; LANES]; 3];
+        for (column, x) in form.chunks_exact(stride(points)).zip(own) {
+            let column = &column[block * LANES..][..LANES];
+            for (sum, x) in sum.iter_mut().zip(x) {
+                for (sum, k) in sum.iter_mut().zip(column) {
+                    *sum += k * x;
+                }
+            }
+        }
+        for (lane, &place) in rows.iter().enumerate() {
+            let y = &mut sums[place as usize];
+            for axis in 0..3 {
+                y[axis] += sum[axis][lane];
+            }
+        }
+    }
+}
