@@ -69,6 +69,17 @@ fn names(which: impl Fn(Scheme) -> bool) -> String {
     one_of(&names)
 }
 
+/// After a search for the fairest surface that did not converge.
+pub fn of_unfair(outcome: Outcome) -> &'static str {
+    match outcome {
+        Outcome::MaxIterations => "raise --max-iter or --membrane, or interpolate more vertices",
+        Outcome::Rounding | Outcome::Stagnated => "no steps that small can be told in doubles: raise --tol",
+        Outcome::Converged | Outcome::Diverged | Outcome::Singular | Outcome::Breakdown | Outcome::Stopped => {
+            "the energy is too uneven for doubles: choose --thin-plate and --membrane nearer to 1"
+        }
+    }
+}
+
 /// After a run that did not converge: something to do that is not what has just failed. `unit` is what a length of one
 /// measures in the units of the mesh.
 pub fn of_failed(failed: &Failed, unit: f64) -> String {

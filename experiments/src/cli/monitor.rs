@@ -23,9 +23,16 @@ impl MonitorFlags {
 
     /// A line about an iterate of the run `of`, if lines were asked for.
     pub fn see(&self, of: impl Display, iteration: usize, errors: Errors) {
+        self.see_of("error", of, iteration, errors);
+    }
+
+    /// As [`see`](Self::see), where an iterate is measured by another `quantity`.
+    pub fn see_of(&self, quantity: &str, of: impl Display, iteration: usize, errors: Errors) {
         if self.monitor {
             let Errors { max, mean } = errors;
-            super::say(format_args!("{of}: iteration {iteration}: max error {max:.6e}, mean error {mean:.6e}"));
+            super::say(format_args!(
+                "{of}: iteration {iteration}: max {quantity} {max:.6e}, mean {quantity} {mean:.6e}"
+            ));
         }
     }
 }

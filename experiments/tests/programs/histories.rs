@@ -7,9 +7,14 @@ use super::*;
 
 /// The entries of a history as the monitor says them.
 fn lines(of: &str, history: &Value) -> Vec<String> {
+    lines_of("error", of, history)
+}
+
+/// As [`lines`], where the iterates are measured by another quantity.
+fn lines_of(quantity: &str, of: &str, history: &Value) -> Vec<String> {
     let line = |entry: &Value| {
-        let [max, mean] = ["max_error", "mean_error"].map(|field| entry[field].as_f64().unwrap());
-        format!("{of}: iteration {}: max error {max:.6e}, mean error {mean:.6e}", entry["iteration"])
+        let [max, mean] = ["max", "mean"].map(|what| entry[format!("{what}_{quantity}")].as_f64().unwrap());
+        format!("{of}: iteration {}: max {quantity} {max:.6e}, mean {quantity} {mean:.6e}", entry["iteration"])
     };
     history.as_array().unwrap().iter().map(line).collect()
 }
@@ -70,6 +75,14 @@ fn monitors_say_the_histories_and_change_nothing() {
             assert!((seen - written).abs() <= least, "{arguments}: {seen}, {written}");
         }
     }
+    let arguments = ["torus:8x6", "--noise", "0.1", "--method", "halstead", "-o", "a.obj"];
+    let (object, seen) = monitored(INTERPOLATE, folder, &arguments);
+    let history = object["history"].as_array().unwrap();
+    assert_eq!(seen, lines_of("step", "torus:8x6: halstead", &object["history"]));
+    assert_eq!(history.len() as u64, object["iterations"].as_u64().unwrap() + 1);
+    let [last, tolerance] =
+        [&history[history.len() - 1]["max_step"], &object["tolerance"]].map(|x| x.as_f64().unwrap());
+    assert!(history.len() > 10 && last <= tolerance, "{last} {tolerance}");
     let arguments = ["torus:8x6", "--noise", "0.1", "--method", "jacobi,lu,auto"];
     let (object, seen) = monitored(COMPARE, folder, &arguments);
     let label = |row: &Value| {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::energy::{Fairness, Row, Weights};
-use super::fit::Rings;
+use super::fit::Masks;
 use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
 use crate::parallel;
@@ -27,7 +27,7 @@ const CHUNK: usize = 4096;
 /// Points alone: the coordinates do not know of each other.
 pub(super) fn by_points(
     fairness: &Fairness,
-    rings: &Rings,
+    masks: &Masks,
     points: &[DVec3],
     chosen: &[usize],
     weights: Weights,
@@ -38,7 +38,7 @@ pub(super) fn by_points(
     kkt.energy(&forms, weights, 0);
     let mut right = vec![DVec3::ZERO; n];
     for &v in chosen {
-        kkt.constraint(rings.limits[v].iter().copied());
+        kkt.constraint(masks.limit(v).into_iter());
         right.push(points[v]);
     }
     let mut x = kkt.solve(right)?;
@@ -49,7 +49,7 @@ pub(super) fn by_points(
 /// Points and normals: unknown 3i + axis, in the first coordinate of the solver's vectors.
 pub(super) fn by_normals(
     fairness: &Fairness,
-    rings: &Rings,
+    masks: &Masks,
     points: &[DVec3],
     chosen: &[usize],
     normals: &[Option<DVec3>],
@@ -64,12 +64,12 @@ pub(super) fn by_normals(
     let mut right = vec![DVec3::ZERO; 3 * n];
     for &v in chosen {
         for axis in 0..3 {
-            kkt.constraint(rings.limits[v].iter().map(|&(j, w)| (3 * j + axis, w)));
+            kkt.constraint(masks.limit(v).into_iter().map(|(j, w)| (3 * j + axis, w)));
             right.push(DVec3::X * points[v][axis as usize]);
         }
         let Some(normal) = normals[v] else { continue };
-        for tangent in &rings.tangents[v] {
-            let terms = tangent.iter().flat_map(|&(j, w)| (0..3).map(move |a| (3 * j + a, w * normal[a as usize])));
+        for tangent in masks.tangents(v) {
+            let terms = tangent.into_iter().flat_map(|(j, w)| (0..3).map(move |a| (3 * j + a, w * normal[a as usize])));
             kkt.constraint(terms);
             right.push(DVec3::ZERO);
         }

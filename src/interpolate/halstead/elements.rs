@@ -14,6 +14,7 @@ use glam::DVec3;
 use super::energy::{
     Gram, QUARTER, Sectors, StepMasks, WHOLE, Weighted, Weights, patch_grams, pulled_back, regular_patch,
 };
+use crate::memory::require;
 use crate::mesh::Surface;
 use crate::mesh::order::{Numbering, Order};
 use crate::parallel;
@@ -21,8 +22,8 @@ use crate::{Error, Result};
 
 /// Vertices of a block, about: with those around it, which are a tenth, a block and its product stay in the second-level cache.
 const BLOCK: usize = 4096;
-/// Fine faces of one task.
-const CHUNK: usize = 8192;
+/// Groups of four fine faces of one task.
+const CHUNK: usize = 2048;
 /// Rows of a matrix are filled up to a multiple of this: the numbers that a processor of any kind takes at once.
 const LANES: usize = 4;
 
@@ -78,23 +79,71 @@ pub(super) fn owners(surface: &Surface, owner: Vec<u32>) -> Vec<u32> {
 /// What the surroundings of an element look like: how many faces meet at its corners, in numbers of its vertices.
 type Signature = Vec<u32>;
 
-/// What tells the element over a fine face.
+/// An element: over a fine face, or over the four of a face of the level before, which have consecutive numbers. Element
+/// 5g + k is over face 4g + k, 5g + 4 over all four.
+type Element = u32;
+
+/// What elements look like, as far as it can be told without their matrix.
+enum Look {
+    /// A patch with these sharp sides.
+    Patch(usize),
+    /// Four patches without any.
+    Four,
+    /// By its signature.
+    Quarters,
+}
+
+/// The kinds before those by signature: of patches, and of four.
+const FOUR: usize = 16;
+
+/// What tells elements.
 #[derive(Default)]
 struct Probe {
     /// Of an element that is no patch.
     signature: Signature,
     vertices: Vec<u32>,
+    /// The places of vertices after the first [`FEW`].
+    more: HashMap<u32, usize>,
 }
 
+/// Vertices that are looked through one by one.
+const FEW: usize = 64;
+
 impl Probe {
-    /// Lists the vertices of the element over face `f`. Returns the sharp sides of a patch; else the signature is made.
-    fn look(&mut self, fine: &Surface, f: usize) -> Option<usize> {
+    /// Visits the elements over four faces with all that is known of each.
+    fn each(&mut self, fine: &Surface, group: usize, mut visit: impl FnMut(Element, Look, &Probe)) {
+        let four = 5 * group as Element + 4;
+        if self.look(fine, four).is_some() {
+            return visit(four, Look::Four, self);
+        }
+        for element in four - 4..four {
+            if let Some(look) = self.look(fine, element) {
+                visit(element, look, self);
+            }
+        }
+    }
+
+    /// Lists the vertices of an element. None if four faces are not one.
+    fn look(&mut self, fine: &Surface, element: Element) -> Option<Look> {
         self.vertices.clear();
+        let (group, k) = (element as usize / 5, element as usize % 5);
+        if k == 4 {
+            self.vertices.resize(25, 0);
+            for k in 0..4 {
+                let patch = regular_patch(fine, 4 * group + k).filter(|patch| patch.sharp == 0)?;
+                for (at, v) in patch.points() {
+                    self.vertices[of_four(k, at)] = v;
+                }
+            }
+            return Some(Look::Four);
+        }
+        let f = 4 * group + k;
         if let Some(patch) = regular_patch(fine, f) {
             self.vertices.extend(patch.points().map(|point| point.1));
-            return Some(patch.sharp);
+            return Some(Look::Patch(patch.sharp));
         }
         self.signature.clear();
+        self.more.clear();
         let sectors = Sectors { surface: fine };
         let range = fine.faces().range(f);
         // From the corner that is not regular: every vertex of that valence then looks alike.
@@ -128,16 +177,29 @@ impl Probe {
                 }
             }
         }
-        None
+        Some(Look::Quarters)
     }
 
     fn mention(&mut self, v: u32) {
-        let place = self.vertices.iter().position(|&w| w == v).unwrap_or_else(|| {
+        let mut few = self.vertices.iter().take(FEW);
+        let place = few.position(|&w| w == v).or_else(|| self.more.get(&v).copied()).unwrap_or_else(|| {
+            let place = self.vertices.len();
             self.vertices.push(v);
-            self.vertices.len() - 1
+            if place >= FEW {
+                self.more.insert(v, place);
+            }
+            place
         });
         self.signature.push(place as u32);
     }
+}
+
+/// The place among the 5 × 5 points over four faces of a point of the patch over one of them. The k-th has the k-th corner
+/// of all four as its first, so that its u turns with k.
+fn of_four(k: usize, at: usize) -> usize {
+    let (i, j) = (at / 4, at % 4);
+    let [i, j] = [[i, j], [4 - j, i], [4 - i, 4 - j], [j, 4 - i]][k];
+    5 * i + j
 }
 
 /// The corners of a quad from corner `c` on.
@@ -171,6 +233,20 @@ impl Kind {
         Kind::new(there.len(), |i, j| [WHOLE * thin_plate[there[i]][there[j]], membrane[there[i]][there[j]]])
     }
 
+    fn four([thin_plate, membrane]: &[Gram; 2]) -> Self {
+        let mut sums = vec![[0.0; 2]; 25 * 25];
+        for k in 0..4 {
+            for i in 0..16 {
+                for j in 0..16 {
+                    let sum = &mut sums[25 * of_four(k, i) + of_four(k, j)];
+                    sum[0] += WHOLE * thin_plate[i][j];
+                    sum[1] += membrane[i][j];
+                }
+            }
+        }
+        Kind::new(25, |i, j| sums[25 * i + j])
+    }
+
     /// Of a face that is no patch, from the vertices in the order of its [`Probe`].
     fn quarters(fine: &Surface, masks: &StepMasks, f: usize, vertices: &[u32], grams: &[[Gram; 2]]) -> Self {
         let none: Vec<Weighted> = vertices.iter().map(|&v| (v, [0.0; 16])).collect();
@@ -200,6 +276,12 @@ impl Elements {
     /// # Errors
     /// A vertex whose faces have more vertices than fit a block, or whose matrices memory has no room for.
     pub(super) fn new(given: &Surface, fine: &Surface, owner: Vec<u32>) -> Result<Self> {
+        /// Of the elements, and of what the iterations keep, a fine vertex.
+        const BYTES: u64 = 160;
+        let what = || format!("the energy of the surface of {} vertices", given.len());
+        require(BYTES * fine.len() as u64, what, "use a coarser mesh, or another method")?;
+        let greatest = (0..fine.len()).map(|v| fine.incidence().face_count(v)).max().unwrap_or(0);
+        require_room(greatest)?;
         let (numbering, ranges) = numbered(given, &owner);
         let block_of = {
             let mut block_of = vec![0u32; fine.len()];
@@ -211,46 +293,49 @@ impl Elements {
         let masks = StepMasks::new(fine);
         let grams: Vec<[Gram; 2]> = (0..16).map(patch_grams).collect();
         // Where each kind occurs first, and which blocks each element touches.
-        let found = parallel::map(fine.faces().len(), CHUNK, |range| {
+        let found = parallel::map(fine.faces().len() / 4, CHUNK, |range| {
             let mut probe = Probe::default();
-            let mut firsts: HashMap<Signature, usize> = HashMap::new();
-            let mut touched: Vec<(u32, u32)> = Vec::new();
-            for f in range {
-                if probe.look(fine, f).is_none() && !firsts.contains_key(&probe.signature) {
-                    firsts.insert(probe.signature.clone(), f);
-                }
-                let start = touched.len();
-                for &v in &probe.vertices {
-                    let block = block_of[v as usize];
-                    if touched[start..].iter().all(|t| t.0 != block) {
-                        touched.push((block, f as u32));
+            let mut firsts: HashMap<Signature, Element> = HashMap::new();
+            let mut touched: Vec<(u32, Element)> = Vec::new();
+            for group in range {
+                probe.each(fine, group, |element, look, probe| {
+                    if matches!(look, Look::Quarters) && !firsts.contains_key(&probe.signature) {
+                        firsts.insert(probe.signature.clone(), element);
                     }
-                }
+                    let start = touched.len();
+                    for &v in &probe.vertices {
+                        let block = block_of[v as usize];
+                        if touched[start..].iter().all(|t| t.0 != block) {
+                            touched.push((block, element));
+                        }
+                    }
+                });
             }
             (firsts, touched)
         });
-        let mut kinds: Vec<Kind> = (0..16).map(Kind::patch).collect();
+        let mut kinds: Vec<Kind> = (0..FOUR).map(Kind::patch).collect();
+        kinds.push(Kind::four(&grams[0]));
         let mut known: HashMap<Signature, u32> = HashMap::new();
-        let mut faces_of = vec![Vec::new(); ranges.len()];
+        let mut elements_of = vec![Vec::new(); ranges.len()];
         let mut probe = Probe::default();
         for (firsts, touched) in found {
-            let mut firsts: Vec<usize> = firsts.into_values().collect();
+            let mut firsts: Vec<Element> = firsts.into_values().collect();
             firsts.sort_unstable();
-            for f in firsts {
-                probe.look(fine, f);
+            for element in firsts {
+                probe.look(fine, element);
                 if !known.contains_key(&probe.signature) {
-                    require_room(probe.vertices.len())?;
                     known.insert(probe.signature.clone(), kinds.len() as u32);
+                    let f = (element / 5 * 4 + element % 5) as usize;
                     kinds.push(Kind::quarters(fine, &masks, f, &probe.vertices, &grams));
                 }
             }
-            for (block, f) in touched {
-                faces_of[block as usize].push(f);
+            for (block, element) in touched {
+                elements_of[block as usize].push(element);
             }
         }
         let blocks = parallel::map(ranges.len(), 1, |k| {
-            let (vertices, faces) = (ranges[k.start].clone(), &faces_of[k.start]);
-            Block::new(fine, vertices, faces, &known, &kinds, &numbering)
+            let (vertices, elements) = (ranges[k.start].clone(), &elements_of[k.start]);
+            Block::new(fine, vertices, elements, &known, &kinds, &numbering)
         });
         Ok(Elements { owner, numbering, kinds, blocks: blocks.into_iter().collect::<Result<_>>()? })
     }
@@ -265,9 +350,10 @@ impl Elements {
         self.numbering.back(values)
     }
 
-    /// For each fine vertex the point of the given vertex that it belongs to.
+    /// For each fine vertex, in the order within, the point of the given vertex that it belongs to.
     pub(super) fn spread(&self, points: &[DVec3]) -> Vec<DVec3> {
-        parallel::collect(self.owner.len(), |w| points[self.owner[w] as usize])
+        let order = self.numbering.order();
+        parallel::collect(order.len(), |i| points[self.owner[order[i] as usize] as usize])
     }
 
     /// The place of each vertex in the order within.
@@ -305,9 +391,11 @@ impl Elements {
             let block = &self.blocks[k.start];
             let local = block.gather(x);
             let mut sums = vec![[0.0; 3]; local.len()];
-            self.each_element(block, |kind, places| match places.len() {
-                16 => multiply::<16>(&forms[kind], places, &local, &mut sums),
-                points => multiply_any(points, &forms[kind], places, &local, &mut sums),
+            let mut own = Vec::new();
+            self.each_element(block, |kind, places| {
+                own.clear();
+                own.extend(places.iter().map(|&place| local[place as usize]));
+                product(&forms[kind], &own, places, &mut sums);
             });
             part.iter_mut().zip(&sums).for_each(|(y, sum)| *y = DVec3::from_array(*sum));
             then(k.start, x, part)
@@ -370,18 +458,20 @@ impl Block {
     fn new(
         fine: &Surface,
         vertices: Range<usize>,
-        faces: &[u32],
+        touching: &[Element],
         known: &HashMap<Signature, u32>,
         kinds: &[Kind],
         numbering: &Numbering,
     ) -> Result<Self> {
         let mut probe = Probe::default();
-        let mut elements: Vec<(u32, u32)> = Vec::with_capacity(faces.len());
+        let mut elements: Vec<(u32, u32)> = Vec::with_capacity(touching.len());
         let mut all = Vec::new();
-        for &f in faces {
-            let kind = match probe.look(fine, f as usize) {
-                Some(sharp) => sharp as u32,
-                None => known[&probe.signature],
+        for &element in touching {
+            let kind = match probe.look(fine, element) {
+                Some(Look::Patch(sharp)) => sharp as u32,
+                Some(Look::Four) => FOUR as u32,
+                Some(Look::Quarters) => known[&probe.signature],
+                None => continue,
             };
             elements.push((kind, all.len() as u32));
             all.extend(probe.vertices.iter().map(|&v| numbering.place()[v as usize]));
@@ -390,6 +480,7 @@ impl Block {
         let mut around: Vec<u32> = all.iter().copied().filter(|&v| !is_inside(v)).collect();
         around.sort_unstable();
         around.dedup();
+        around.shrink_to_fit();
         if vertices.len() + around.len() > usize::from(u16::MAX) {
             return Err(too_great());
         }
@@ -454,40 +545,25 @@ fn too_great() -> Error {
     }
 }
 
-fn require_room(points: usize) -> Result<()> {
+/// The matrix of the faces about a vertex with so many.
+fn require_room(faces: usize) -> Result<()> {
+    // Two rings, and what the other corners see.
+    let points = 2 * faces + 8;
     if points > usize::from(u16::MAX) {
         return Err(too_great());
     }
     // Two forms, and their weighted sum.
     let bytes = 24 * (points * stride(points)) as u64;
-    crate::memory::require(
-        bytes,
-        || format!("the energy about a vertex whose faces have {points} control points"),
-        "use a mesh of smaller valences",
-    )
+    let what = || format!("the energy of the surface about a vertex or in a face of valence {faces}");
+    require(bytes, what, "use a mesh of smaller valences")
 }
 
-/// Adds K x of one element.
+/// Adds K x of one element with the points x: four rows at once, by columns, the matrix being symmetric.
 #[inline(always)]
-fn multiply<const POINTS: usize>(form: &[f64], places: &[u16], x: &[[f64; 3]], sums: &mut [[f64; 3]]) {
-    let mut own = [[0.0; 3]; POINTS];
-    for (own, &place) in own.iter_mut().zip(places) {
-        *own = x[place as usize];
-    }
-    product(POINTS, form, &own, places, sums);
-}
-
-fn multiply_any(points: usize, form: &[f64], places: &[u16], x: &[[f64; 3]], sums: &mut [[f64; 3]]) {
-    let own: Vec<[f64; 3]> = places.iter().map(|&place| x[place as usize]).collect();
-    product(points, form, &own, places, sums);
-}
-
-/// Four rows at once, by columns: the matrix is symmetric.
-#[inline(always)]
-fn product(points: usize, form: &[f64], own: &[[f64; 3]], places: &[u16], sums: &mut [[f64; 3]]) {
+fn product(form: &[f64], own: &[[f64; 3]], places: &[u16], sums: &mut [[f64; 3]]) {
     for (block, rows) in places.chunks(LANES).enumerate() {
         let mut sum = [[0.0; LANES]; 3];
-        for (column, x) in form.chunks_exact(stride(points)).zip(own) {
+        for (column, x) in form.chunks_exact(stride(own.len())).zip(own) {
             let column = &column[block * LANES..][..LANES];
             for (sum, x) in sum.iter_mut().zip(x) {
                 for (sum, k) in sum.iter_mut().zip(column) {

@@ -12,7 +12,6 @@ use crate::interpolate::normals::unit_normals;
 use crate::interpolate::zheng_cai::Constraints;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Surface, diagonal};
-use crate::parallel;
 use crate::schemes::catmull_clark::{limit_mask, tangent_constant};
 use crate::solvers::system::Rows;
 use crate::solvers::{Errors, Outcome, Report, Step, Stop};
@@ -132,21 +131,20 @@ pub fn fit_watched(
     let normals = wishes.normals.map(unit_normals).transpose()?;
     let normals = normals.filter(|n| n.iter().any(Option::is_some));
     let chosen: Vec<usize> = (0..points.len()).filter(|&v| wishes.is_interpolated(v)).collect();
-    let rings = Rings::new(fairness, points.len(), normals.as_deref());
+    let masks = Masks { fine: &fairness.fine, sharp: SharpMasks::new(&fairness.fine) };
     let (x, report) = match solver {
         Solver::Iterations => {
-            let conditions = parallel::collect(chosen.len(), |k| {
-                let v = chosen[k];
+            let conditions = |v: usize| {
                 let normal = normals.as_ref().and_then(|normals| normals[v]);
-                let tangents = normal.map(|normal| (&rings.tangents[v], normal));
-                Conditions { limit: &rings.limits[v], point: points[v], tangents }
-            });
-            minimise(&fairness.elements, weights, points, &conditions, stop, watch)?
+                let tangents = normal.map(|normal| (masks.tangents(v), normal));
+                Conditions { limit: masks.limit(v), point: points[v], tangents }
+            };
+            minimise(&fairness.elements, weights, points, &chosen, conditions, stop, watch)?
         }
         Solver::Factorization => {
             let x = match normals {
-                None => by_points(fairness, &rings, points, &chosen, weights)?,
-                Some(normals) => by_normals(fairness, &rings, points, &chosen, &normals, weights)?,
+                None => by_points(fairness, &masks, points, &chosen, weights)?,
+                Some(normals) => by_normals(fairness, &masks, points, &chosen, &normals, weights)?,
             };
             (x, Report { outcome: Outcome::Converged, iterations: 1, history: Vec::new(), detail: None })
         }
@@ -155,8 +153,7 @@ pub fn fit_watched(
     let mut nothing = vec![(); chosen.len()];
     let totals = Rows::new(chosen.len()).pass_one(&mut nothing, |k, (), tally| {
         let v = chosen[k];
-        let terms = rings.limits[v].iter();
-        let limit: DVec3 = terms.map(|&(j, w)| w * surface.positions()[j as usize]).sum();
+        let limit: DVec3 = masks.limit(v).iter().map(|&(j, w)| w * surface.positions()[j as usize]).sum();
         tally.error(points[v] - limit);
     });
     let size = points.iter().fold(0.0f64, |a, p| a.max(p.abs().max_element()));
@@ -193,31 +190,27 @@ fn require_anchors(fairness: &Fairness, wishes: &Constraints, originals: usize) 
     }
 }
 
-/// The masks of the original vertices as rows over the fine control points.
-pub(super) struct Rings {
-    pub(super) limits: Vec<Row>,
-    /// Cosine and sine, where a normal is given; of no vertex if none is.
-    pub(super) tangents: Vec<[Row; 2]>,
+/// The masks of original vertices as rows over the fine control points. They are made where they are needed: to keep
+/// them all takes 300 bytes a vertex.
+pub(super) struct Masks<'a> {
+    fine: &'a Surface,
+    sharp: SharpMasks<'a>,
 }
 
-impl Rings {
-    fn new(fairness: &Fairness, originals: usize, normals: Option<&[Option<DVec3>]>) -> Self {
-        let fine = &fairness.fine;
-        let sharp = SharpMasks::new(fine);
-        let star = |v: usize| {
-            let mut star = Vec::new();
-            fine.topology().star(fine.faces(), v, &mut star);
-            star
-        };
-        let limits =
-            parallel::collect(originals, |v| sharp.of(v, 1.0 / 6.0).unwrap_or_else(|| limit_row(fine, v, &star(v))));
-        let tangents = normals.map(|normals| {
-            parallel::collect(originals, |v| match normals[v] {
-                Some(_) => tangent_rows(fine, &star(v)),
-                None => Default::default(),
-            })
-        });
-        Rings { limits, tangents: tangents.unwrap_or_default() }
+impl Masks<'_> {
+    fn star(&self, v: usize) -> Vec<u32> {
+        let mut star = Vec::new();
+        self.fine.topology().star(self.fine.faces(), v, &mut star);
+        star
+    }
+
+    pub(super) fn limit(&self, v: usize) -> Row {
+        self.sharp.of(v, 1.0 / 6.0).unwrap_or_else(|| limit_row(self.fine, v, &self.star(v)))
+    }
+
+    /// Cosine and sine, at a smooth vertex.
+    pub(super) fn tangents(&self, v: usize) -> [Row; 2] {
+        tangent_rows(self.fine, &self.star(v))
     }
 }
 

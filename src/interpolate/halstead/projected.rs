@@ -19,86 +19,97 @@ use crate::solvers::{Errors, Failure, Iterate, Outcome, Report, Step, Stop};
 use crate::{Error, Result};
 
 /// What is asked at one given vertex.
-pub(super) struct Conditions<'a> {
+pub(super) struct Conditions {
     /// The limit mask over fine vertices, and the point that it gives.
-    pub(super) limit: &'a Row,
+    pub(super) limit: Row,
     pub(super) point: DVec3,
     /// The tangent masks, and the unit normal that they are perpendicular to.
-    pub(super) tangents: Option<(&'a [Row; 2], DVec3)>,
+    pub(super) tangents: Option<([Row; 2], DVec3)>,
 }
 
 /// The conditions of one ring as orthonormal rows over the scaled unknowns.
 struct Ring {
     /// Places in the block.
-    places: Vec<u32>,
-    /// That of the limit, for all coordinates, and those of the tangents, along the normal. None if they vanish.
-    rows: Vec<Vec<f64>>,
-    normal: DVec3,
-    /// What the rows give: a point, and numbers along the normal.
+    places: Box<[u16]>,
+    /// The row of the limit, for all coordinates, and the point that it gives.
+    row: Box<[f64]>,
     limit: DVec3,
-    slopes: Vec<f64>,
+    tangents: Option<Box<Tangents>>,
+}
+
+/// The rows that are summed up along a normal.
+struct Tangents {
+    normal: DVec3,
+    /// Each with what it gives.
+    rows: Vec<(Vec<f64>, f64)>,
+}
+
+/// What is left of a row that depends on others, as a part of it.
+const DEPENDENT: f64 = 1e-12;
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 impl Ring {
     fn new(conditions: &Conditions, place: &[u32], first: usize, scale: &[f64]) -> Self {
-        let mut places: Vec<u32> = conditions.limit.iter().map(|term| place[term.0 as usize] - first as u32).collect();
+        let local = |v: u32| (place[v as usize] as usize - first) as u16;
+        let mut places: Vec<u16> = conditions.limit.iter().map(|term| local(term.0)).collect();
         places.sort_unstable();
         places.dedup();
         let scaled = |row: &Row| -> Vec<f64> {
             let mut values = vec![0.0; places.len()];
             for &(v, weight) in row {
-                let local = place[v as usize] - first as u32;
-                values[places.partition_point(|&p| p < local)] += weight * scale[place[v as usize] as usize];
+                values[places.partition_point(|&p| p < local(v))] += weight * scale[place[v as usize] as usize];
             }
             values
         };
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let mut limit_row = scaled(conditions.limit);
-        let length = dot(&limit_row, &limit_row).sqrt();
-        limit_row.iter_mut().for_each(|w| *w /= length);
-        let limit = conditions.point / length;
-        let mut rows = vec![limit_row];
-        let mut slopes: Vec<f64> = Vec::new();
-        let mut normal = DVec3::ZERO;
-        if let Some((tangents, n)) = conditions.tangents {
-            normal = n;
+        let unit = |mut row: Vec<f64>, length: f64| {
+            row.iter_mut().for_each(|w| *w /= length);
+            row
+        };
+        let row = scaled(&conditions.limit);
+        let length = dot(&row, &row).sqrt();
+        let (row, limit) = (unit(row, length), conditions.point / length);
+        let tangents = conditions.tangents.as_ref().map(|(tangents, normal)| {
+            let mut rows: Vec<(Vec<f64>, f64)> = Vec::new();
             for tangent in tangents {
-                let mut row = scaled(tangent);
-                let whole = dot(&row, &row).sqrt();
-                // The condition is that the sum along the normal vanishes; what earlier rows have of it is known.
+                let mut own = scaled(tangent);
+                let whole = dot(&own, &own).sqrt();
+                // The sum along the normal shall vanish, and what earlier rows have of it is known.
                 let mut slope = 0.0;
-                for (k, earlier) in rows.iter().enumerate() {
-                    let part = dot(&row, earlier);
-                    row.iter_mut().zip(earlier).for_each(|(w, e)| *w -= part * e);
-                    slope -= part * if k == 0 { limit.dot(n) } else { slopes[k - 1] };
+                let earlier = rows.iter().map(|(row, slope)| (row.as_slice(), *slope));
+                for (row, given) in std::iter::once((row.as_slice(), limit.dot(*normal))).chain(earlier) {
+                    let part = dot(&own, row);
+                    own.iter_mut().zip(row).for_each(|(w, e)| *w -= part * e);
+                    slope -= part * given;
                 }
-                let length = dot(&row, &row).sqrt();
-                if length > 1e-12 * whole {
-                    row.iter_mut().for_each(|w| *w /= length);
-                    rows.push(row);
-                    slopes.push(slope / length);
+                let length = dot(&own, &own).sqrt();
+                if length > DEPENDENT * whole {
+                    rows.push((unit(own, length), slope / length));
                 }
             }
-        }
-        Ring { places, rows, normal, limit, slopes }
+            Box::new(Tangents { normal: *normal, rows })
+        });
+        Ring { places: places.into(), row: row.into(), limit, tangents }
     }
 
-    /// Moves scaled unknowns to where the rows give `limit` and `slopes`.
-    fn meet(&self, y: &mut [DVec3], limit: DVec3, slopes: impl Iterator<Item = f64>) {
-        let (Some(first), rest) = (self.rows.first(), self.rows.get(1..).unwrap_or_default()) else { return };
-        let sum =
-            |row: &[f64], y: &[DVec3]| -> DVec3 { self.places.iter().zip(row).map(|(&p, w)| *w * y[p as usize]).sum() };
-        let miss = limit - sum(first, y);
-        self.places.iter().zip(first).for_each(|(&p, w)| y[p as usize] += *w * miss);
-        for (row, slope) in rest.iter().zip(slopes) {
-            let miss = (slope - sum(row, y).dot(self.normal)) * self.normal;
-            self.places.iter().zip(row).for_each(|(&p, w)| y[p as usize] += *w * miss);
-        }
+    fn sum(&self, row: &[f64], y: &[DVec3]) -> DVec3 {
+        self.places.iter().zip(row).map(|(&p, w)| *w * y[p as usize]).sum()
     }
 
-    /// Takes off what changes a condition.
-    fn project(&self, y: &mut [DVec3]) {
-        self.meet(y, DVec3::ZERO, std::iter::repeat(0.0));
+    fn add(&self, row: &[f64], change: DVec3, y: &mut [DVec3]) {
+        self.places.iter().zip(row).for_each(|(&p, w)| y[p as usize] += *w * change);
+    }
+
+    /// Moves scaled unknowns to where the rows give `share` of what they should: 1, or 0 to take off all that changes a condition.
+    fn meet(&self, share: f64, y: &mut [DVec3]) {
+        self.add(&self.row, share * self.limit - self.sum(&self.row, y), y);
+        let Some(tangents) = &self.tangents else { return };
+        for (row, slope) in &tangents.rows {
+            let miss = share * slope - self.sum(row, y).dot(tangents.normal);
+            self.add(row, miss * tangents.normal, y);
+        }
     }
 }
 
@@ -117,9 +128,10 @@ struct Minimiser<'a> {
     /// The direction, unscaled.
     direction: Vec<DVec3>,
     product: Vec<DVec3>,
-    /// ‖rest‖².
+    /// ‖rest‖², and of the iterate before where the direction goes on from it.
     squared: f64,
-    is_fresh: bool,
+    before: Option<f64>,
+    errors: Errors,
 }
 
 /// What the chunks of a vector add up.
@@ -133,7 +145,12 @@ struct Sums {
 /// Elements of one task.
 const CHUNK: usize = 4096;
 
-impl<'a> Minimiser<'a> {
+impl Minimiser<'_> {
+    /// The iterate; memory of all else is free then.
+    fn into_points(self) -> Vec<DVec3> {
+        self.x
+    }
+
     fn meet_conditions(&mut self) {
         let (rings, scale, elements) = (&self.rings, &self.scale, self.elements);
         let ranges: Vec<_> = elements.blocks().collect();
@@ -141,7 +158,7 @@ impl<'a> Minimiser<'a> {
             let scale = &scale[ranges[k.start].clone()];
             for ring in &rings[k.start] {
                 ring.places.iter().for_each(|&p| x[p as usize] /= scale[p as usize]);
-                ring.meet(x, ring.limit, ring.slopes.iter().copied());
+                ring.meet(1.0, x);
                 ring.places.iter().for_each(|&p| x[p as usize] *= scale[p as usize]);
             }
         });
@@ -154,18 +171,22 @@ impl<'a> Minimiser<'a> {
         elements.apply(&self.forms, &self.x, &mut self.rest, |k, _, y| {
             let scale = &scale[ranges[k].clone()];
             y.iter_mut().zip(scale).for_each(|(y, s)| *y *= -*s);
-            rings[k].iter().for_each(|ring| ring.project(y));
+            rings[k].iter().for_each(|ring| ring.meet(0.0, y));
         });
-        self.is_fresh = true;
+        self.before = None;
+        self.walk(0.0);
     }
 
-    fn measure(&mut self) -> Errors {
-        let scale = &self.scale;
+    /// x += step·direction and rest −= step·product, and what the new rest comes to.
+    fn walk(&mut self, step: f64) {
+        let (direction, product, scale) = (&self.direction, &self.product, &self.scale);
         let mut sums = vec![Sums::default(); self.rest.len().div_ceil(CHUNK)];
-        parallel::chunks_with(&mut self.rest, CHUNK, &mut sums, |first, rest, sums| {
-            for (r, s) in rest.iter().zip(&scale[first..]) {
+        parallel::chunks_of_two(&mut self.x, &mut self.rest, CHUNK, &mut sums, |first, x, rest, sums| {
+            for (i, (x, r)) in (first..).zip(x.iter_mut().zip(rest)) {
+                *x += step * direction[i];
+                *r -= step * product[i];
                 let squared = r.length_squared();
-                let length = squared.sqrt() * s;
+                let length = squared.sqrt() * scale[i];
                 sums.squared += squared;
                 sums.length += length;
                 sums.max = if length > sums.max || length.is_nan() { length } else { sums.max };
@@ -173,7 +194,8 @@ impl<'a> Minimiser<'a> {
         });
         self.squared = sums.iter().map(|s| s.squared).sum();
         let max = sums.iter().fold(0.0, |max: f64, s| if s.max.is_nan() { f64::NAN } else { max.max(s.max) });
-        Errors { max, mean: sums.iter().map(|s| s.length).sum::<f64>() / self.rest.len() as f64 }
+        let mean = sums.iter().map(|s| s.length).sum::<f64>() / self.rest.len() as f64;
+        self.errors = Errors { max, mean };
     }
 
     /// direction ← D^{-½} rest + factor · direction.
@@ -185,35 +207,25 @@ impl<'a> Minimiser<'a> {
 
 impl Iterate for Minimiser<'_> {
     fn errors(&mut self) -> Errors {
-        let before = self.squared;
-        let errors = self.measure();
-        if self.is_fresh {
-            self.turn(0.0);
-            self.is_fresh = false;
-        } else {
-            self.turn(self.squared / before);
-        }
-        errors
+        self.errors
     }
 
-    fn confirm(&mut self, errors: Errors) -> Errors {
-        let _ = errors;
+    /// By a product; the method goes on from there as from a start.
+    fn confirm(&mut self, _: Errors) -> Errors {
         self.meet_conditions();
         self.evaluate();
-        let errors = self.measure();
-        self.turn(0.0);
-        self.is_fresh = false;
-        errors
+        self.errors
     }
 
     fn advance(&mut self) -> std::result::Result<(), Failure> {
+        self.turn(self.before.map_or(0.0, |before| self.squared / before));
         let (rings, scale, elements) = (&self.rings, &self.scale, self.elements);
         let ranges: Vec<_> = elements.blocks().collect();
         let curvatures = elements.apply(&self.forms, &self.direction, &mut self.product, |k, p, y| {
             let range = ranges[k].clone();
             let curvature: f64 = p[range.clone()].iter().zip(&*y).map(|(p, y)| p.dot(*y)).sum();
             y.iter_mut().zip(&scale[range]).for_each(|(y, s)| *y *= *s);
-            rings[k].iter().for_each(|ring| ring.project(y));
+            rings[k].iter().for_each(|ring| ring.meet(0.0, y));
             curvature
         });
         let curvature: f64 = curvatures.into_iter().sum();
@@ -226,9 +238,8 @@ impl Iterate for Minimiser<'_> {
                 ),
             });
         }
-        let (direction, product) = (&self.direction, &self.product);
-        parallel::change(&mut self.x, |i, x| *x += step * direction[i]);
-        parallel::change(&mut self.rest, |i, r| *r -= step * product[i]);
+        self.before = Some(self.squared);
+        self.walk(step);
         Ok(())
     }
 
@@ -237,14 +248,15 @@ impl Iterate for Minimiser<'_> {
     }
 }
 
-/// The minimiser of the weighted energy among the control points that meet the conditions, in the order of the fine mesh.
+/// The minimiser of the weighted energy among the control points that meet the conditions at the `chosen` given vertices, in the order of the fine mesh.
 /// The errors of an iterate are the steps, in mesh units, that would take the energy to its least value along one control
 /// point at a time. The start is the point of the next given vertex.
 pub(super) fn minimise(
     elements: &Elements,
     weights: Weights,
     points: &[DVec3],
-    conditions: &[Conditions],
+    chosen: &[usize],
+    conditions: impl Fn(usize) -> Conditions + Sync,
     stop: &Stop,
     watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
 ) -> Result<(Vec<DVec3>, Report)> {
@@ -255,35 +267,36 @@ pub(super) fn minimise(
             "the energy does not hold every control point in doubles: choose fairness weights nearer to 1".into(),
         ));
     }
-    let scale: Vec<f64> = diagonal.iter().map(|d| d.sqrt().recip()).collect();
+    let scale: Vec<f64> = diagonal.into_iter().map(|d| d.sqrt().recip()).collect();
     let place = elements.place();
     let blocks: Vec<_> = elements.blocks().collect();
     let mut of_block = vec![Vec::new(); blocks.len()];
-    for (k, conditions) in conditions.iter().enumerate() {
-        let at = conditions.limit.first().map_or(0, |term| place[term.0 as usize] as usize);
-        of_block[blocks.partition_point(|range| range.end <= at)].push(k);
+    for &v in chosen {
+        of_block[blocks.partition_point(|range| range.end <= place[v] as usize)].push(v);
     }
     let rings = parallel::map(blocks.len(), 1, |b| {
         let first = blocks[b.start].start;
-        of_block[b.start].iter().map(|&k| Ring::new(&conditions[k], place, first, &scale)).collect()
+        of_block[b.start].iter().map(|&v| Ring::new(&conditions(v), place, first, &scale)).collect()
     });
+    drop(of_block);
     let n = place.len();
     let mut minimiser = Minimiser {
         elements,
         forms,
         scale,
         rings,
-        x: elements.there(&elements.spread(points)),
+        x: elements.spread(points),
         rest: vec![DVec3::ZERO; n],
         direction: vec![DVec3::ZERO; n],
         product: vec![DVec3::ZERO; n],
         squared: 0.0,
-        is_fresh: true,
+        before: None,
+        errors: Errors { max: f64::NAN, mean: f64::NAN },
     };
     minimiser.meet_conditions();
     minimiser.evaluate();
     let size = largest(points);
     let report = solve_in_scale(&mut minimiser, size, stop, watch);
     minimiser.meet_conditions();
-    Ok((elements.back(&minimiser.x), report))
+    Ok((elements.back(&minimiser.into_points()), report))
 }

@@ -44,29 +44,36 @@ pub struct Control {
 }
 
 /// What is shown of a solution as it goes: a bar, or lines.
-struct Shown<'a> {
+pub struct Shown<'a> {
     arguments: &'a Arguments,
     input: &'a Input,
     progress: Progress,
     tolerance: f64,
+    /// What the errors of iterates are.
+    quantity: &'static str,
     /// The first error seen.
     start: Option<f64>,
 }
 
 impl<'a> Shown<'a> {
     fn new(arguments: &'a Arguments, input: &'a Input, tolerance: f64) -> Self {
-        let progress = Progress::toward("solving", arguments.monitor.no_bar(&arguments.common));
-        Shown { arguments, input, progress, tolerance, start: None }
+        Shown::of("error", arguments, input, tolerance)
     }
 
-    fn see(&mut self, method: &str, step: &Step) -> ControlFlow<()> {
+    pub fn of(quantity: &'static str, arguments: &'a Arguments, input: &'a Input, tolerance: f64) -> Self {
+        let progress = Progress::toward("solving", arguments.monitor.no_bar(&arguments.common));
+        Shown { arguments, input, progress, tolerance, quantity, start: None }
+    }
+
+    pub fn see(&mut self, method: &str, step: &Step) -> ControlFlow<()> {
         // In digits: from the first error seen to the tolerance.
         let error = step.errors.max;
         let digits = |e: f64| (e / self.tolerance).ln();
         self.progress.part(1.0 - digits(error) / digits(*self.start.get_or_insert(error)));
         let (iteration, errors) = (step.iteration, step.errors * self.input.frame.scale());
-        self.progress.message(format!("{method}: iteration {iteration}: max error {:.2e}", errors.max));
-        self.arguments.monitor.see(format_args!("{}: {method}", self.input.name), iteration, errors);
+        let quantity = self.quantity;
+        self.progress.message(format!("{method}: iteration {iteration}: max {quantity} {:.2e}", errors.max));
+        self.arguments.monitor.see_of(quantity, format_args!("{}: {method}", self.input.name), iteration, errors);
         ControlFlow::Continue(())
     }
 }

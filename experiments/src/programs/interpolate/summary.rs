@@ -6,6 +6,7 @@ use crate::studies::histories;
 use glam::DVec3;
 use limitlab::Result;
 use limitlab::error::counted;
+use limitlab::solvers::Recorded;
 use serde_json::{Value, json};
 
 use super::arguments::{Arguments, Choice};
@@ -78,7 +79,7 @@ pub fn print_summary(
         "max_error": number(errors.max),
         "mean_error": number(errors.mean),
         "tolerance": number(result.tolerance),
-        "history": histories::json(&result.history),
+        "history": history(arguments, result),
         "output": arguments.output.display().to_string(),
         "interpolated": per_vertex.interpolated.as_ref().map_or(input.surface.len(), marked),
         "subdivide": arguments.shape.subdivide,
@@ -107,4 +108,19 @@ pub fn print_summary(
         object["scheme"] = json!(scheme.name());
     }
     cli::print_object(object, provenance)
+}
+
+/// The errors of the iterates, or what another method measures them by.
+fn history(arguments: &Arguments, result: &Finished) -> Value {
+    if arguments.method != Choice::Halstead {
+        return histories::json(&result.history);
+    }
+    let entry = |at: &Recorded| {
+        json!({
+            "iteration": at.iteration,
+            "max_step": number(at.errors.max),
+            "mean_step": number(at.errors.mean),
+        })
+    };
+    result.history.iter().map(entry).collect()
 }

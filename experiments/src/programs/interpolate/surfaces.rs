@@ -2,19 +2,19 @@
 
 use std::time::Instant;
 
-use crate::cli::Input;
+use crate::cli::{Input, advice};
 use limitlab::Result;
-use limitlab::error::Error;
-use limitlab::interpolate::halstead::{self, Energies, Fairness, Weights, fit};
+use limitlab::error::{Error, counted};
+use limitlab::interpolate::halstead::{self, Energies, Fairness, Solver, Weights, fit_watched};
 use limitlab::interpolate::lin_luo;
 use limitlab::interpolate::normals::Rotation;
 use limitlab::interpolate::surface::{SurfaceMesh, SurfaceOptions, surface};
 use limitlab::mesh::frame::Frame;
 use limitlab::schemes::Refinement;
-use limitlab::solvers::{Errors, Recorded};
+use limitlab::solvers::{Errors, Outcome, Recorded, Step};
 
 use super::arguments::Arguments;
-use super::control::{Control, Seconds};
+use super::control::{Control, Seconds, Shown};
 use super::vertex_options::VertexOptions;
 
 pub struct Finished {
@@ -23,7 +23,7 @@ pub struct Finished {
     pub iterations: usize,
     pub status: &'static str,
     pub errors: Errors,
-    /// Of the solution: empty where nothing iterates.
+    /// Of the solution: empty where nothing iterates. By halstead steps in the place of errors.
     pub history: Vec<Recorded>,
     pub tolerance: f64,
     pub fairness: Option<Energies>,
@@ -75,7 +75,23 @@ pub fn fairest(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions)
     let flags = &arguments.shape;
     let weights = Weights { thin_plate: flags.thin_plate.unwrap_or(1.0), membrane: flags.membrane.unwrap_or(1.0) };
     let points = input.surface.positions();
-    let found = fit(&fairness, points, &per_vertex.constraints(), weights)?;
+    let stop = input.stop(&arguments.stop)?;
+    let mut shown = Shown::of("step", arguments, input, stop.tolerance);
+    let watch = &mut |step: &Step| shown.see("halstead", step);
+    let found = fit_watched(&fairness, points, &per_vertex.constraints(), weights, Solver::Iterations, &stop, watch)?;
+    drop(shown);
+    let report = found.report;
+    if report.outcome != Outcome::Converged {
+        let unit = input.frame.scale();
+        return Err(Error::Computation(format!(
+            "halstead ended as {} after {}, the largest step left {:.3e} against {:.3e}; {}",
+            report.outcome,
+            counted(report.iterations, "iteration"),
+            unit * report.last().max,
+            unit * stop.tolerance,
+            advice::of_unfair(report.outcome)
+        )));
+    }
     let solve = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let request = SurfaceOptions {
@@ -88,11 +104,11 @@ pub fn fairest(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions)
     Ok(Finished {
         method: "halstead",
         made,
-        iterations: 1,
-        status: "converged",
+        iterations: report.iterations,
+        status: report.outcome.name(),
         errors: found.errors,
-        history: Vec::new(),
-        tolerance: 0.0,
+        history: report.history,
+        tolerance: stop.tolerance,
         fairness: Some(found.energies),
         seconds: Seconds { assemble, solve, subdivide: start.elapsed().as_secs_f64(), ..Seconds::default() },
     })
