@@ -238,7 +238,10 @@ fn failures_say_what_is_wrong_and_write_nothing() {
         (format!("icosahedron --shape-handle {handles} --scheme nasri --subdivide 2"), "vertex 4: the shape handle -1"),
         ("icosahedron --shape-handle 2 --scheme loop".into(), "use --scheme zheng-cai"),
         ("icosahedron --method pia --max-iter 1".into(), "ran out"),
-        ("icosahedron --method halstead --max-iter 1".into(), "ended as max-iterations after 1 iteration, the largest step"),
+        (
+            "icosahedron --method halstead --max-iter 1".into(),
+            "ended as max-iterations after 1 iteration, the largest step",
+        ),
     ] {
         let error = bench.fail(&arguments, 1);
         assert!(error.contains(what), "{arguments}: {error}");

@@ -8,7 +8,7 @@
 //! | [`zheng_cai`] | Zheng & Cai's two phases: exact centroids, normals, shape handles |
 //! | [`nasri`] | Nasri's method, beside it |
 //! | [`lin_luo`] | Lin & Luo's unified schemes for curves and √3 surfaces |
-//! | [`halstead`] | fair interpolation as a sparse constrained least-squares problem; iterations watched by it |
+//! | [`halstead`] | fair interpolation as a constrained least-squares problem, without a matrix; iterations watched by it |
 //! | [`surface`] | from a control mesh to the surface: levels, limit points, normals |
 //! | [`solver`] | the front door: the control mesh by any method, by `auto` unless told; once, or again for points that move |
 //! | [`staged`] | curves, then smooth vertices, or some of them, by any method |

@@ -74,7 +74,7 @@ pub struct Fairness {
 
 impl Fairness {
     /// Refines a mesh and lists the elements of the forms: which vertices a spline takes, and one small matrix for all
-    /// that look alike. Time and memory O(16·corners), about 2 KB a vertex; O(n³) beside for each vertex of a great valence n.
+    /// that look alike. Time and memory O(16·corners), 2 KB a vertex; O(n³) beside for each vertex of a great valence n.
     ///
     /// # Errors
     /// A boundary that is treated as interior, a dart, a semi-sharp edge or vertex; a mesh that is too large for memory or for

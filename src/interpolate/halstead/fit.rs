@@ -34,7 +34,7 @@ pub struct Fit {
 /// How the least energy is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Solver {
-    /// Conjugate gradients among the control points that meet the conditions, without a matrix: about 3 KB a vertex.
+    /// Conjugate gradients among the control points that meet the conditions, without a matrix: 4 KB a vertex in all.
     #[default]
     Iterations,
     /// LDLᵀ of one large sparse matrix, some 180 KB a vertex: what the iterations are held against.

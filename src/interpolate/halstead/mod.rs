@@ -5,7 +5,8 @@
 //! The unknowns are the vertices of the mesh refined [`LEVELS`] times: by then the 1-rings of the original vertices
 //! are disjoint, so the constraints, each on one ring, are independent and always soluble, on meshes too whose own
 //! limit system is singular. Boundaries are natural, and a crease is a boundary of each of its sides. [`mod@energy`]
-//! makes the energy as a quadratic form, [`mod@fit`] minimises it under the constraints, [`mod@follow`] holds the
+//! makes the energy as a quadratic form, a sum over elements, [`mod@fit`] minimises it under the constraints, by projected
+//! conjugate gradients or by a factorization, [`mod@follow`] holds the
 //! iterative methods against it.
 
 mod direct;
