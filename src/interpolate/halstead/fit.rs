@@ -75,7 +75,9 @@ const MISS: f64 = 1e-8;
 /// let fairness = Fairness::new(&surface)?;
 /// let fair = fit(&fairness, surface.positions(), &Constraints::default(), Weights::default())?;
 /// assert!(fair.errors.max < 1e-12);
-/// assert!(fair.energies.thin_plate < fairness.energies(fairness.fine.positions()).thin_plate);
+/// let weights = Weights { membrane: 10.0, ..Weights::default() };
+/// let tighter = fit(&fairness, surface.positions(), &Constraints::default(), weights)?;
+/// assert!(tighter.energies.membrane < fair.energies.membrane);
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn fit(fairness: &Fairness, points: &[DVec3], wishes: &Constraints, weights: Weights) -> Result<Fit> {
