@@ -27,7 +27,7 @@ template <class Preconditioner> void solve(const char *folder, const System &s) 
                                     boost::make_iterator_range(s.columns, s.columns + s.entries),
                                     boost::make_iterator_range(s.values, s.values + s.entries));
     typename Solver::params parameters;
-    parameters.solver.tol = 1e-11;
+    parameters.solver.tol = 3e-12;
     parameters.solver.maxiter = 1000;
     from_here();
     double start = seconds();

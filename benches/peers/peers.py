@@ -102,14 +102,14 @@ def pardiso(m, right):
 def cg(m, right):
     scale = yield lambda: 1 / m.diagonal()
     jacobi = linalg.LinearOperator(m.shape, lambda x: scale * x)
-    one = lambda b, see: linalg.cg(m, b, rtol=1e-11, maxiter=3000, M=jacobi, callback=see)[0]
+    one = lambda b, see: linalg.cg(m, b, rtol=3e-12, maxiter=3000, M=jacobi, callback=see)[0]
     yield lambda: columns(one, right)
 
 
 def multigrid(m, right):
     library = need("pyamg")
     levels = yield lambda: library.smoothed_aggregation_solver(m)
-    one = lambda b, see: levels.solve(b, tol=1e-11, accel="cg", maxiter=1000, callback=see)
+    one = lambda b, see: levels.solve(b, tol=3e-12, accel="cg", maxiter=1000, callback=see)
     yield lambda: columns(one, right)
 
 
