@@ -295,7 +295,7 @@ fn export(surface: &Surface, arguments: &Arguments, folder: &Path) -> Result<()>
     write_file(&folder.join("R.petsc"), |out| export.write_right_hand_side(surface.positions(), out))?;
     write_file(&folder.join("H.petsc"), |out| export.write_weights(out))?;
     write_file(&folder.join(ORDER), |out| export.write_order(out))?;
-    let manifest = json!({ "diagonal": surface.diagonal() }).to_string();
+    let manifest = json!({ "diagonal": surface.diagonal(), "index": 32 }).to_string();
     write_file(&folder.join(cli::MANIFEST), |out| out.write_all(manifest.as_bytes()))
 }
 

@@ -152,7 +152,7 @@ int main(int argc, char **argv)
   char           dir[PETSC_MAX_PATH_LEN] = ".", out[PETSC_MAX_PATH_LEN], path[PETSC_MAX_PATH_LEN];
   PetscBool      is_named = PETSC_FALSE, has_length = PETSC_FALSE;
   PetscReal      tol = 1e-10, length = 0;
-  PetscInt       rows, low, high, most[2], total, iterations = 0, rounds = 0;
+  PetscInt       rows, low, high, most[2], total, bits = 0, iterations = 0, rounds = 0;
   PetscMPIInt    rank, size;
   PetscLogDouble clock[5];
   PetscOptions   manifest;
@@ -185,6 +185,9 @@ int main(int argc, char **argv)
   PetscCall(PetscOptionsInsertFileYAML(PETSC_COMM_WORLD, manifest, path, PETSC_TRUE));
   PetscCall(PetscOptionsGetReal(manifest, NULL, "-diagonal", &length, &has_length));
   PetscCheck(has_length && length > 0, PETSC_COMM_WORLD, PETSC_ERR_FILE_UNEXPECTED, "%s tells no diagonal", path);
+  PetscCall(PetscOptionsGetInt(manifest, NULL, "-index", &bits, NULL));
+  PetscCheck(bits == 8 * (PetscInt)sizeof(PetscInt), PETSC_COMM_WORLD, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: indices of %d bits, and this PETSc has %d: assemble --index %d", path, (int)bits, (int)(8 * sizeof(PetscInt)), (int)(8 * sizeof(PetscInt)));
   PetscCall(PetscOptionsDestroy(&manifest));
   measure.tolerance = tol * length;
 
