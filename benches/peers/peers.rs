@@ -25,7 +25,7 @@ use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, Outcome, Stop, run};
 use limitlab_experiments::cli;
 use limitlab_experiments::report::{
-    Column, Columns, Figure, Format, LinePlot, Marker, Provenance, Scale, Series, palette, provenance::Source,
+    Column, Columns, Figure, Format, LinePlot, Provenance, Scale, Series, marker, palette, provenance::Source,
 };
 use serde_json::{Value, json};
 use sprs::CsMat;
@@ -470,19 +470,10 @@ fn write(
     let label = Source { checksum: crc32fast::hash(arguments.mesh.as_bytes()), ..label };
     let provenance = provenance.about(&label);
     table.write(&arguments.out, &provenance)?;
-    let markers = [
-        Marker::Circle,
-        Marker::Square,
-        Marker::Triangle,
-        Marker::Diamond,
-        Marker::InvertedTriangle,
-        Marker::Cross,
-        Marker::Plus,
-    ];
     let found = rows.iter().filter_map(|row| Some((row, row.least.as_ref()?))).enumerate();
     let series = found.map(|(k, (row, run))| {
         let point = (total(run), run.megabytes);
-        let series = Series::scatter(row.name.as_str(), [point]).marker(markers[(k / 7 + k) % 7]).colour(palette(k));
+        let series = Series::scatter(row.name.as_str(), [point]).marker(marker(k / 7 + k)).colour(palette(k));
         Series { bold: row.name.starts_with("limitlab"), ..series }
     });
     let plot = LinePlot {

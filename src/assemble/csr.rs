@@ -226,3 +226,15 @@ impl Csr {
 pub(super) fn too_many(count: usize) -> Error {
     Error::Matrix(format!("a matrix with {count} rows or entries: 32-bit indices hold 4294967295, no more"))
 }
+
+/// Puts the entries of a row in the order of columns, and adds up those of one column.
+pub(crate) fn sum_columns(row: &mut Vec<(u32, f64)>) {
+    row.sort_by_key(|entry| entry.0);
+    row.dedup_by(|next, kept| {
+        let is_same = next.0 == kept.0;
+        if is_same {
+            kept.1 += next.1;
+        }
+        is_same
+    });
+}

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::csr::sum_columns;
 use crate::error::{Error, Result};
 use crate::mesh::Surface;
 use crate::mesh::features::Rule;
@@ -23,12 +24,7 @@ pub(super) fn row_at(star: &StarOf, scheme: Scheme, rule: Rule) -> Result<StarRo
 /// The entries of a row in the order of columns.
 fn sorted(star: &StarOf, row: &StarRow) -> Vec<(u32, f64)> {
     let mut all: Vec<(u32, f64)> = star.entries(row).collect();
-    all.sort_unstable_by_key(|entry| entry.0);
-    all.dedup_by(|next, kept| {
-        let same = next.0 == kept.0;
-        kept.1 += if same { next.1 } else { 0.0 };
-        same
-    });
+    sum_columns(&mut all);
     all.retain(|entry| entry.1 != 0.0);
     all
 }

@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 
+use super::csr::sum_columns;
 use super::curves::Curves;
 use super::operator::Operator;
 use super::stages::free;
@@ -105,14 +106,7 @@ impl StreamedSystem {
                 entries.push((j as u32, a / h));
             }
         });
-        entries.sort_unstable_by_key(|entry| entry.0);
-        entries.dedup_by(|next, kept| {
-            let is_same = next.0 == kept.0;
-            if is_same {
-                kept.1 += next.1;
-            }
-            is_same
-        });
+        sum_columns(entries);
     }
 
     /// R for the points P of all vertices. O(corners).

@@ -51,6 +51,6 @@ pub use plot::LinePlot;
 pub use png::{Animation, Image};
 pub use provenance::Provenance;
 pub use render::{ColourMap, ColourScale, Finish, Paint, Picture, Points, ShadedMesh, Stroke, Vectors, View};
-pub use series::{Rule, Series, Style, palette};
+pub use series::{Rule, Series, Style, marker, palette};
 pub use sparsity::SparsityPlot;
 pub use table::{Cell, Column, Table};

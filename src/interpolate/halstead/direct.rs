@@ -11,7 +11,7 @@ use glam::DVec3;
 use super::energy::{Fairness, Row, Weights};
 use super::fit::Masks;
 use crate::assemble::Csr;
-use crate::assemble::csr::Pattern;
+use crate::assemble::csr::{Pattern, sum_columns};
 use crate::parallel;
 use crate::solvers::direct::{Cholesky, CholeskyForm, Factorization};
 use crate::{Error, Result};
@@ -108,14 +108,7 @@ impl Kkt {
         let multiplier = self.rows.len() as u32;
         let mut terms: Row = terms.collect();
         // A vertex may be met twice in a ring; a vanishing weight must stay, for the pattern is symmetric.
-        terms.sort_by_key(|t| t.0);
-        terms.dedup_by(|b, a| {
-            let same = a.0 == b.0;
-            if same {
-                a.1 += b.1;
-            }
-            same
-        });
+        sum_columns(&mut terms);
         for &(j, w) in &terms {
             self.rows[j as usize].push((multiplier, w));
         }

@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::report::{Column, Columns, Table};
 use glam::DVec3;
 use limitlab::Result;
-use limitlab::interpolate::{Interpolator, Options, Tolerance, interpolate};
+use limitlab::interpolate::{Interpolator, Options, interpolate};
 use limitlab::mesh::noise::{mean_edge_length, move_vertices};
 use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::Scheme;
@@ -97,50 +97,16 @@ pub fn frames_table(rows: &[Row]) -> Table {
 /// Frames of one mesh.
 pub fn frames(name: &str, mesh: Mesh, scheme: Scheme, rows: &mut Vec<Row>) -> Result<()> {
     let surface = Surface::new(mesh)?;
-    let length = surface.diagonal();
     let edge = mean_edge_length(surface.mesh());
     let mut interpolator = Interpolator::new(&surface, scheme, None)?;
     for motion in [Motion::Wave, Motion::Noise] {
         for part in MOTIONS {
             for tolerance in TOLERANCES {
-                let stop = Stop { tolerance: tolerance * length, max_iterations: 10_000 };
+                let stop = Stop { tolerance: tolerance * surface.diagonal(), max_iterations: 10_000 };
                 let mut scratch = f64::NAN;
                 for start in Start::ALL {
-                    let mut points = surface.clone();
-                    let mut control = Vec::new();
-                    interpolator.solve(points.positions(), &mut control, &stop);
-                    let mut seconds = f64::INFINITY;
-                    let mut iterations = 0;
-                    for frame in 0..FRAMES {
-                        let before = points.positions().to_vec();
-                        match motion {
-                            Motion::Wave => {
-                                for (p, at) in points.positions_mut().iter_mut().zip(surface.positions()) {
-                                    *p += part * edge * wave(*at / length, frame);
-                                }
-                            }
-                            Motion::Noise => move_vertices(&mut points, part, frame as u64),
-                        }
-                        let clock = Instant::now();
-                        let report = match start {
-                            Start::Scratch => {
-                                let tolerance = Tolerance::Absolute(stop.tolerance);
-                                interpolate(&points, scheme, &Options { tolerance, ..Options::default() })?.report
-                            }
-                            Start::Points => {
-                                control.copy_from_slice(points.positions());
-                                interpolator.solve(points.positions(), &mut control, &stop)
-                            }
-                            Start::Last => interpolator.solve(points.positions(), &mut control, &stop),
-                            Start::Moved => {
-                                let moved = points.positions().iter().zip(&before);
-                                control.iter_mut().zip(moved).for_each(|(v, (p, before))| *v += *p - *before);
-                                interpolator.solve(points.positions(), &mut control, &stop)
-                            }
-                        };
-                        seconds = seconds.min(clock.elapsed().as_secs_f64());
-                        iterations = report.iterations;
-                    }
+                    let moves = |frame| motion.steps(&surface, edge, part, frame);
+                    let (seconds, iterations) = fastest(&surface, scheme, &mut interpolator, start, &stop, moves)?;
                     if start == Start::Scratch {
                         scratch = seconds;
                     }
@@ -151,6 +117,57 @@ pub fn frames(name: &str, mesh: Mesh, scheme: Scheme, rows: &mut Vec<Row>) -> Re
         }
     }
     Ok(())
+}
+
+/// The seconds of the fastest of [`FRAMES`], whose points `moves` makes of the frames before, and the iterations of the last.
+fn fastest(
+    surface: &Surface,
+    scheme: Scheme,
+    interpolator: &mut Interpolator,
+    start: Start,
+    stop: &Stop,
+    moves: impl Fn(usize) -> Vec<DVec3>,
+) -> Result<(f64, usize)> {
+    let mut points = surface.clone();
+    let mut control = Vec::new();
+    interpolator.solve(points.positions(), &mut control, stop);
+    let (mut seconds, mut iterations) = (f64::INFINITY, 0);
+    for frame in 0..FRAMES {
+        let steps = moves(frame);
+        points.positions_mut().iter_mut().zip(&steps).for_each(|(p, step)| *p += *step);
+        let clock = Instant::now();
+        if start == Start::Points {
+            control.copy_from_slice(points.positions());
+        } else if start == Start::Moved {
+            control.iter_mut().zip(&steps).for_each(|(v, step)| *v += *step);
+        }
+        let report = if start == Start::Scratch {
+            interpolate(&points, scheme, &Options::from(*stop))?.report
+        } else {
+            interpolator.solve(points.positions(), &mut control, stop)
+        };
+        seconds = seconds.min(clock.elapsed().as_secs_f64());
+        iterations = report.iterations;
+    }
+    Ok((seconds, iterations))
+}
+
+impl Motion {
+    /// How each point moves from the frame before to this one, in parts of the mean edge.
+    fn steps(self, surface: &Surface, edge: f64, part: f64, frame: usize) -> Vec<DVec3> {
+        let at = surface.positions();
+        match self {
+            Motion::Wave => {
+                let length = surface.diagonal();
+                at.iter().map(|p| part * edge * wave(*p / length, frame)).collect()
+            }
+            Motion::Noise => {
+                let mut moved = surface.clone();
+                move_vertices(&mut moved, part, frame as u64);
+                moved.positions().iter().zip(at).map(|(p, at)| *p - *at).collect()
+            }
+        }
+    }
 }
 
 /// The movement of a place, in parts of the diagonal, from one frame to the next: a direction of length 1 at most.
