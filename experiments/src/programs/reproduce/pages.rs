@@ -102,27 +102,43 @@ pub fn write_index(root: &Path, folder: &Path, items: &[Item], provenance: &Prov
         sections.push(section);
     }
     if folder == root {
-        sections.extend(scaling(folder, &files)?);
+        sections.extend(measured(folder, &files)?);
     }
     let page = index::index("Reports", &introduction(root, folder, &files)?, &sections);
     write_page(&folder.join(INDEX), &linked(&page), provenance)
 }
 
-/// The section on what the program `scaling` wrote.
-fn scaling(folder: &Path, files: &[String]) -> Result<Option<Section>> {
-    let own = || files.iter().filter(|file| file.starts_with("scaling"));
-    let pages = own().filter(|file| file.ends_with(".md"));
-    let tables: Vec<Link> =
-        pages.map(|file| Ok(Link { text: heading(&folder.join(file))?, file: file.clone() })).collect::<Result<_>>()?;
+/// The sections on what a clock measured, by other programs than this: files that begin with a stem.
+fn measured(folder: &Path, files: &[String]) -> Result<Vec<Section>> {
     let large = if folder.join("ten-million").is_dir() { "; [ten million vertices](ten-million)" } else { "" };
-    let pictures = own().filter(|file| file.ends_with(".png"));
-    let pictures = pictures.map(|file| Link { text: "Time and memory over growing meshes".into(), file: file.clone() });
-    Ok((!tables.is_empty()).then(|| Section {
-        question: "How do time and memory grow with the mesh?".into(),
-        answer: format!("As the program `scaling` measured them on one machine{large}."),
-        tables,
-        pictures: pictures.collect(),
-    }))
+    let all = [
+        (
+            "scaling",
+            "How do time and memory grow with the mesh?",
+            format!("As the program `scaling` measured them on one machine{large}."),
+            "Time and memory over growing meshes",
+        ),
+        (
+            "peers",
+            "How do other libraries do on the same system?",
+            "As `benches/peers` measured them on one machine, in turn; every error is measured here.".into(),
+            "Time and memory of limitlab and of other libraries",
+        ),
+    ];
+    let mut sections = Vec::new();
+    for (stem, question, answer, alt) in all {
+        let own = || files.iter().filter(|file| file.starts_with(stem));
+        let pages = own().filter(|file| file.ends_with(".md"));
+        let tables: Vec<Link> = pages
+            .map(|file| Ok(Link { text: heading(&folder.join(file))?, file: file.clone() }))
+            .collect::<Result<_>>()?;
+        let pictures = own().filter(|file| file.ends_with(".png"));
+        let pictures = pictures.map(|file| Link { text: alt.into(), file: file.clone() }).collect();
+        if !tables.is_empty() {
+            sections.push(Section { question: question.into(), answer, tables, pictures });
+        }
+    }
+    Ok(sections)
 }
 
 /// Findings, claims by verdict, and what else there is.
