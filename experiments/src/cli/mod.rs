@@ -237,6 +237,14 @@ impl OutputFlags {
     }
 }
 
+/// A `value_parser`: a file to write, which is never standard output.
+pub fn file(name: &str) -> std::result::Result<PathBuf, String> {
+    match name == STANDARD_STREAM {
+        true => Err("a file is needed: only results in text go to standard output (a file of this name is ./-)".into()),
+        false => Ok(name.into()),
+    }
+}
+
 /// A `value_parser`: a positive, finite number.
 pub fn positive(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {

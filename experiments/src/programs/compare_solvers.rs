@@ -63,7 +63,7 @@ pub struct Arguments {
     errors_at: Option<List<usize>>,
     /// Write an interactive page of one mesh or folder to this file too: curves of convergence, an ω sweep, the spectrum, the
     /// surfaces with the errors of every method; it needs a browser and no network
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = cli::file)]
     html: Option<PathBuf>,
     #[command(flatten)]
     mesh: MeshFlags,
@@ -115,6 +115,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
             return Err(Error::mesh(name, what));
         }
         let Compared { rows, refused, measured, error_maps } = compare(&problem, &arguments.wanted())?;
+        arguments.output.settle(error_maps.iter().flatten().map(|maps| maps.id(&stem)))?;
         let about = format!(
             "{}; start V = P; stop at max_i ‖p_i − (A v)_i‖ ≤ {:.3e} ({}).",
             problem.subject.size,

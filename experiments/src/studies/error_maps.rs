@@ -74,12 +74,18 @@ pub fn measure(problem: &Problem, system: &impl System, row: &MethodRow, at: &[u
 }
 
 impl ErrorMaps {
+    /// What its files are called.
+    pub fn id(&self, stem: &str) -> String {
+        format!("{stem}-errors-{}", self.label.replace(' ', "-"))
+    }
+
     /// Writes `STEM-errors-METHOD.ply` and a picture; gives the JSON object about them.
     ///
     /// # Errors
     /// If a file cannot be written.
     pub fn write(self, problem: &Problem, stem: &str, output: &OutputFlags, made: &Provenance) -> Result<Value> {
         let Some(mesh) = problem.file_mesh() else { return Ok(Value::Null) };
+        let id = self.id(stem);
         let ErrorMaps { label, maps } = self;
         let iterations: Vec<usize> = maps.iter().map(|(k, _)| *k).collect();
         // Errors that have diverged beyond all numbers take the last colour.
@@ -89,8 +95,6 @@ impl ErrorMaps {
         let scalars = maps.into_iter().map(|(k, values)| Scalars { name: format!("error_{k}"), values }).collect();
         let maps =
             Maps { mesh: &mesh, scalars, units, scale: ColourScale::logarithmic("error / largest", (LEAST, 1.0)) };
-        let id = format!("{stem}-errors-{}", label.replace(' ', "-"));
-        output.settle([&id])?;
         let file = output.out.join(format!("{id}.ply"));
         maps.write_ply(&file, iterations.len() - 1, made)?;
         let all = iterations.len();

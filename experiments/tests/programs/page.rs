@@ -236,3 +236,14 @@ fn reproduce_writes_the_page_of_the_horse() {
     }
     assert!(by_reproduce == compared);
 }
+
+#[test]
+fn a_page_is_a_file() {
+    let folder = tempdir().unwrap();
+    for program in [COMPARE, REPRODUCE] {
+        let output = run(program, folder.path(), ["--html", "-"]);
+        assert_eq!(output.status.code(), Some(2));
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(error.contains("a file is needed") && below(folder.path()).is_empty(), "{error}");
+    }
+}

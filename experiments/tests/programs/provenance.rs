@@ -235,6 +235,14 @@ fn no_clobber_refuses_before_the_work() {
     // A table of another mesh whose name ends alike is not in the way.
     let other = ["prism:4", "--method", "pia", "--out", "c", "--no-clobber", "--quiet"];
     assert_done(&run(COMPARE, folder.path(), other), "another mesh");
+    // Maps of errors, whose names are known by what was compared, are refused before anything is written.
+    fs::write(folder.path().join("compare-solvers-octahedron-loop-errors-pia.ply"), "mine").unwrap();
+    let maps = ["octahedron", "--scheme", "loop", "--method", "pia", "--errors-at", "1", "--out", ".", "--no-clobber"];
+    let error = assert_refused(&run(COMPARE, folder.path(), maps), "maps");
+    assert!(
+        error.contains("errors-pia.ply") && !folder.path().join("compare-solvers-octahedron-loop.csv").exists(),
+        "{error}"
+    );
     let both = run(INTERPOLATE, folder.path(), ["cube", "-o", "x.off", "--no-clobber", "--force"]);
     assert_eq!(both.status.code(), Some(2));
 }

@@ -71,7 +71,7 @@ pub struct Arguments {
     quick: bool,
     /// Write an interactive page too, of every method on the horse or on what stands in for it; it needs a browser and no
     /// network
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = cli::file)]
     html: Option<PathBuf>,
     /// Write the tables of wall-clock times too (ID--times), which differ from run to run
     #[arg(long)]
@@ -89,7 +89,7 @@ pub struct Arguments {
 }
 
 /// All items, in the order in which they run.
-const ITEMS: [Item; 18] = [
+const ITEMS: [Item; 19] = [
     pia::TABLE1,
     thall::ITERATIONS,
     zheng_cai::SECTION_3_5,
@@ -108,6 +108,7 @@ const ITEMS: [Item; 18] = [
     figures::ALL,
     claims::LEDGER,
     claims::FINDINGS,
+    claims::PAPER,
 ];
 
 /// Runs the program.

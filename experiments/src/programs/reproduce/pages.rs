@@ -10,7 +10,7 @@ use crate::report::{Provenance, Table};
 use limitlab::Result;
 use limitlab::error::Error;
 
-use crate::programs::reproduce::claims::{self, FINDINGS, LEDGER, Tally, links::linked};
+use crate::programs::reproduce::claims::{self, FINDINGS, LEDGER, PAPER, Tally, links::linked};
 use crate::programs::reproduce::context::{BUILT_IN, Item};
 
 /// The index of a folder.
@@ -153,6 +153,10 @@ fn introduction(root: &Path, folder: &Path, files: &[String]) -> Result<String> 
             None => title.into(),
         };
         parts.push(claims::findings::headings().map(line).collect::<Vec<_>>().join("\n"));
+    }
+    let paper = format!("{}.md", PAPER.id);
+    if there(&paper) {
+        parts.push(format!("All of it in the form of a short paper: [{}]({paper}).", PAPER.title));
     }
     let ledger = folder.join(format!("{}.csv", LEDGER.id));
     if ledger.is_file() {

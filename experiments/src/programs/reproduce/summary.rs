@@ -12,7 +12,11 @@ pub fn screen(context: &Context, made: &Made) -> String {
         format!("The papers' claims, {} of them ({}):\n", context.ledger.len(), folder.join("claims.md").display());
     text.push_str(&claims::verdicts(&context.ledger));
     if context.quick {
-        let _ = writeln!(text, "A quick run leaves out {}, and the page of findings.", claims::left_out().join(", "));
+        let _ = writeln!(
+            text,
+            "A quick run leaves out {}, and the pages of words that quote them.",
+            claims::left_out().join(", ")
+        );
     } else {
         let _ = writeln!(text, "\nWhat they left open or state wrongly ({}):", folder.join("findings.md").display());
         for heading in claims::findings::headings() {

@@ -42,8 +42,8 @@ const EXAMPLES: [&str; 1] = ["scaling --sizes 1000,10000,100000 --profile 0 --ga
 ///
 /// Runs go from faces in memory to control points, and everything is counted.
 ///
-/// As it stands this takes about twenty minutes on two cores, most of them for Cholesky and incomplete Cholesky of a million
-/// vertices, and 5 GB of memory; --sizes 1000,10000,100000 --profile 0 --gains 0 --frames 0 --steps 0 takes one. Each row is said on standard
+/// As it stands this takes a quarter of an hour on two cores, most of it for Cholesky and incomplete Cholesky of a million
+/// vertices, and 5 GB of memory; --sizes 1000,10000,100000 --profile 0 --gains 0 --frames 0 --steps 0 takes one minute. Each row is said on standard
 /// error and written as soon as it is measured, and what is there stays when the program is stopped.
 #[derive(Parser)]
 #[command(name = "scaling", version = cli::VERSION, after_help = cli::ending(&EXAMPLES, cli::DONE, None))]

@@ -1,25 +1,26 @@
-//! The page of findings: what the papers left open or state wrongly, with proofs in a few lines and the ledger's
-//! numbers in them.
+//! The page of findings, what the papers left open or state wrongly, with proofs in a few lines, and the report in the form
+//! of a paper that sums them up: pages with the ledger's numbers in them.
 
 use limitlab::Result;
 use limitlab::error::Error;
 
 use super::{Record, in_prose};
 
-/// The page. `{{ID}}` stands for the verdict of a claim, `{{ID|start of a quantity}}` for a number of it.
-const PAGE: &str = include_str!("findings.md");
+/// In these texts `{{ID}}` stands for the verdict of a claim, `{{ID|start of a quantity}}` for a number of it.
+pub const FINDINGS: &str = include_str!("findings.md");
+pub const PAPER: &str = include_str!("paper.md");
 
 /// The findings, a numbered line each.
 pub fn headings() -> impl Iterator<Item = &'static str> {
-    PAGE.lines().filter_map(|line| line.strip_prefix("## "))
+    FINDINGS.lines().filter_map(|line| line.strip_prefix("## "))
 }
 
-/// The page with the ledger's numbers.
+/// A text with the ledger's numbers.
 ///
 /// # Errors
 /// A placeholder that names no claim or number of the ledger.
-pub fn page(note_on_meshes: &str, records: &[Record]) -> Result<String> {
-    Ok(fill(PAGE, records)?.replace("(meshes)", note_on_meshes))
+pub fn page(text: &str, note_on_meshes: &str, records: &[Record]) -> Result<String> {
+    Ok(fill(text, records)?.replace("(meshes)", note_on_meshes))
 }
 
 fn fill(text: &str, records: &[Record]) -> Result<String> {
@@ -49,7 +50,7 @@ fn look_up(name: &str, records: &[Record]) -> Result<String> {
             exact.or_else(start).map(|e| in_prose(e.value))
         }
     };
-    found.ok_or_else(|| Error::Computation(format!("the page of findings quotes {name}, which is not in the ledger")))
+    found.ok_or_else(|| Error::Computation(format!("a page quotes {name}, which is not in the ledger")))
 }
 
 #[cfg(test)]
@@ -77,10 +78,20 @@ mod tests {
     }
 
     #[test]
-    fn the_page_names_claims_that_exist() {
-        for part in PAGE.split("{{").skip(1) {
+    fn the_pages_name_claims_that_exist() {
+        for part in [FINDINGS, PAPER].iter().flat_map(|text| text.split("{{").skip(1)) {
             let name = part.split(['}', '|']).next().unwrap();
             assert!(find(name).is_some(), "{name}");
+        }
+    }
+
+    #[test]
+    fn the_paper_has_a_row_for_every_finding() {
+        let rows: Vec<_> = PAPER.lines().filter_map(|line| line.strip_prefix("| [")?.split_once(']')).collect();
+        for heading in headings() {
+            let (number, _) = heading.split_once(". ").unwrap();
+            let place = format!("(findings.md#{})", crate::report::index::anchor(heading));
+            assert!(rows.iter().any(|(n, rest)| *n == number && rest.starts_with(&place)), "{number}: {place}");
         }
     }
 

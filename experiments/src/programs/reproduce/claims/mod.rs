@@ -51,7 +51,14 @@ pub const FINDINGS: Item = Item {
     id: "findings",
     title: "Findings: what the papers left open or state wrongly",
     question: None,
-    run: run_findings,
+    run: |context| run_page(context, "findings.md", findings::FINDINGS),
+};
+
+pub const PAPER: Item = Item {
+    id: "paper",
+    title: "Interpolating subdivision surfaces: what the systems of four papers do",
+    question: None,
+    run: |context| run_page(context, "paper.md", findings::PAPER),
 };
 
 /// A statement of a paper.
@@ -127,17 +134,17 @@ fn run_ledger(context: &mut Context) -> Result<()> {
     Ok(())
 }
 
-fn run_findings(context: &mut Context) -> Result<()> {
+fn run_page(context: &mut Context, file: &str, text: &str) -> Result<()> {
     if context.quick {
-        // The page quotes claims that a quick run leaves out.
+        // Such a page quotes claims that a quick run leaves out.
         return Ok(());
     }
     if context.ledger.is_empty() {
         context.ledger = compute(context, all())?;
     }
-    let page = findings::page(&context.note_on_meshes(), &context.ledger)?;
+    let page = findings::page(text, &context.note_on_meshes(), &context.ledger)?;
     let written = pages::of_words(&page, &[]);
-    write_page(&context.folder().join("findings.md"), &written, &context.provenance())?;
+    write_page(&context.folder().join(file), &written, &context.provenance())?;
     context.made.pages += 1;
     context.printer.page(&page)
 }
