@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::memory::require;
 use crate::mesh::incidence::{next_in, prev_in, split_rows};
+use crate::mesh::numbering::{Numbering, add_up, rows_back};
 use crate::mesh::{Faces, Surface, Topology};
 use crate::pages::large;
 use crate::parallel;
@@ -60,6 +61,8 @@ pub(super) struct Gather<'a> {
     valence: &'a [u32],
     /// Every side at a vertex that has a row of its own has a twin.
     closed: bool,
+    /// Where the faces are in another order than the rows, which are wanted in that of the file: the way to it.
+    numbering: Option<&'a Numbering>,
 }
 
 /// All rows of M and A.
@@ -203,20 +206,26 @@ fn close_gaps(offsets: &mut [u32], lengths: &[u32], mut shift: impl FnMut(Range<
 }
 
 impl<'a> Gather<'a> {
+    /// Valences are those of the faces that the rows are made from: as they are [renumbered](Surface::renumbered) inside, if
+    /// they are.
     pub(super) fn new(
         surface: &'a Surface,
         blocks: &'a FaceBlocks,
         by_valence: &'a [[f64; 2]],
         valence: &'a [u32],
     ) -> Self {
-        Gather {
-            faces: surface.faces(),
-            topology: surface.topology(),
-            blocks,
-            by_valence,
-            valence,
-            closed: surface.is_closed() || surface.features().is_some(),
-        }
+        let (faces, topology, numbering) = match surface.renumbered() {
+            Some(inside) => (&inside.faces, inside.topology(), Some(&inside.numbering)),
+            None => (surface.faces(), surface.topology(), None),
+        };
+        let closed = surface.is_closed() || surface.features().is_some();
+        Gather { faces, topology, blocks, by_valence, valence, closed, numbering }
+    }
+
+    /// The column of vertex `v`.
+    #[inline]
+    fn column(&self, v: u32) -> u32 {
+        self.numbering.map_or(v, |numbering| numbering.order()[v as usize])
     }
 
     /// All rows.
@@ -232,8 +241,9 @@ impl<'a> Gather<'a> {
                 advice: "use a smaller mesh or one without very large faces",
             });
         }
-        // A column and a value of M and of A each, and numbers for every row.
-        let bytes = total * 20 + lengths.len() as u64 * 24;
+        // A column and a value of M and of A each, and numbers for every row. To be put in order, the first two twice.
+        let each = if self.numbering.is_some() { 32 } else { 20 };
+        let bytes = total * each + lengths.len() as u64 * 24;
         let what = || format!("the matrix with {total} entries");
         require(
             bytes,
@@ -249,16 +259,21 @@ impl<'a> Gather<'a> {
         }
         let mut columns = large(vec![0u32; end as usize]);
         let mut m = large(vec![0.0; end as usize]);
-        let mut a = large(vec![0.0; end as usize]);
+        // Rows that will be put in order have their part of A then.
+        let mut a = if self.numbering.is_some() { Vec::new() } else { large(vec![0.0; end as usize]) };
         let mut diagonal = large(vec![0.0; lengths.len()]);
+        let a_parts: Vec<&mut [f64]> = match self.numbering {
+            Some(_) => (0..lengths.len()).step_by(CHUNK).map(|_| Default::default()).collect(),
+            None => split_rows(&offsets, CHUNK, &mut a).into_iter().map(|(_, a)| a).collect(),
+        };
         let parts = split_rows(&offsets, CHUNK, &mut columns)
             .into_par_iter()
             .zip(split_rows(&offsets, CHUNK, &mut m))
-            .zip(split_rows(&offsets, CHUNK, &mut a))
+            .zip(a_parts)
             .zip(diagonal.par_chunks_mut(CHUNK))
             .zip(lengths.par_chunks_mut(CHUNK));
         parts.for_each_init(Row::default, |row, parts| {
-            let (((((rows, columns), (_, m)), (_, a)), diagonal), lengths) = parts;
+            let (((((rows, columns), (_, m)), a), diagonal), lengths) = parts;
             let first = offsets[rows.start] as usize;
             for ((v, diagonal), length) in rows.zip(diagonal).zip(lengths) {
                 self.row(v, row);
@@ -269,12 +284,15 @@ impl<'a> Gather<'a> {
                 assert!(row.columns.len() <= *length as usize, "the longest rows of a manifold");
                 columns[range.clone()].copy_from_slice(&row.columns);
                 m[range.clone()].copy_from_slice(&row.values);
-                for (a, m) in a[range].iter_mut().zip(&row.values) {
+                for (a, m) in a.get_mut(range).unwrap_or_default().iter_mut().zip(&row.values) {
                     *a = h * m;
                 }
                 *length = row.columns.len() as u32;
             }
         });
+        if let Some(numbering) = self.numbering {
+            return Ok(self.in_file_order(numbering, (&offsets, &lengths), columns, m, &diagonal));
+        }
         let filled = close_gaps(&mut offsets, &lengths, |from, to| {
             columns.copy_within(from.clone(), to);
             m.copy_within(from.clone(), to);
@@ -284,6 +302,38 @@ impl<'a> Gather<'a> {
         m.truncate(filled);
         a.truncate(filled);
         Ok(Arrays { offsets, columns, m, a, diagonal })
+    }
+
+    /// The rows in the order of the file; `starts` and `lengths` tell where they are.
+    fn in_file_order(
+        &self,
+        numbering: &Numbering,
+        (starts, lengths): (&[u32], &[u32]),
+        columns: Vec<u32>,
+        m: Vec<f64>,
+        diagonal: &[f64],
+    ) -> Arrays {
+        let place = numbering.place();
+        let mut offsets = large(vec![0; place.len() + 1]);
+        parallel::fill(&mut offsets[1..], |v| lengths[place[v] as usize]);
+        add_up(&mut offsets);
+        let moved = rows_back(numbering, &columns, starts, &offsets);
+        drop(columns);
+        let columns = moved;
+        let moved = rows_back(numbering, &m, starts, &offsets);
+        drop(m);
+        let m = moved;
+        let mut a = large(vec![0.0; m.len()]);
+        parallel::parts(split_rows(&offsets, CHUNK, &mut a), |rows, mut part| {
+            for v in rows {
+                let h = self.by_valence[self.valence[place[v] as usize] as usize][0];
+                let m = &m[offsets[v] as usize..offsets[v + 1] as usize];
+                let (row, rest) = part.split_at_mut(m.len());
+                row.iter_mut().zip(m).for_each(|(a, m)| *a = h * m);
+                part = rest;
+            }
+        });
+        Arrays { offsets, columns, m, a, diagonal: numbering.back(diagonal) }
     }
 
     /// The greatest length of every row on a manifold, attained where faces share an edge or a vertex at most.
@@ -325,15 +375,15 @@ impl<'a> Gather<'a> {
             // Both halves of the edge that leaves; the one that enters leaves in another face.
             let (across, _) = block_at(twins[c as usize]);
             let mut other = next_in(&range, c);
-            short.add(corners[other as usize], block[1] + across[across.len() - 1]);
+            short.add(self.column(corners[other as usize]), block[1] + across[across.len() - 1]);
             if !blocks.sides_only {
                 for &weight in &block[2..block.len() - 1] {
                     other = next_in(&range, other);
-                    short.add(corners[other as usize], weight);
+                    short.add(self.column(corners[other as usize]), weight);
                 }
             }
         }
-        short.add(v as u32, own);
+        short.add(self.column(v as u32), own);
         let sorted = short.sort_into(&mut row.columns, &mut row.values);
         row.own = sorted.unwrap_or(0);
         sorted.is_some()
@@ -342,7 +392,7 @@ impl<'a> Gather<'a> {
     /// Row `v` of M.
     fn row(&self, v: usize, row: &mut Row) {
         if self.valence[v] == 0 {
-            return row.unit(v, self.by_valence[0][1]);
+            return row.unit(self.column(v as u32) as usize, self.by_valence[0][1]);
         }
         if self.closed && self.usual_row(v, row) {
             return;
@@ -359,39 +409,42 @@ impl<'a> Gather<'a> {
             own += block[0];
             let (next, prev) = (next_in(&range, c), prev_in(&range, c));
             if blocks.sides_only {
-                row.add(corners[next as usize], block[1]);
-                row.add(corners[prev as usize], block[range.len() - 1]);
+                row.add(self.column(corners[next as usize]), block[1]);
+                row.add(self.column(corners[prev as usize]), block[range.len() - 1]);
             } else {
                 let place = c as usize - range.start;
                 let face = &corners[range];
                 for (&w, &weight) in face[place + 1..].iter().zip(&block[1..]) {
-                    row.add(w, weight);
+                    row.add(self.column(w), weight);
                 }
                 for (&w, &weight) in face[..place].iter().zip(&block[block.len() - place..]) {
-                    row.add(w, weight);
+                    row.add(self.column(w), weight);
                 }
             }
             if has_boundary {
                 // A side without a face across it brings the edge's other half itself.
                 for (side, end) in [(c, next), (prev, prev)] {
                     if topology.twin(side).is_none() {
-                        row.add(corners[end as usize], blocks.half_edge);
+                        row.add(self.column(corners[end as usize]), blocks.half_edge);
                     }
                 }
             }
         }
-        row.add(v as u32, own);
-        row.sum(v);
+        let column = self.column(v as u32);
+        row.add(column, own);
+        row.sum(column as usize);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assemble::system::valences;
+    use crate::assemble::stages::free;
+    use crate::assemble::system::{rows_of, valences};
     use crate::mesh::Mesh;
     use crate::mesh::builtin::builtin;
-    use crate::mesh::random::{random_polygons, random_triangulation};
+    use crate::mesh::features::Tags;
+    use crate::mesh::random::{random_creased, random_polygons, random_triangulation};
     use crate::schemes::{Masks, Scheme};
 
     /// How many rows of M are made the usual way, after comparing them with those made the general way.
@@ -440,6 +493,32 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn rows_made_in_another_order_are_those_of_the_file_to_the_last_bit() {
+        let mut meshes = 0;
+        for seed in 0..20 {
+            for closed in [random_polygons(seed), random_triangulation(seed)] {
+                let whole = (Surface::new(closed.clone()).unwrap(), Tags::default());
+                for (surface, tags) in std::iter::once(whole).chain(random_creased(&closed, seed)) {
+                    let inside = Surface::scattered(surface.mesh().clone(), tags.boundary);
+                    let inside = if tags == Tags::default() { inside } else { inside.tagged(&tags).unwrap() };
+                    assert!(inside.renumbered().is_some());
+                    let free = free(&surface, None).unwrap();
+                    let suits = |scheme: &Scheme| scheme.first_unsuitable_face(surface.faces()).is_none();
+                    for scheme in Scheme::ALL.into_iter().filter(suits) {
+                        let [expected, found] =
+                            [&surface, &inside].map(|surface| rows_of(surface, &scheme, free.as_deref()).unwrap());
+                        let what = format!("{scheme}, seed {seed}, {} vertices", surface.len());
+                        assert!(found.m == expected.m && found.a == expected.a, "{what}");
+                        assert!(found.h == expected.h && found.diagonal == expected.diagonal, "{what}");
+                    }
+                    meshes += 1;
+                }
+            }
+        }
+        assert!(meshes > 50);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::bounds::SpectralBounds;
 use super::csr::{Csr, Pattern};
 use super::gather::{FaceBlocks, Gather};
 use crate::error::{Error, Result};
-use crate::mesh::Surface;
+use crate::mesh::{Incidence, Surface};
 use crate::parallel;
 use crate::schemes::{Masks, Scheme};
 
@@ -112,7 +112,8 @@ pub(super) fn rows_of(surface: &Surface, masks: &impl Masks, free: Option<&[bool
     let weights = |n: usize| if n == 0 { [1.0, 1.0] } else { [masks.h(n), masks.vertex_weight(n)] };
     let by_valence: Vec<[f64; 2]> = (0..=largest).map(weights).collect();
     let blocks = FaceBlocks::new(surface.faces(), masks);
-    let rows = Gather::new(surface, &blocks, &by_valence, &valence);
+    let near = surface.renumbered().map(|inside| inside.numbering.there(&valence));
+    let rows = Gather::new(surface, &blocks, &by_valence, near.as_deref().unwrap_or(&valence));
     let arrays = rows.arrays()?;
     let h = parallel::collect(valence.len(), |v| by_valence[valence[v] as usize][0]);
     let pattern = Arc::new(Pattern::new(arrays.offsets, arrays.columns));
@@ -146,11 +147,12 @@ pub(super) fn check(surface: &Surface, scheme: Scheme) -> Result<()> {
 
 /// The number of edges at every smooth vertex: the valence n of the masks, on a boundary that is treated as interior too.
 pub fn valences(surface: &Surface) -> Vec<u32> {
-    parallel::collect(surface.len(), |v| {
-        if surface.is_closed() || surface.features().is_some() {
-            surface.incidence().face_count(v) as u32
-        } else {
-            surface.topology().edge_valence(surface.faces(), v) as u32
+    let by_faces = |incidence: &Incidence| parallel::collect(incidence.vertices(), |v| incidence.face_count(v) as u32);
+    match surface.renumbered() {
+        _ if !surface.is_closed() && surface.features().is_none() => {
+            parallel::collect(surface.len(), |v| surface.topology().edge_valence(surface.faces(), v) as u32)
         }
-    })
+        Some(inside) => inside.numbering.back(&by_faces(&inside.incidence)),
+        None => by_faces(surface.incidence()),
+    }
 }

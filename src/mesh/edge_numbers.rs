@@ -2,37 +2,32 @@
 
 use crate::parallel;
 
-/// The edges of a manifold, numbered by their first half-edges: the order of
-/// [`Topology::edge_sides`](super::Topology::edge_sides). A number comes from a bit and half a bit of counts a half-edge,
-/// few enough to stay in a cache, instead of from a table.
-pub(crate) struct EdgeNumbers<'a> {
-    twins: &'a [u32],
+/// Which half-edges are the first of their edges, and the edges in the order of these: a bit and half a bit of counts a
+/// half-edge, few enough to stay in a cache.
+pub(crate) struct FirstSides {
     /// For every 64 half-edges: which are first, and how many before them are.
     words: Vec<(u64, u32)>,
     edges: u32,
 }
 
-impl<'a> EdgeNumbers<'a> {
-    /// From the opposite of every half-edge, [`NONE`](super::topology::NONE), the greatest number, on a boundary.
-    pub(super) fn new(twins: &'a [u32]) -> Self {
-        let mut words: Vec<(u64, u32)> = parallel::collect(twins.len().div_ceil(64), |k| {
-            let mut bits = 0;
-            for (i, (c, &t)) in (64 * k as u32..).zip(twins[64 * k..].iter().take(64)).enumerate() {
-                bits |= u64::from(c <= t) << i;
-            }
+impl FirstSides {
+    /// Of `count` half-edges.
+    pub(super) fn new(count: usize, is_first: impl Fn(u32) -> bool + Sync) -> Self {
+        let mut words: Vec<(u64, u32)> = parallel::collect(count.div_ceil(64), |k| {
+            let sides = 64 * k as u32..count.min(64 * (k + 1)) as u32;
+            let bits = sides.enumerate().fold(0, |bits, (i, c)| bits | u64::from(is_first(c)) << i);
             (bits, bits.count_ones())
         });
         let mut before = 0;
         for (_, count) in &mut words {
             before += std::mem::replace(count, before);
         }
-        EdgeNumbers { twins, words, edges: before }
+        FirstSides { words, edges: before }
     }
 
-    /// The edge of half-edge `c`.
+    /// The number of the edge whose first half-edge is `first`.
     #[inline]
-    pub(crate) fn of(&self, c: u32) -> u32 {
-        let first = c.min(self.twins[c as usize]);
+    pub(crate) fn edge(&self, first: u32) -> u32 {
         let (bits, before) = self.words[first as usize / 64];
         before + (bits & !(u64::MAX << (first % 64))).count_ones()
     }
@@ -50,6 +45,41 @@ impl<'a> EdgeNumbers<'a> {
             let value = &value;
             move |_| value(firsts.next().expect("as many first half-edges as edges"))
         });
+    }
+}
+
+/// The edges of a manifold, numbered by their first half-edges: the order of
+/// [`Topology::edge_sides`](super::Topology::edge_sides). A number comes from these bits instead of from a table.
+pub(crate) struct EdgeNumbers<'a> {
+    twins: &'a [u32],
+    firsts: FirstSides,
+}
+
+impl<'a> EdgeNumbers<'a> {
+    /// From the opposite of every half-edge, [`NONE`](super::topology::NONE), the greatest number, on a boundary.
+    pub(super) fn new(twins: &'a [u32]) -> Self {
+        EdgeNumbers { twins, firsts: FirstSides::new(twins.len(), |c| c <= twins[c as usize]) }
+    }
+
+    /// The edge of half-edge `c`.
+    #[inline]
+    pub(crate) fn of(&self, c: u32) -> u32 {
+        self.firsts.edge(c.min(self.twins[c as usize]))
+    }
+
+    /// The first half-edge of every edge.
+    pub(crate) fn firsts(&self) -> &FirstSides {
+        &self.firsts
+    }
+
+    /// The first half-edges of the edges from number `edge` on, ascending.
+    pub(crate) fn firsts_from(&self, edge: u32) -> impl Iterator<Item = u32> {
+        self.firsts.firsts_from(edge)
+    }
+
+    /// Appends to `values` what `value` makes of the first half-edge of every edge.
+    pub(crate) fn extend<T: Send>(&self, values: &mut Vec<T>, value: impl Fn(u32) -> T + Sync) {
+        self.firsts.extend(values, value);
     }
 }
 

@@ -51,43 +51,13 @@ impl FaceOf {
 }
 
 impl Incidence {
-    /// A counting sort of the corners by vertex, in parallel: O(corners), stable. Each thread reads all corners and
-    /// sorts those of its own vertices.
+    /// A counting sort of the corners by vertex, in parallel: O(corners), stable.
     ///
     /// # Panics
     /// If a corner names a vertex ≥ `vertices` (the validator reports such faces before).
     pub fn new(faces: &Faces, vertices: usize) -> Self {
-        /// Beyond these many threads, reading the corners outweighs sorting them.
-        const MOST_PARTS: usize = 8;
-        let corners = faces.corners();
-        let parts = rayon::current_num_threads().min(MOST_PARTS);
-        let share = vertices.div_ceil(parts).max(CHUNK);
-        let mut offsets = large(vec![0u32; vertices + 1]);
-        parallel::chunks(&mut offsets[1..], share, |first, counts| {
-            let first = first as u32;
-            for &v in corners {
-                if let Some(count) = counts.get_mut(v.wrapping_sub(first) as usize) {
-                    *count += 1;
-                }
-            }
-        });
-        for v in 0..vertices {
-            offsets[v + 1] += offsets[v];
-        }
-        assert!(offsets[vertices] as usize == corners.len(), "every corner names a vertex");
-        let mut sorted = large(vec![0u32; corners.len()]);
-        parallel::parts(split_rows(&offsets, share, &mut sorted), |rows, sorted| {
-            let base = offsets[rows.start];
-            let mut next: Vec<u32> = offsets[rows.clone()].iter().map(|&o| o - base).collect();
-            let first = rows.start as u32;
-            for (&v, c) in corners.iter().zip(0..) {
-                if let Some(slot) = next.get_mut(v.wrapping_sub(first) as usize) {
-                    sorted[*slot as usize] = c;
-                    *slot += 1;
-                }
-            }
-        });
-        Incidence::from_parts(offsets, sorted, faces)
+        let (offsets, corners) = sorted_by(faces.corners(), vertices);
+        Incidence::from_parts(offsets, corners, faces)
     }
 
     /// From its arrays.
@@ -249,6 +219,44 @@ impl Incidence {
             _ => each_once::<FEW>(v, sides),
         }
     }
+}
+
+/// A counting sort: where the numbers k of each key `keys[k]` start, and the end; and these numbers, ascending for each key.
+/// In parallel: each thread reads all keys and sorts those in a range of its own. O(keys + end).
+///
+/// # Panics
+/// If a key is `end` or greater.
+pub(super) fn sorted_by(keys: &[u32], end: usize) -> (Vec<u32>, Vec<u32>) {
+    /// Beyond these many threads, reading the keys outweighs sorting them.
+    const MOST_PARTS: usize = 8;
+    let parts = rayon::current_num_threads().min(MOST_PARTS);
+    let share = end.div_ceil(parts).max(CHUNK);
+    let mut offsets = large(vec![0u32; end + 1]);
+    parallel::chunks(&mut offsets[1..], share, |first, counts| {
+        let first = first as u32;
+        for &key in keys {
+            if let Some(count) = counts.get_mut(key.wrapping_sub(first) as usize) {
+                *count += 1;
+            }
+        }
+    });
+    for key in 0..end {
+        offsets[key + 1] += offsets[key];
+    }
+    assert!(offsets[end] as usize == keys.len(), "every key is below the end");
+    let mut sorted = large(vec![0u32; keys.len()]);
+    parallel::parts(split_rows(&offsets, share, &mut sorted), |rows, sorted| {
+        let base = offsets[rows.start];
+        let mut next: Vec<u32> = offsets[rows.clone()].iter().map(|&o| o - base).collect();
+        let first = rows.start as u32;
+        for (&key, k) in keys.iter().zip(0..) {
+            if let Some(slot) = next.get_mut(key.wrapping_sub(first) as usize) {
+                sorted[*slot as usize] = k;
+                *slot += 1;
+            }
+        }
+    });
+    (offsets, sorted)
 }
 
 /// Whether the vertices where sides leave `v` for are the ones that sides enter it from, no two the same and none `v`,

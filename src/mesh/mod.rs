@@ -19,7 +19,7 @@ pub mod incidence;
 pub mod io;
 pub(crate) mod magic;
 pub mod noise;
-mod numbering;
+pub(crate) mod numbering;
 pub mod obj;
 mod obj_normals;
 pub mod off;
@@ -27,6 +27,7 @@ pub mod order;
 pub mod origin;
 pub mod ply;
 pub mod random;
+pub(crate) mod renumbered;
 pub mod repair;
 pub mod space_filling;
 pub mod stl;
@@ -39,8 +40,10 @@ pub mod weld;
 
 use std::sync::OnceLock;
 
+use crate::pages::filled;
 use crate::parallel;
 use glam::DVec3;
+use incidence::split_rows;
 
 pub use incidence::Incidence;
 pub use surface::Surface;
@@ -214,6 +217,55 @@ impl Faces {
     /// The vertex of every corner, to renumber vertices in place; the sizes of faces stay.
     pub fn corners_mut(&mut self) -> &mut [u32] {
         &mut self.corners
+    }
+
+    /// The faces in another order, the k-th of them face `order[k]`, with the vertices that `corners` has in place of this
+    /// one's. In parallel.
+    ///
+    /// # Panics
+    /// If `order` names a face that does not exist, or there is not one vertex a corner.
+    pub(crate) fn in_order(&self, order: &[u32], corners: &[u32]) -> Faces {
+        assert_eq!(corners.len(), self.corners.len(), "one vertex a corner");
+        let gathered = self.rows_in_order(order, corners);
+        match self.size {
+            Some(0) => Faces { count: order.len(), ..Faces::default() },
+            Some(size) => Faces::of_size(size, gathered),
+            None => Faces::from_parts(self.offsets_in_order(order), gathered),
+        }
+    }
+
+    /// Of one value a corner, those of the faces in another order.
+    pub(crate) fn rows_in_order<T: Copy + Default + Send + Sync>(&self, order: &[u32], values: &[T]) -> Vec<T> {
+        if let Some(size @ 1..) = self.size {
+            let mut rows = filled(size * order.len(), T::default());
+            parallel::chunks(&mut rows, CHUNK / 8 * size, |first, part| {
+                for (row, &f) in part.chunks_exact_mut(size).zip(&order[first / size..]) {
+                    row.copy_from_slice(&values[self.range(f as usize)]);
+                }
+            });
+            return rows;
+        }
+        let offsets = self.offsets_in_order(order);
+        let mut rows = filled(offsets[order.len()] as usize, T::default());
+        parallel::parts(split_rows(&offsets, CHUNK / 8, &mut rows), |faces, mut part| {
+            for &f in &order[faces] {
+                let range = self.range(f as usize);
+                let (row, rest) = part.split_at_mut(range.len());
+                row.copy_from_slice(&values[range]);
+                part = rest;
+            }
+        });
+        rows
+    }
+
+    /// Where each face starts in that order, and the end.
+    fn offsets_in_order(&self, order: &[u32]) -> Vec<u32> {
+        let mut offsets = vec![0; order.len() + 1];
+        parallel::fill(&mut offsets[1..], |k| self.range(order[k] as usize).len() as u32);
+        for k in 0..order.len() {
+            offsets[k + 1] += offsets[k];
+        }
+        offsets
     }
 
     /// The face size that all faces share, if they do.

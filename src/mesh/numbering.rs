@@ -1,19 +1,23 @@
 //! Permutations of the vertices with their inverses.
 
+use super::incidence::split_rows;
+use super::topology::{NONE, Scatter};
+use crate::pages::filled;
 use crate::parallel;
+use crate::prefetch::prefetch;
 
-/// The place of every vertex: `inverse(o)[o[k]] = k`.
+/// The place of every vertex: `inverse(o)[o[k]] = k`. In parallel.
 ///
 /// # Panics
 /// If `order` is not a permutation.
 pub fn inverse(order: &[u32]) -> Vec<u32> {
-    let mut inverse = vec![u32::MAX; order.len()];
-    for (k, &v) in order.iter().enumerate() {
-        let place = &mut inverse[v as usize];
-        assert_eq!(*place, u32::MAX, "vertex {v} occurs twice in the order");
-        *place = k as u32;
-    }
-    inverse
+    let places = Scatter::new(order.len());
+    parallel::each(order.len(), |k| places.set(order[k], k as u32));
+    let places = places.into_vec();
+    // As many numbers as places: one that occurs twice leaves a place empty.
+    let missing = parallel::find_first(places.len(), |v| places[v] == NONE);
+    assert_eq!(missing, None, "a vertex that does not occur in the order");
+    places
 }
 
 /// An order with its inverse: the way there and back.
@@ -74,6 +78,47 @@ impl Numbering {
         let n = self.place.len();
         assert!(values.len() == n && out.len() == n, "one value a vertex");
         parallel::fill(out, |v| values[self.place[v] as usize]);
+    }
+}
+
+/// Rows of values, each moved to the place of its vertex: those at place k from `starts[k]` on become those of vertex v =
+/// `order[k]`, `ends[v]..ends[v + 1]`. In parallel.
+///
+/// # Panics
+/// If a row lies beyond the values.
+pub(crate) fn rows_back<T: Copy + Default + Send + Sync>(
+    numbering: &Numbering,
+    values: &[T],
+    starts: &[u32],
+    ends: &[u32],
+) -> Vec<T> {
+    /// Rows of one task.
+    const CHUNK: usize = 4096;
+    /// Rows between one look-up and the next.
+    const AHEAD: usize = 16;
+    let place = numbering.place();
+    let mut moved = filled(ends[place.len()] as usize, T::default());
+    parallel::parts(split_rows(ends, CHUNK, &mut moved), |rows, mut part| {
+        for v in rows {
+            if let Some(&k) = place.get(v + 2 * AHEAD) {
+                prefetch(starts, k as usize);
+            }
+            if let Some(&k) = place.get(v + AHEAD) {
+                prefetch(values, starts[k as usize] as usize);
+            }
+            let (row, rest) = part.split_at_mut((ends[v + 1] - ends[v]) as usize);
+            let start = starts[place[v] as usize] as usize;
+            row.copy_from_slice(&values[start..start + row.len()]);
+            part = rest;
+        }
+    });
+    moved
+}
+
+/// Turns lengths, of which the k-th stands at place k + 1, into where rows start, and the end.
+pub(crate) fn add_up(lengths: &mut [u32]) {
+    for k in 1..lengths.len() {
+        lengths[k] += lengths[k - 1];
     }
 }
 

@@ -4,8 +4,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DVec3;
 
+use super::incidence::sorted_by;
 use super::numbering::Numbering;
 use super::{Faces, Mesh, bounding_box};
+use crate::pages::large;
 use crate::parallel;
 
 /// Whether vertices that faces bring together lie scattered through memory: of the vertices that a face does not
@@ -34,66 +36,32 @@ pub fn is_scattered(faces: &Faces) -> bool {
     f64::from(near) < NEAR_SHARE * f64::from(fresh)
 }
 
-/// The mesh with its vertices along Morton's curve through the cells of a grid of 64³, its faces by smallest vertex, and
-/// that numbering. Every later pass over the mesh then runs through memory almost in order.
-/// `None` if a face names a vertex that does not exist. Two counting sorts, of vertices and of faces.
-pub fn along_curve(mesh: &Mesh) -> Option<(Mesh, Numbering)> {
-    let n = mesh.len();
+/// The mesh with its vertices along Morton's curve through the cells of a grid of 64³ and its faces by smallest vertex, that
+/// numbering, and the order of the faces. Every later pass over the mesh then runs through memory almost in order.
+/// `None` if a face names a vertex that does not exist. Two counting sorts, of vertices and of faces, in parallel.
+pub(super) fn along_curve(mesh: &Mesh) -> Option<(Mesh, Numbering, Vec<u32>)> {
     let numbering = Numbering::new(morton_cells(&mesh.positions));
     let place = numbering.place();
     let old = mesh.faces.corners();
     let missing = AtomicBool::new(false);
-    let corners = parallel::collect(old.len(), |c| {
-        place.get(old[c] as usize).copied().unwrap_or_else(|| {
-            missing.store(true, Ordering::Relaxed);
-            0
-        })
+    let mut corners = large(Vec::with_capacity(old.len()));
+    parallel::extend(&mut corners, old.len(), |_| {
+        |c| {
+            place.get(old[c] as usize).copied().unwrap_or_else(|| {
+                missing.store(true, Ordering::Relaxed);
+                0
+            })
+        }
     });
     if missing.into_inner() {
         return None;
     }
-    let moved = Faces::from_parts(mesh.faces.offsets().to_vec(), corners);
-    let smallest = parallel::collect(moved.len(), |f| moved.face(f).iter().copied().min().unwrap_or(0));
-    let by_smallest = counting_sort(&smallest, n);
-    let faces = match moved.uniform_size() {
-        // Each face has its place: all threads can work.
-        Some(size) => {
-            let mut corners = vec![0; moved.corners().len()];
-            parallel::chunks(&mut corners, 8192 * size, |first, part| {
-                for (face, &f) in part.chunks_exact_mut(size).zip(&by_smallest[first / size..]) {
-                    face.copy_from_slice(moved.face(f as usize));
-                }
-            });
-            Faces::from_parts(moved.offsets().to_vec(), corners)
-        }
-        None => {
-            let mut faces = Faces::with_capacity(moved.corners().len());
-            for &f in &by_smallest {
-                faces.push(moved.face(f as usize));
-            }
-            faces
-        }
-    };
+    let smallest =
+        parallel::collect(mesh.faces.len(), |f| corners[mesh.faces.range(f)].iter().copied().min().unwrap_or(0));
+    let (_, order) = sorted_by(&smallest, mesh.len());
+    let faces = mesh.faces.in_order(&order, &corners);
     let positions = numbering.there(&mesh.positions);
-    Some((Mesh::new(positions, faces), numbering))
-}
-
-/// The numbers of the keys in ascending order of the keys, all below `end`; equal keys as they come. O(keys + end).
-fn counting_sort(keys: &[u32], end: usize) -> Vec<u32> {
-    let mut starts = vec![0u32; end + 1];
-    for &key in keys {
-        starts[key as usize + 1] += 1;
-    }
-    for k in 0..end {
-        starts[k + 1] += starts[k];
-    }
-    let mut sorted = vec![0u32; keys.len()];
-    for (k, &key) in (0..).zip(keys) {
-        let slot = &mut starts[key as usize];
-        sorted[*slot as usize] = k;
-        *slot += 1;
-    }
-    sorted
+    Some((Mesh::new(positions, faces), numbering, order))
 }
 
 /// One counting sort by the highest bits of the codes, and a sort of each of the short lists that this gives.
@@ -102,7 +70,7 @@ pub(super) fn morton(positions: &[DVec3]) -> Vec<u32> {
     const FIRST: u32 = 5;
     let codes = morton_codes(positions, |code| code);
     let highest = morton_codes(positions, |code| (code >> (3 * (21 - FIRST))) as u32);
-    let mut order = counting_sort(&highest, 1 << (3 * FIRST));
+    let (_, mut order) = sorted_by(&highest, 1 << (3 * FIRST));
     let mut lists: Vec<&mut [u32]> = order.chunk_by_mut(|&v, &w| highest[v as usize] == highest[w as usize]).collect();
     parallel::chunks(&mut lists, 64, |_, lists| {
         for list in lists {
@@ -116,7 +84,7 @@ pub(super) fn morton(positions: &[DVec3]) -> Vec<u32> {
 fn morton_cells(positions: &[DVec3]) -> Vec<u32> {
     const BITS: u32 = 6;
     let cells = morton_codes(positions, |code| (code >> (3 * (21 - BITS))) as u32);
-    counting_sort(&cells, 1 << (3 * BITS))
+    sorted_by(&cells, 1 << (3 * BITS)).1
 }
 
 /// `take` of the place of every position along the curve, 21 bits a coordinate.

@@ -8,6 +8,7 @@ use super::boundary::Boundary;
 use super::features::{Features, Rule, SHARP, Tags};
 use super::numbering::Numbering;
 use super::origin::Numbers;
+use super::renumbered::Renumbered;
 use super::space_filling::{along_curve, is_scattered};
 use super::validate::{Validation, boundary_remark, validate};
 use super::{Faces, Incidence, Mesh, Topology, degenerate};
@@ -53,16 +54,8 @@ struct Connectivity {
     /// Where not all vertices are smooth.
     features: Option<Features>,
     incidence: OnceLock<Arc<Incidence>>,
-    topology: OnceLock<Topology>,
+    topology: OnceLock<Arc<Topology>>,
     renumbered: Option<Renumbered>,
-}
-
-/// The faces of a scattered mesh, with their vertices along a space-filling curve: every pass is several times faster.
-#[derive(Clone, Debug)]
-pub(crate) struct Renumbered {
-    pub(crate) faces: Faces,
-    pub(crate) incidence: Incidence,
-    pub(crate) numbering: Numbering,
 }
 
 impl Surface {
@@ -120,8 +113,29 @@ impl Surface {
             incidence: OnceLock::from(Arc::clone(&topology.incidence)),
             ..Connectivity::new(topology.is_closed())
         };
+        let connectivity = Connectivity { topology: OnceLock::from(Arc::new(topology)), ..connectivity };
+        Surface { mesh, connectivity: Arc::new(connectivity) }
+    }
+
+    /// A valid mesh as it is [renumbered](Renumbered) inside, with all vertices smooth.
+    pub(super) fn near(mesh: Mesh, topology: Arc<Topology>) -> Self {
+        let connectivity = Connectivity {
+            incidence: OnceLock::from(Arc::clone(&topology.incidence)),
+            sides: topology.boundary_half_edges().to_vec(),
+            ..Connectivity::new(topology.is_closed())
+        };
         let connectivity = Connectivity { topology: OnceLock::from(topology), ..connectivity };
         Surface { mesh, connectivity: Arc::new(connectivity) }
+    }
+
+    /// As [`examined`](Self::examined), renumbered inside however small the mesh, and wherever its vertices lie.
+    ///
+    /// # Panics
+    /// If the mesh is not valid.
+    #[cfg(test)]
+    pub(crate) fn scattered(mesh: Mesh, boundary: Boundary) -> Self {
+        let connectivity = Connectivity::checked(&mesh, boundary, along_curve(&mesh));
+        Surface { mesh, connectivity: Arc::new(connectivity.expect("a valid mesh")) }
     }
 
     /// A closed mesh that is valid by the way it was made. Its topology is made if it is asked for.
@@ -239,13 +253,24 @@ impl Surface {
     }
 
     fn shared_incidence(&self) -> &Arc<Incidence> {
-        self.connectivity.incidence.get_or_init(|| Arc::new(Incidence::new(&self.mesh.faces, self.mesh.len())))
+        self.connectivity.incidence.get_or_init(|| {
+            let faces = &self.mesh.faces;
+            Arc::new(match self.renumbered() {
+                Some(inside) => inside.incidence_of(faces),
+                None => Incidence::new(faces, self.mesh.len()),
+            })
+        })
     }
 
     /// Opposite half-edges, edges, stars. The first call may take as long as validation did.
     pub fn topology(&self) -> &Topology {
-        let made = || Topology::of(Arc::clone(self.shared_incidence()), &self.mesh.faces);
-        self.connectivity.topology.get_or_init(made)
+        self.connectivity.topology.get_or_init(|| {
+            let incidence = Arc::clone(self.shared_incidence());
+            Arc::new(match self.renumbered() {
+                Some(inside) => inside.topology_of(&self.mesh.faces, incidence),
+                None => Topology::of(incidence, &self.mesh.faces),
+            })
+        })
     }
 
     /// Rules and curves, where not all vertices are smooth: on an open mesh, unless its boundary is treated as interior,
@@ -346,8 +371,13 @@ impl Connectivity {
     /// another boundary.
     fn manifold(mesh: &Mesh, boundary: Boundary) -> Option<Self> {
         let renumbered = if mesh.len() >= SCATTERED && is_scattered(&mesh.faces) { along_curve(mesh) } else { None };
+        Self::checked(mesh, boundary, renumbered)
+    }
+
+    /// As [`manifold`](Self::manifold), of what is renumbered.
+    fn checked(mesh: &Mesh, boundary: Boundary, renumbered: Option<(Mesh, Numbering, Vec<u32>)>) -> Option<Self> {
         let (faces, points) = match &renumbered {
-            Some((moved, _)) => (&moved.faces, &moved.positions),
+            Some((moved, ..)) => (&moved.faces, &moved.positions),
             None => (&mesh.faces, &mesh.positions),
         };
         let corners = faces.corners();
@@ -371,8 +401,8 @@ impl Connectivity {
             return Self::open(mesh, boundary, (incidence, on_boundary), renumbered);
         }
         let (incidence, renumbered) = match renumbered {
-            Some((Mesh { faces, .. }, numbering)) => {
-                (OnceLock::new(), Some(Renumbered { faces, incidence, numbering }))
+            Some((moved, numbering, order)) => {
+                (OnceLock::new(), Some(Renumbered::new(moved.faces, incidence, numbering, order)))
             }
             None => (OnceLock::from(Arc::new(incidence)), None),
         };
@@ -386,13 +416,13 @@ impl Connectivity {
         mesh: &Mesh,
         boundary: Boundary,
         (incidence, on_boundary): (Incidence, Vec<u32>),
-        renumbered: Option<(Mesh, Numbering)>,
+        renumbered: Option<(Mesh, Numbering, Vec<u32>)>,
     ) -> Option<Self> {
         let (incidence, vertices, renumbered) = match renumbered {
-            Some((Mesh { faces, .. }, numbering)) => {
+            Some((moved, numbering, order)) => {
                 let vertices = on_boundary.iter().map(|&v| numbering.order()[v as usize]).collect();
-                let renumbered = Renumbered { faces, incidence, numbering };
-                (Incidence::new(&mesh.faces, mesh.len()), vertices, Some(renumbered))
+                let renumbered = Renumbered::new(moved.faces, incidence, numbering, order);
+                (renumbered.incidence_of(&mesh.faces), vertices, Some(renumbered))
             }
             None => (incidence, on_boundary, None),
         };

@@ -107,18 +107,12 @@ impl Topology {
     }
 
     /// The topology of a closed manifold from its arrays: every half-edge has its twin, every vertex one umbrella.
-    pub(crate) fn closed(incidence: Incidence, twin: Vec<u32>) -> Self {
-        Topology {
-            incidence: Arc::new(incidence),
-            edges: twin.len() / 2,
-            twin,
-            boundary: Vec::new(),
-            irregular_edges: Vec::new(),
-        }
+    pub(crate) fn closed(incidence: Arc<Incidence>, twin: Vec<u32>) -> Self {
+        Topology { incidence, edges: twin.len() / 2, twin, boundary: Vec::new(), irregular_edges: Vec::new() }
     }
 
     /// As [`closed`](Self::closed), of an open manifold: `boundary` are the half-edges without a twin, ascending.
-    pub(crate) fn open(incidence: Incidence, twin: Vec<u32>, boundary: Vec<u32>) -> Self {
+    pub(crate) fn open(incidence: Arc<Incidence>, twin: Vec<u32>, boundary: Vec<u32>) -> Self {
         Topology { edges: (twin.len() + boundary.len()) / 2, boundary, ..Self::closed(incidence, twin) }
     }
 

@@ -15,7 +15,7 @@ use glam::DVec3;
 
 use super::interpolatory::{RegularMask, SQRT_3, tangents, vertices};
 use super::loop_scheme::{refined_topology, split_in_four};
-use super::refined;
+use super::refined::{self, Of};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::ring::{Place, RingRule, Rings};
 use super::sharp::{Polygons, mirrored};
@@ -24,7 +24,7 @@ use super::star::{
     require_triangles,
 };
 use crate::Result;
-use crate::mesh::edge_numbers::EdgeNumbers;
+use crate::mesh::edge_numbers::{EdgeNumbers, FirstSides};
 use crate::mesh::{Mesh, Surface};
 use crate::pages::large;
 use crate::parallel;
@@ -108,20 +108,36 @@ fn check(surface: &Surface) -> Result<()> {
 /// # Errors
 /// As [`loop_scheme::refine`](super::loop_scheme::refine).
 pub fn refine(surface: &Surface) -> Result<Mesh> {
-    let (mesh, topology) = (surface.mesh(), surface.topology());
+    let mesh = surface.mesh();
     check(surface)?;
     require_room(mesh, 4)?;
-    let rule = RingRule { place: Place::Edge, mask: |n| (CENTER, extraordinary_mask(n)), amplitudes };
-    let rings = Rings::new(surface, rule);
-    let edges = topology.edge_numbers();
+    let edges = surface.topology().edge_numbers();
+    if surface.features().is_none() {
+        let positions = refined::points(surface, &edges, &[Of::Vertices, Of::Edges], &|surface, edges| {
+            smooth_points(surface, &rings(surface), edges)
+        });
+        return Ok(Mesh::new(positions, split_in_four(mesh, &edges)));
+    }
+    let rings = rings(surface);
+    let mut positions = smooth_points(surface, &rings, edges.firsts());
+    set_at_sharp_edges(&mut positions[mesh.len()..], surface, &rings, &edges);
+    Ok(Mesh::new(positions, split_in_four(mesh, &edges)))
+}
+
+fn rings(surface: &Surface) -> Rings<'_> {
+    Rings::new(surface, RingRule { place: Place::Edge, mask: |n| (CENTER, extraordinary_mask(n)), amplitudes })
+}
+
+/// The points of vertices and edges, those of sharp edges and beside them as if these were not there.
+fn smooth_points(surface: &Surface, rings: &Rings, edges: &FirstSides) -> Vec<DVec3> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
     parallel::append(&mut positions, &mesh.positions);
     let at = |c: usize| mesh.positions[mesh.faces.corners()[c] as usize];
     edges.extend(&mut positions, |c| {
-        point(surface, &rings, c, |side| at(prev_in_triangle(across(topology, side as u32))))
+        point(surface, rings, c, |side| at(prev_in_triangle(across(topology, side as u32))))
     });
-    set_at_sharp_edges(&mut positions[mesh.len()..], surface, &rings, &edges);
-    Ok(Mesh::new(positions, split_in_four(mesh, &edges)))
+    positions
 }
 
 /// The new point of the edge of half-edge `c`; `beyond(side)` is the vertex across a side of its triangles.

@@ -7,13 +7,13 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::local_limit::{Star, StarRule};
-use super::refined::{self, set_rows};
+use super::refined::{self, Of, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Circulant, Definition, PaperNames, SingularSet};
 use super::sharp::{self, Across};
 use super::star::{Circle, Tangents, across, centroid, for_each_star, require_room, require_rules, sides};
 use crate::Result;
-use crate::mesh::edge_numbers::EdgeNumbers;
+use crate::mesh::edge_numbers::{EdgeNumbers, FirstSides};
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
@@ -78,12 +78,19 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// [`Error::Open`](crate::Error::Open) if the mesh has a boundary that is treated as interior,
 /// [`Error::TooLarge`](crate::Error::TooLarge) if 32-bit indices do not reach the result.
 pub fn refine(surface: &Surface) -> Result<Mesh> {
-    let (mesh, topology) = (surface.mesh(), surface.topology());
     require_rules(surface)?;
-    require_room(mesh, 4)?;
+    require_room(surface.mesh(), 4)?;
+    let edges = surface.topology().edge_numbers();
+    let mut positions = refined::points(surface, &edges, &[Of::Vertices, Of::Edges, Of::Faces], &smooth_points);
+    sharp::set_refined(&mut positions, surface, &edges, |v| surface.positions()[v]);
+    Ok(Mesh::new(positions, split(surface, &edges)))
+}
+
+/// The new points of vertices, edges and faces where nothing is sharp.
+fn smooth_points(surface: &Surface, edges: &FirstSides) -> Vec<DVec3> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let (old, incidence) = (&mesh.positions, &topology.incidence);
     let corners = mesh.faces.corners();
-    let edges = topology.edge_numbers();
     let mut centers = large(Vec::with_capacity(mesh.faces.len()));
     parallel::extend(&mut centers, mesh.faces.len(), |_| |f| centroid(old, mesh.faces.face(f)));
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges() + centers.len()));
@@ -103,9 +110,8 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
             [c, across(topology, c)].map(|c| old[corners[c as usize] as usize] + centers[incidence.face_of(c)]);
         0.25 * one + 0.25 * other
     });
-    sharp::set_refined(&mut positions, surface, &edges, |v| old[v]);
     positions.append(&mut centers);
-    Ok(Mesh::new(positions, split(surface, &edges)))
+    positions
 }
 
 /// The topology of `refined`, which is what [`refine`] made of the surface.

@@ -165,7 +165,11 @@ pub fn refine_by(rule: CornerRule, surface: &Surface) -> Result<Mesh> {
     let first = 3 * count as u32;
     let ends = &incidence.offsets()[1..];
     parallel::extend(&mut offsets, ends.len(), |_| |v| first + ends[v]);
-    Ok(Mesh::new(corner_points(mesh, rule), Faces::from_parts(offsets, corners)))
+    let points = match surface.renumbered() {
+        Some(inside) => inside.of_corners(&corner_points(inside.surface(&mesh.positions).mesh(), rule)),
+        None => corner_points(mesh, rule),
+    };
+    Ok(Mesh::new(points, Faces::from_parts(offsets, corners)))
 }
 
 /// The index of the type-V face of vertex 0 after a step; the first one of every vertex follows in order.

@@ -114,16 +114,30 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
     let mesh = surface.mesh();
     thirds::require(surface, NAME)?;
     require_room(mesh, 3)?;
-    let rule = RingRule { place: Place::Triangle, mask: extraordinary_mask, amplitudes };
-    let rings = Rings::new(surface, rule);
-    let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len() + surface.boundary_edges()));
-    parallel::append(&mut positions, &mesh.positions);
-    parallel::extend(&mut positions, mesh.faces.len(), |_| |f| center(surface, &rings, f, |_| None));
+    if surface.features().is_none() {
+        let positions = refined::points_in_faces(surface, &|surface| smooth_points(surface, &rings(surface)));
+        return Ok(Mesh::new(positions, flip(surface)));
+    }
+    let rings = rings(surface);
+    let mut positions = smooth_points(surface, &rings);
     for f in beside_sharp_edges(surface) {
         positions[mesh.len() + f] = center(surface, &rings, f, |side| beyond(surface, side));
     }
     thirds::set_thirds(&mut positions, surface, |_, _| 1.0);
     Ok(Mesh::new(positions, flip(surface)))
+}
+
+fn rings(surface: &Surface) -> Rings<'_> {
+    Rings::new(surface, RingRule { place: Place::Triangle, mask: extraordinary_mask, amplitudes })
+}
+
+/// The points of vertices and faces, those beside sharp edges as if these were not there.
+fn smooth_points(surface: &Surface, rings: &Rings) -> Vec<DVec3> {
+    let mesh = surface.mesh();
+    let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len() + surface.boundary_edges()));
+    parallel::append(&mut positions, &mesh.positions);
+    parallel::extend(&mut positions, mesh.faces.len(), |_| |f| center(surface, rings, f, |_| None));
+    positions
 }
 
 /// The new point of a triangle; `beyond(side)` is what is put across a side, if anything.

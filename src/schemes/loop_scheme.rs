@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::local_limit::{Star, StarRule};
-use super::refined::{self, set_rows};
+use super::refined::{self, Of, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{CUBIC, Definition, PaperNames, SingularSet, from_limit_weight};
 use super::sharp::{self, across_boundary_of_triangles};
@@ -15,7 +15,7 @@ use super::star::{
     require_triangles, ring_tangents,
 };
 use crate::Result;
-use crate::mesh::edge_numbers::EdgeNumbers;
+use crate::mesh::edge_numbers::{EdgeNumbers, FirstSides};
 use crate::mesh::{Faces, Mesh, Surface, Topology};
 use crate::pages::large;
 
@@ -96,11 +96,18 @@ pub(super) const RULES: RefinementRules = RefinementRules {
 /// with a vertex of two triangles that have all corners in common (a part of an open mesh that is closed): their middle
 /// triangles would share all corners too.
 pub fn refine(surface: &Surface) -> Result<Mesh> {
-    let (mesh, topology) = (surface.mesh(), surface.topology());
     check(surface)?;
-    require_room(mesh, 4)?;
+    require_room(surface.mesh(), 4)?;
+    let edges = surface.topology().edge_numbers();
+    let mut positions = refined::points(surface, &edges, &[Of::Vertices, Of::Edges], &smooth_points);
+    sharp::set_refined(&mut positions, surface, &edges, |v| surface.positions()[v]);
+    Ok(Mesh::new(positions, split_in_four(surface.mesh(), &edges)))
+}
+
+/// The new points of vertices and edges where nothing is sharp.
+fn smooth_points(surface: &Surface, edges: &FirstSides) -> Vec<DVec3> {
+    let (mesh, topology) = (surface.mesh(), surface.topology());
     let (old, corners) = (&mesh.positions, mesh.faces.corners());
-    let edges = topology.edge_numbers();
     let mut positions = large(Vec::with_capacity(mesh.len() + topology.edges()));
     push_blends(&mut positions, surface, vertex_mask);
     edges.extend(&mut positions, |c| {
@@ -111,8 +118,7 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
         });
         one + other
     });
-    sharp::set_refined(&mut positions, surface, &edges, |v| old[v]);
-    Ok(Mesh::new(positions, split_in_four(mesh, &edges)))
+    positions
 }
 
 /// The topology of `refined`, which is what [`refine`] or [`butterfly`](super::butterfly) made of the surface.

@@ -12,7 +12,7 @@
 use glam::DVec3;
 
 use super::doo_sabin::{CornerRule, refine_by};
-use super::refined::{self, set_rows};
+use super::refined::{self, Of, set_rows};
 use super::refinement::{Class, Refinement, RefinementRules, Size};
 use super::scheme::{Definition, PaperNames, QUADRATIC, SingularSet};
 use super::star::{Tangents, blend_with_neighbors, require_curves, require_room, ring_tangents, stars, twin};
@@ -92,14 +92,17 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
         return refine_by(CornerRule::MidEdge, surface);
     }
     require_room(mesh, 2)?;
-    let (points, old) = (&mesh.positions, mesh.faces.corners());
     let edges = topology.edge_numbers();
-    let mut positions = large(Vec::with_capacity(topology.edges()));
-    edges.extend(&mut positions, |c| {
-        let [v, w] = [c, twin(topology, c)].map(|c| points[old[c as usize] as usize]);
-        0.5 * v + 0.5 * w
+    let positions = refined::points(surface, &edges, &[Of::Edges], &|surface, edges| {
+        let (topology, old) = (surface.topology(), surface.faces().corners());
+        let mut positions = large(Vec::with_capacity(topology.edges()));
+        edges.extend(&mut positions, |c| {
+            let [v, w] = [c, twin(topology, c)].map(|c| surface.positions()[old[c as usize] as usize]);
+            0.5 * v + 0.5 * w
+        });
+        positions
     });
-    let count = old.len();
+    let count = mesh.faces.corners().len();
     let mut corners = large(vec![0; 2 * count]);
     let (of_faces, of_vertices) = corners.split_at_mut(count);
     let stars = stars(surface);

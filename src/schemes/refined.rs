@@ -6,10 +6,16 @@
 //! same one twice (it would name a vertex twice), so that no two new edges have the same ends, and the refined mesh is
 //! valid too.
 
+use std::sync::Arc;
+
+use glam::DVec3;
+
 use super::star::{next_in_triangle, prev_in_triangle, stars};
 use crate::Result;
+use crate::mesh::edge_numbers::{EdgeNumbers, FirstSides};
 use crate::mesh::features::Features;
 use crate::mesh::incidence::split_rows;
+use crate::mesh::renumbered::Renumbered;
 use crate::mesh::topology::{NONE, Scatter};
 use crate::mesh::{Incidence, Mesh, Surface, Topology};
 use crate::pages::large;
@@ -17,6 +23,70 @@ use crate::parallel;
 
 /// New faces, edges or vertices of one task.
 const CHUNK: usize = 4096;
+
+/// What the points of a step are points of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Of {
+    Vertices,
+    Edges,
+    Faces,
+}
+
+/// The points of a step: `make` gives one for each of the vertices, edges or faces of a surface without sharp edges, in
+/// these `parts` one after the other; edges come by their first half-edges. Where vertices lie scattered in memory, it is called with
+/// the surface as it is [renumbered](Surface::renumbered) inside, and the points are put in the order of the file: the
+/// same to the last bit.
+pub(super) fn points(
+    surface: &Surface,
+    edges: &EdgeNumbers,
+    parts: &[Of],
+    make: &dyn Fn(&Surface, &FirstSides) -> Vec<DVec3>,
+) -> Vec<DVec3> {
+    let Some(inside) = surface.renumbered() else {
+        return make(surface, edges.firsts());
+    };
+    let firsts = inside.first_sides();
+    let made = make(&inside.surface(surface.positions()), &firsts);
+    put_back(surface, inside, parts, &made, |points, made| {
+        let (faces, incidence) = (surface.faces(), surface.incidence());
+        edges.extend(points, |c| made[firsts.edge(inside.corner(faces, incidence.face_of(c), c)) as usize]);
+    })
+}
+
+/// As [`points`], where there are none of edges: of the vertices, then of the faces.
+pub(super) fn points_in_faces(surface: &Surface, make: &dyn Fn(&Surface) -> Vec<DVec3>) -> Vec<DVec3> {
+    match surface.renumbered() {
+        None => make(surface),
+        Some(inside) => {
+            let made = make(&inside.surface(surface.positions()));
+            put_back(surface, inside, &[Of::Vertices, Of::Faces], &made, |_, _| {})
+        }
+    }
+}
+
+/// The points in the order of the file. `put_edges` appends those of edges, from all that are left.
+fn put_back(
+    surface: &Surface,
+    inside: &Renumbered,
+    parts: &[Of],
+    made: &[DVec3],
+    put_edges: impl Fn(&mut Vec<DVec3>, &[DVec3]),
+) -> Vec<DVec3> {
+    let mut points = large(Vec::with_capacity(made.len() + surface.boundary_edges()));
+    for part in parts {
+        let made = &made[points.len()..];
+        let place = match part {
+            Of::Vertices => inside.numbering.place(),
+            Of::Faces => inside.face_place(),
+            Of::Edges => {
+                put_edges(&mut points, made);
+                continue;
+            }
+        };
+        parallel::extend(&mut points, place.len(), |_| |k| made[place[k] as usize]);
+    }
+    points
+}
 
 /// After the split of every face into quads, one a corner: quad c is (vertex, edge of c, face, edge of prev c).
 pub(super) fn of_quads(surface: &Surface, refined: &Mesh) -> Topology {
@@ -138,7 +208,7 @@ fn halved(
     let mut boundary = Vec::with_capacity(2 * surface.boundary_edges());
     surface.boundary_half_edges().iter().for_each(|&c| halves(surface, c, &mut boundary));
     boundary.sort_unstable();
-    Topology::open(incidence, twins, boundary)
+    Topology::open(Arc::new(incidence), twins, boundary)
 }
 
 /// Appends the ends of a row for every edge, of `size` entries a side, that begin after the last end.
@@ -294,7 +364,7 @@ pub(super) fn of_midpoints(surface: &Surface, refined: &Mesh) -> Topology {
 
 fn closed(refined: &Mesh, offsets: Vec<u32>, corners: Vec<u32>, twins: Vec<u32>) -> Topology {
     let incidence = Incidence::from_parts(offsets, corners, &refined.faces);
-    Topology::closed(incidence, twins)
+    Topology::closed(Arc::new(incidence), twins)
 }
 
 /// Gives every edge, in order, a row: that of its first half-edge.
@@ -327,4 +397,52 @@ fn scale(to: &mut [u32], from: &[u32], map: impl Fn(u32) -> u32 + Sync) {
 /// Appends the ends of `count` rows of `size` entries that begin at `start`.
 pub(super) fn push_ends(offsets: &mut Vec<u32>, start: usize, size: u32, count: usize) {
     parallel::extend(offsets, count, |_| |k| start as u32 + size * (k as u32 + 1));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::features::Tags;
+    use crate::mesh::random::{random_creased, random_polygons, random_semi_sharp, random_triangulation};
+    use crate::mesh::validate::Boundary;
+    use crate::schemes::Refinement;
+
+    /// Closed, open, with creases and with semi-sharp edges.
+    fn surfaces(closed: &Mesh, seed: u64) -> Vec<(Surface, Option<Tags>)> {
+        let tagged = [random_creased(closed, seed), random_semi_sharp(closed, seed)].into_iter().flatten();
+        let plain = (Surface::new(closed.clone()).unwrap(), None);
+        std::iter::once(plain).chain(tagged.map(|(surface, tags)| (surface, Some(tags)))).collect()
+    }
+
+    #[test]
+    fn a_step_in_another_order_inside_is_the_same_to_the_last_bit() {
+        let bits = |s: &Surface| s.positions().iter().map(|p| p.to_array().map(f64::to_bits)).collect::<Vec<_>>();
+        let mut steps = [0; 2];
+        for seed in 0..20 {
+            let meshes = [random_polygons(seed), random_triangulation(seed)];
+            for (surface, tags) in meshes.iter().flat_map(|mesh| surfaces(mesh, seed)) {
+                let boundary = tags.as_ref().map_or(Boundary::Refuse, |tags| tags.boundary);
+                let inside = Surface::scattered(surface.mesh().clone(), boundary);
+                let inside = tags.as_ref().map_or(inside.clone(), |tags| inside.tagged(tags).unwrap());
+                assert!(inside.renumbered().is_some() && inside.features() == surface.features());
+                assert!(inside.topology() == surface.topology() && inside.incidence() == surface.incidence());
+                for scheme in Refinement::ALL {
+                    match [scheme.refined(&surface), scheme.refined(&inside)] {
+                        [Ok(expected), Ok(found)] => {
+                            let what = format!("{scheme}, seed {seed}, {} vertices", surface.len());
+                            assert!(bits(&found) == bits(&expected), "{what}");
+                            assert!(found.faces() == expected.faces(), "{what}");
+                            assert!(found.topology() == expected.topology(), "{what}");
+                            steps[usize::from(tags.is_some())] += 1;
+                        }
+                        results => {
+                            let told = results.map(|result| result.err().map(|e| e.to_string()));
+                            assert_eq!(told[0], told[1], "{scheme}, seed {seed}");
+                        }
+                    }
+                }
+            }
+        }
+        assert!(steps.iter().all(|&steps| steps > 100), "{steps:?}");
+    }
 }

@@ -99,14 +99,21 @@ pub fn refine(surface: &Surface) -> Result<Mesh> {
     let mesh = surface.mesh();
     thirds::require(surface, "sqrt3")?;
     require_room(mesh, 3)?;
-    let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len() + surface.boundary_edges()));
-    push_blends(&mut positions, surface, vertex_mask);
-    parallel::extend(&mut positions, mesh.faces.len(), |_| |f| centroid(&mesh.positions, mesh.faces.face(f)));
+    let mut positions = refined::points_in_faces(surface, &smooth_points);
     for (v, point) in thirds::moved(surface, vertex_mask) {
         positions[v] = point;
     }
     thirds::set_thirds(&mut positions, surface, |_, _| 0.0);
     Ok(Mesh::new(positions, flip(surface)))
+}
+
+/// The new points of vertices and faces where nothing is sharp.
+fn smooth_points(surface: &Surface) -> Vec<DVec3> {
+    let mesh = surface.mesh();
+    let mut positions = large(Vec::with_capacity(mesh.len() + mesh.faces.len() + surface.boundary_edges()));
+    push_blends(&mut positions, surface, vertex_mask);
+    parallel::extend(&mut positions, mesh.faces.len(), |_| |f| centroid(&mesh.positions, mesh.faces.face(f)));
+    positions
 }
 
 /// The topology of `refined`, which is what [`refine`] made of the surface.

@@ -8,7 +8,7 @@ use crate::mesh::features::Rule;
 use crate::mesh::frame::magnitude;
 use crate::mesh::incidence::split_rows;
 use crate::mesh::topology::NONE;
-use crate::mesh::{Incidence, Mesh, Surface, Topology};
+use crate::mesh::{Faces, Incidence, Mesh, Surface, Topology};
 use crate::pages::large;
 use crate::parallel::{self, find_first};
 use crate::{Error, Result};
@@ -160,11 +160,22 @@ pub(crate) fn stars(surface: &Surface) -> Vec<u32> {
 
 /// As [`stars`], into memory that is there already.
 pub(crate) fn put_stars(surface: &Surface, stars: &mut [u32]) {
-    let (mesh, topology) = (surface.mesh(), surface.topology());
+    match surface.renumbered() {
+        None => put(surface.faces(), surface.topology(), stars),
+        Some(inside) => {
+            let mut near = large(vec![0; stars.len()]);
+            put(&inside.faces, inside.topology(), &mut near);
+            let (_, moved) = inside.of_vertices(surface.faces(), &near);
+            parallel::fill(stars, |k| moved[k]);
+        }
+    }
+}
+
+fn put(faces: &Faces, topology: &Topology, stars: &mut [u32]) {
     parallel::parts(split_rows(topology.incidence.offsets(), CHUNK, stars), |range, mut part| {
         let mut star = Vec::new();
         for v in range {
-            topology.star(&mesh.faces, v, &mut star);
+            topology.star(faces, v, &mut star);
             let (here, rest) = part.split_at_mut(star.len());
             here.copy_from_slice(&star);
             part = rest;
