@@ -482,19 +482,19 @@ fn scatter_is_recognised_and_mended() {
         let order = Order::Random(2).order(&mesh, &Incidence::new(&mesh.faces, mesh.len()));
         for scattered in [permute_vertices(&mesh, &order), shuffle_faces(&permute_vertices(&mesh, &order), 4)] {
             assert!(is_scattered(&scattered.faces), "{name}");
-            let (mended, order) = along_curve(&scattered).expect("good indices");
+            let (mended, order, face_order) = along_curve(&scattered).expect("good indices");
             assert!(!is_scattered(&mended.faces), "{name}");
             for (k, &v) in order.order().iter().enumerate() {
                 assert_eq!(mended.positions[k], scattered.positions[v as usize]);
             }
-            // The same faces, in another order.
-            let sorted = |faces: &Faces, name: &dyn Fn(u32) -> u32| {
-                let mut list: Vec<Vec<u32>> = faces.iter().map(|f| f.iter().map(|&v| name(v)).collect()).collect();
-                list.sort_unstable();
-                list
-            };
-            let theirs = sorted(&mended.faces, &|v| order.order()[v as usize]);
-            assert!(theirs == sorted(&scattered.faces, &|v| v), "{name}");
+            // The same faces from the same corners on, each once, in another order.
+            for (face, &f) in mended.faces.iter().zip(&face_order) {
+                let theirs = face.iter().map(|&v| order.order()[v as usize]);
+                assert!(theirs.eq(scattered.faces.face(f as usize).iter().copied()), "{name}");
+            }
+            let mut each = face_order;
+            each.sort_unstable();
+            assert!(each.into_iter().eq(0..scattered.faces.len() as u32), "{name}");
         }
     }
     let wrong = Mesh::new(rough(3), Faces::from_lists([[0u32, 1, 7]]));

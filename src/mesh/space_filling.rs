@@ -39,7 +39,7 @@ pub fn is_scattered(faces: &Faces) -> bool {
 /// The mesh with its vertices along Morton's curve through the cells of a grid of 64³ and its faces by smallest vertex, that
 /// numbering, and the order of the faces. Every later pass over the mesh then runs through memory almost in order.
 /// `None` if a face names a vertex that does not exist. Two counting sorts, of vertices and of faces, in parallel.
-pub(super) fn along_curve(mesh: &Mesh) -> Option<(Mesh, Numbering, Vec<u32>)> {
+pub fn along_curve(mesh: &Mesh) -> Option<(Mesh, Numbering, Vec<u32>)> {
     let numbering = Numbering::new(morton_cells(&mesh.positions));
     let place = numbering.place();
     let old = mesh.faces.corners();

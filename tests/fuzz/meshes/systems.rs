@@ -65,7 +65,7 @@ fn numberings(surface: &Surface) -> Vec<Numbering> {
     let (mesh, faces, incidence) = (surface.mesh(), surface.faces(), surface.incidence());
     let mut all = vec![in_fronts(faces, incidence), in_colours(faces, incidence)];
     all.extend(in_kinds(faces, incidence));
-    all.extend(along_curve(mesh).map(|(_, numbering)| numbering));
+    all.extend(along_curve(mesh).map(|(_, numbering, _)| numbering));
     all.extend([Order::File, Order::Random(5)].map(|order| Numbering::new(order.order(mesh, incidence))));
     all
 }
