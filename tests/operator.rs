@@ -299,8 +299,15 @@ fn mixed_precision_meets_the_tolerance_with_any_number_of_threads() {
 
 #[test]
 fn sweeps_in_waves_are_the_sweeps_one_after_the_other() {
-    for (name, band) in [("torus:60x40", 200), ("irregular-quad:3000", 700)] {
-        let case = both(name, surface(name), Scheme::CatmullClark);
+    // Sums over faces, one each and three, which follow the iterate; with rows of quads alone beside them.
+    let cases = [
+        ("torus:60x40", 200, Scheme::CatmullClark),
+        ("irregular-quad:3000", 700, Scheme::CatmullClark),
+        ("irregular-poly:6000", 1000, Scheme::CatmullClark),
+        ("irregular-poly:6000", 1000, Scheme::Nasri),
+    ];
+    for (name, band, scheme) in cases {
+        let case = both(name, surface(name), scheme);
         let (operator, numbering) = in_front_order(&case);
         let points = numbering.there(case.surface.positions());
         for count in [1, 8, 11] {

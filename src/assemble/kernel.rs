@@ -132,8 +132,13 @@ impl Stencil {
     /// (A x)_i, faces summed for this row alone: O(neighbours + corners of the faces at `i`). `points` holds x from
     /// vertex `start` on, as far as the row reaches.
     #[inline]
-    pub(super) fn row<P: Point>(&self, i: usize, (points, start): (&[P], usize)) -> P {
-        let faces = |i| self.polygons.row(i, (points, start));
+    pub(super) fn row<P: Point>(&self, i: usize, window: (&[P], usize)) -> P {
+        self.row_by(i, window, |i| self.polygons.row(i, window))
+    }
+
+    /// As [`row`](Self::row); `faces(i)` is what the faces at row i add up to.
+    #[inline]
+    pub(super) fn row_by<P: Point>(&self, i: usize, (points, start): (&[P], usize), faces: impl Fn(usize) -> P) -> P {
         match self.codes.of_row(i) {
             RowNeighbours::Near(near) => self.coded_row(near, i, points, start, faces),
             RowNeighbours::Far(far) => self.coded_row(far, i, points, start, faces),

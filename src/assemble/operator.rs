@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::bounds::SpectralBounds;
 use super::build::RowSource;
+use super::face_sums::Others;
 use super::kernel::{Stencil, runs};
 use super::neighbours::Neighbours;
 use super::system::{check, require_one_block};
@@ -33,6 +34,8 @@ pub struct Operator {
     /// h and a_ii by row, of use to some methods only: made when first asked for.
     weights: OnceLock<Vec<f64>>,
     diagonal: OnceLock<Vec<f64>>,
+    /// Of use to sweeps in place only.
+    others: OnceLock<Others>,
     bounds: SpectralBounds,
     usual_lambda_min: f64,
 }
@@ -134,6 +137,7 @@ impl Operator {
             h,
             weights: OnceLock::new(),
             diagonal: OnceLock::new(),
+            others: OnceLock::new(),
             bounds,
             usual_lambda_min: scheme.usual_lambda_min(),
         })
@@ -191,6 +195,24 @@ impl Operator {
     #[inline]
     pub fn row_within<P: Point>(&self, i: usize, points: (&[P], usize)) -> P {
         self.stencil.row(i, points)
+    }
+
+    /// As [`row_within`](Self::row_within), where `sum(k)` is the k-th of the [sums over faces](Self::all_sums) of x. O(neighbours).
+    ///
+    /// # Panics
+    /// If the row reaches beyond the points.
+    #[inline]
+    pub fn row_by_sums(&self, i: usize, points: (&[DVec3], usize), sum: impl Fn(usize) -> DVec3) -> DVec3 {
+        self.stencil.row_by(i, points, |i| self.stencil.polygons.total(i, &sum))
+    }
+
+    /// Calls `add(k, part)` for what is to be added to the k-th of the [sums over faces](Self::all_sums) where x_i changes by
+    /// `change`; each is told once. O(faces at i).
+    #[inline]
+    pub fn follow(&self, i: usize, change: DVec3, add: impl FnMut(usize, DVec3)) {
+        let polygons = &self.stencil.polygons;
+        let others = self.others.get_or_init(|| polygons.others(&self.stencil.kinds));
+        polygons.follow(others, i, change, add);
     }
 
     /// (M x)_i = (A x)_i / h_i.

@@ -53,6 +53,7 @@ pub struct ConjugateGradient<'a, S> {
     direction: Vec<DVec3>,
     /// A·direction, then the preconditioned residual.
     work: Vec<DVec3>,
+    sums: Vec<DVec3>,
     /// ⟨H⁻¹e, z⟩ of the last direction update; `None` asks for a fresh start of the directions.
     rho: Option<f64>,
     /// ⟨H⁻¹e, z⟩ of the current residual, where the pass that made it could tell.
@@ -80,6 +81,7 @@ impl<'a, S: System> ConjugateGradient<'a, S> {
             residual: vec![DVec3::ZERO; n],
             direction: vec![DVec3::ZERO; n],
             work: vec![DVec3::ZERO; n],
+            sums: Vec::new(),
             rho: None,
             next_rho: None,
             recursive: None,
@@ -134,7 +136,7 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
             },
             Preconditioner::Ssor { omega } => {
                 self.work.fill(DVec3::ZERO);
-                symmetric_sweep(self.system, residual, *omega, None, &mut self.work);
+                symmetric_sweep(self.system, residual, *omega, None, &mut self.work, &mut self.sums);
                 self.rows
                     .pass_one(&mut self.work, |i, z, tally| {
                         tally.dot(residual[i].dot(*z) / h[i]);

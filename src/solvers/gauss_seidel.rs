@@ -2,7 +2,9 @@
 //!
 //! M is symmetric positive definite where A is non-singular, so every order converges for 0 < ω < 2 (ω = 1 is
 //! Gauss-Seidel); the order changes the rate (Zheng-Cai §5). A sweep reads A once; testing the error of the
-//! result reads it again. One array of N points.
+//! result reads it again. One array of N points. On a matrix-free operator whose rows read [sums over
+//! faces](Operator::all_sums), these are made once a sweep and follow each row that changes, in every way to sweep: O(faces) a
+//! row instead of O(corners of faces).
 
 use std::ops::ControlFlow;
 
@@ -24,6 +26,7 @@ pub struct Sor<'a, S> {
     order: Option<&'a [u32]>,
     current: Vec<DVec3>,
     rows: Rows,
+    sums: Vec<DVec3>,
 }
 
 impl<'a, S: System> Sor<'a, S> {
@@ -32,7 +35,7 @@ impl<'a, S: System> Sor<'a, S> {
     /// # Panics
     /// If the order names a vertex that the system lacks.
     pub fn new(system: &'a S, points: &'a [DVec3], omega: f64, order: Option<&'a [u32]>) -> Self {
-        Sor { system, points, omega, order, current: points.to_vec(), rows: Rows::new(points.len()) }
+        Sor { system, points, omega, order, current: points.to_vec(), rows: Rows::new(points.len()), sums: Vec::new() }
     }
 }
 
@@ -43,11 +46,11 @@ impl<S: System> Iterate for Sor<'_, S> {
 
     fn advance(&mut self) -> Result<(), Failure> {
         let n = self.points.len();
+        let (system, points, omega, x, sums) =
+            (self.system, self.points, self.omega, &mut self.current, &mut self.sums);
         match self.order {
-            Some(order) => {
-                sweep(self.system, self.points, self.omega, order.iter().map(|&i| i as usize), &mut self.current)
-            }
-            None => sweep(self.system, self.points, self.omega, 0..n, &mut self.current),
+            Some(order) => sweep(system, points, omega, order.iter().map(|&i| i as usize), x, sums),
+            None => sweep(system, points, omega, 0..n, x, sums),
         }
         Ok(())
     }

@@ -16,6 +16,7 @@ pub struct Ssor<'a, S> {
     order: Option<&'a [u32]>,
     current: Vec<DVec3>,
     rows: Rows,
+    sums: Vec<DVec3>,
 }
 
 impl<'a, S: System> Ssor<'a, S> {
@@ -24,7 +25,7 @@ impl<'a, S: System> Ssor<'a, S> {
     /// # Panics
     /// If the order names a vertex that the system lacks.
     pub fn new(system: &'a S, points: &'a [DVec3], omega: f64, order: Option<&'a [u32]>) -> Self {
-        Ssor { system, points, omega, order, current: points.to_vec(), rows: Rows::new(points.len()) }
+        Ssor { system, points, omega, order, current: points.to_vec(), rows: Rows::new(points.len()), sums: Vec::new() }
     }
 }
 
@@ -34,7 +35,7 @@ impl<S: System> Iterate for Ssor<'_, S> {
     }
 
     fn advance(&mut self) -> Result<(), Failure> {
-        symmetric_sweep(self.system, self.points, self.omega, self.order, &mut self.current);
+        symmetric_sweep(self.system, self.points, self.omega, self.order, &mut self.current, &mut self.sums);
         Ok(())
     }
 
@@ -50,16 +51,23 @@ impl<S: System> WarmStart for Ssor<'_, S> {
 }
 
 /// A forward and a backward sweep.
-pub fn symmetric_sweep<S: System>(system: &S, points: &[DVec3], omega: f64, order: Option<&[u32]>, x: &mut [DVec3]) {
+pub fn symmetric_sweep<S: System>(
+    system: &S,
+    points: &[DVec3],
+    omega: f64,
+    order: Option<&[u32]>,
+    x: &mut [DVec3],
+    sums: &mut Vec<DVec3>,
+) {
     match order {
         Some(order) => {
             let vertices = order.iter().map(|&i| i as usize);
-            sweep(system, points, omega, vertices.clone(), x);
-            sweep(system, points, omega, vertices.rev(), x);
+            sweep(system, points, omega, vertices.clone(), x, sums);
+            sweep(system, points, omega, vertices.rev(), x, sums);
         }
         None => {
-            sweep(system, points, omega, 0..points.len(), x);
-            sweep(system, points, omega, (0..points.len()).rev(), x);
+            sweep(system, points, omega, 0..points.len(), x, sums);
+            sweep(system, points, omega, (0..points.len()).rev(), x, sums);
         }
     }
 }

@@ -59,6 +59,14 @@ pub trait System: Sync {
         shared.clear();
     }
 
+    /// As [`row`](Self::row), by these sums.
+    fn row_by_sums(&self, i: usize, x: &[DVec3], _shared: &[DVec3]) -> DVec3 {
+        self.row(i, x)
+    }
+
+    /// Has these sums follow a change of x_i by `change`.
+    fn follow(&self, _i: usize, _change: DVec3, _shared: &mut [DVec3]) {}
+
     /// `out[k]` becomes (A x)_i of the k-th row i of `rows`; `shared` comes from [`prepare`](Self::prepare).
     fn product<P: Point>(&self, rows: Range<usize>, x: &[P], _shared: &[P], out: &mut [P]) {
         for (out, i) in out.iter_mut().zip(rows) {
@@ -145,6 +153,16 @@ impl System for Operator {
 
     fn prepare<P: Point>(&self, x: &[P], shared: &mut Vec<P>) {
         self.all_sums(x, shared);
+    }
+
+    #[inline]
+    fn row_by_sums(&self, i: usize, x: &[DVec3], shared: &[DVec3]) -> DVec3 {
+        Operator::row_by_sums(self, i, (x, 0), |k| shared[k])
+    }
+
+    #[inline]
+    fn follow(&self, i: usize, change: DVec3, shared: &mut [DVec3]) {
+        Operator::follow(self, i, change, |k, part| shared[k] += part);
     }
 
     fn product<P: Point>(&self, rows: Range<usize>, x: &[P], shared: &[P], out: &mut [P]) {
@@ -236,12 +254,29 @@ pub fn product<S: System, P: Point>(system: &S, x: &[P], out: &mut [P]) {
     });
 }
 
-/// One in-place sweep over the vertices in the order given.
-pub fn sweep<S: System>(system: &S, points: &[DVec3], omega: f64, order: impl Iterator<Item = usize>, x: &mut [DVec3]) {
+/// One in-place sweep over the vertices in the order given. Where rows share sums over faces, these are made once, in `shared`,
+/// and follow the iterate: a row and what becomes of the sums cost O(faces) instead of O(corners of faces).
+pub fn sweep<S: System>(
+    system: &S,
+    points: &[DVec3],
+    omega: f64,
+    order: impl Iterator<Item = usize>,
+    x: &mut [DVec3],
+    shared: &mut Vec<DVec3>,
+) {
     let diagonal = system.diagonal();
+    system.prepare(x, shared);
+    if shared.is_empty() {
+        for i in order {
+            let e = points[i] - system.row(i, x);
+            x[i] += (omega / diagonal[i]) * e;
+        }
+        return;
+    }
     for i in order {
-        let e = points[i] - system.row(i, x);
-        x[i] += (omega / diagonal[i]) * e;
+        let change = (omega / diagonal[i]) * (points[i] - system.row_by_sums(i, x, shared));
+        x[i] += change;
+        system.follow(i, change, shared);
     }
 }
 

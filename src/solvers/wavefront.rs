@@ -153,8 +153,9 @@ impl<'a> Wavefront<'a> {
         let n = self.operator.len();
         assert!(p.len() == n && x.len() == n, "one point a vertex");
         let Some(band) = self.band else {
+            let mut sums = Vec::new();
             for _ in 0..count {
-                sweep(self.operator, p, omega, 0..n, x);
+                sweep(self.operator, p, omega, 0..n, x, &mut sums);
             }
             return;
         };
@@ -162,23 +163,33 @@ impl<'a> Wavefront<'a> {
         let bands = n.div_ceil(band);
         let at = |j: usize| (j * band).min(n);
         let length = self.group_length::<DVec3>(3 * band);
+        let operator = self.operator;
+        let mut sums = filled(operator.sums_of(0..n).len(), DVec3::ZERO);
         for first in (0..count).step_by(length) {
             let sweeps = length.min(count - first);
             for wave in 0..bands + 3 * (sweeps - 1) {
                 let mut rest = (&mut *x, 0);
+                let mut rest_of_sums = (&mut *sums, 0);
                 let tasks: Vec<_> = (0..sweeps)
                     .rev()
                     .filter_map(|k| wave.checked_sub(3 * k).filter(|&j| j < bands))
                     .map(|j| {
                         let seen = at(j.saturating_sub(1))..at(j + 2);
-                        let start = seen.start;
-                        (at(j)..at(j + 1), cut(&mut rest, seen), start)
+                        let known = operator.sums_of(at(j.saturating_sub(1))..at(j + 1));
+                        let (start, first) = (seen.start, known.start);
+                        let sums = (cut(&mut rest_of_sums, known), first);
+                        (at(j)..at(j + 1), (cut(&mut rest, seen), start), sums)
                     })
                     .collect();
-                tasks.into_par_iter().with_max_len(1).for_each(|(rows, window, start)| {
+                tasks.into_par_iter().with_max_len(1).for_each(|(rows, (window, start), (sums, first))| {
+                    // No row of a face whose first one is here has been passed by this sweep, all by the one before it.
+                    let made = operator.sums_of(rows.clone());
+                    operator.sums(made.start, (window, start), &mut sums[made.start - first..made.end - first]);
                     for i in rows {
-                        let e = p[i] - self.operator.row_within(i, (window, start));
-                        window[i - start] += (omega / diagonal[i]) * e;
+                        let e = p[i] - operator.row_by_sums(i, (window, start), |k| sums[k - first]);
+                        let change = (omega / diagonal[i]) * e;
+                        window[i - start] += change;
+                        operator.follow(i, change, |k, part| sums[k - first] += part);
                     }
                 });
             }
