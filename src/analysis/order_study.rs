@@ -80,7 +80,7 @@ pub fn order_study(
             let vertices = order.order(mesh, surface.incidence());
             let zero = vec![DVec3::ZERO; system.len()];
             let rho = sweep_radius(system, |x| {
-                sweep(system, &zero, omega, vertices.iter().map(|&i| i as usize), x, &mut Vec::new());
+                sweep(system, &zero, omega, vertices.iter().map(|&i| i as usize), x);
             })?;
             let mut method = Sor::new(system, points, omega, Some(&vertices));
             let report = solve(&mut method, stop, &mut |_| ControlFlow::Continue(()));

@@ -52,13 +52,13 @@ pub fn predicted_rate(system: &impl System, spectra: &impl Spectra, method: Meth
             };
             let vertices = || order.iter().map(|&i| i as usize);
             Some(sweep_radius(system, |x| {
-                sweep(system, &points, omega, vertices(), x, &mut Vec::new());
+                sweep(system, &points, omega, vertices(), x);
             })?)
         }
         Method::Ssor { omega, order } => {
             let points = zero();
             Some(sweep_radius(system, |x| {
-                symmetric_sweep(system, &points, omega, order, x, &mut Vec::new());
+                symmetric_sweep(system, &points, omega, order, x);
             })?)
         }
         Method::HeavyBall { interval } | Method::Chebyshev { interval } => {
@@ -71,7 +71,7 @@ pub fn predicted_rate(system: &impl System, spectra: &impl Spectra, method: Meth
             // The preconditioned matrix is I − E with E the error matrix of SSOR, whose spectrum is in [0, ρ].
             let points = zero();
             let radius = sweep_radius(system, |x| {
-                symmetric_sweep(system, &points, omega, None, x, &mut Vec::new());
+                symmetric_sweep(system, &points, omega, None, x);
             })?;
             let ends = Extremes { min: 1.0 - radius, max: 1.0 };
             Some(ends.krylov_rate())

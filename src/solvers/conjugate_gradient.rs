@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::incomplete_cholesky::IncompleteCholesky;
 use super::iteration::{Errors, Failure, Iterate, Outcome, WarmStart};
-use super::ssor::symmetric_sweep;
+use super::ssor::symmetric_sweep_with;
 use super::system::{Rows, System};
 
 /// An approximate inverse of M.
@@ -136,7 +136,7 @@ impl<S: System> Iterate for ConjugateGradient<'_, S> {
             },
             Preconditioner::Ssor { omega } => {
                 self.work.fill(DVec3::ZERO);
-                symmetric_sweep(self.system, residual, *omega, None, &mut self.work, &mut self.sums);
+                symmetric_sweep_with(self.system, residual, *omega, None, &mut self.work, &mut self.sums);
                 self.rows
                     .pass_one(&mut self.work, |i, z, tally| {
                         tally.dot(residual[i].dot(*z) / h[i]);

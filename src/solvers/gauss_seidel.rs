@@ -14,7 +14,7 @@ use super::coloured::Coloured;
 use super::iteration::{
     Errors, Failure, Iterate, Outcome, PATIENCE, PROGRESS, Recorded, Report, Step, Stop, WarmStart, largest,
 };
-use super::system::{Rows, System, sweep};
+use super::system::{Rows, System, sweep_with};
 use super::wavefront::Wavefront;
 use crate::assemble::Operator;
 
@@ -49,8 +49,8 @@ impl<S: System> Iterate for Sor<'_, S> {
         let (system, points, omega, x, sums) =
             (self.system, self.points, self.omega, &mut self.current, &mut self.sums);
         match self.order {
-            Some(order) => sweep(system, points, omega, order.iter().map(|&i| i as usize), x, sums),
-            None => sweep(system, points, omega, 0..n, x, sums),
+            Some(order) => sweep_with(system, points, omega, order.iter().map(|&i| i as usize), x, sums),
+            None => sweep_with(system, points, omega, 0..n, x, sums),
         }
         Ok(())
     }

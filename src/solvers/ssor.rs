@@ -6,7 +6,7 @@
 use glam::DVec3;
 
 use super::iteration::{Errors, Failure, Iterate, WarmStart};
-use super::system::{Rows, System, sweep};
+use super::system::{Rows, System, sweep_with};
 
 /// Symmetric SOR at work.
 pub struct Ssor<'a, S> {
@@ -35,7 +35,7 @@ impl<S: System> Iterate for Ssor<'_, S> {
     }
 
     fn advance(&mut self) -> Result<(), Failure> {
-        symmetric_sweep(self.system, self.points, self.omega, self.order, &mut self.current, &mut self.sums);
+        symmetric_sweep_with(self.system, self.points, self.omega, self.order, &mut self.current, &mut self.sums);
         Ok(())
     }
 
@@ -51,7 +51,12 @@ impl<S: System> WarmStart for Ssor<'_, S> {
 }
 
 /// A forward and a backward sweep.
-pub fn symmetric_sweep<S: System>(
+pub fn symmetric_sweep<S: System>(system: &S, points: &[DVec3], omega: f64, order: Option<&[u32]>, x: &mut [DVec3]) {
+    symmetric_sweep_with(system, points, omega, order, x, &mut Vec::new());
+}
+
+/// As [`symmetric_sweep`], with memory for the sums over faces that rows share.
+pub(super) fn symmetric_sweep_with<S: System>(
     system: &S,
     points: &[DVec3],
     omega: f64,
@@ -62,12 +67,12 @@ pub fn symmetric_sweep<S: System>(
     match order {
         Some(order) => {
             let vertices = order.iter().map(|&i| i as usize);
-            sweep(system, points, omega, vertices.clone(), x, sums);
-            sweep(system, points, omega, vertices.rev(), x, sums);
+            sweep_with(system, points, omega, vertices.clone(), x, sums);
+            sweep_with(system, points, omega, vertices.rev(), x, sums);
         }
         None => {
-            sweep(system, points, omega, 0..points.len(), x, sums);
-            sweep(system, points, omega, (0..points.len()).rev(), x, sums);
+            sweep_with(system, points, omega, 0..points.len(), x, sums);
+            sweep_with(system, points, omega, (0..points.len()).rev(), x, sums);
         }
     }
 }

@@ -254,9 +254,14 @@ pub fn product<S: System, P: Point>(system: &S, x: &[P], out: &mut [P]) {
     });
 }
 
-/// One in-place sweep over the vertices in the order given. Where rows share sums over faces, these are made once, in `shared`,
-/// and follow the iterate: a row and what becomes of the sums cost O(faces) instead of O(corners of faces).
-pub fn sweep<S: System>(
+/// One in-place sweep over the vertices in the order given.
+pub fn sweep<S: System>(system: &S, points: &[DVec3], omega: f64, order: impl Iterator<Item = usize>, x: &mut [DVec3]) {
+    sweep_with(system, points, omega, order, x, &mut Vec::new());
+}
+
+/// As [`sweep`], with memory for the sums over faces that rows share: they are made once and follow the iterate, so that a row and
+/// what becomes of them cost O(faces) instead of O(corners of faces).
+pub(super) fn sweep_with<S: System>(
     system: &S,
     points: &[DVec3],
     omega: f64,

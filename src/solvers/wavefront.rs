@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use super::chebyshev::Recurrence;
 use super::system::STRIP;
-use super::system::sweep;
+use super::system::sweep_with;
 use crate::assemble::Operator;
 use crate::assemble::face_sums::BLOCK;
 use crate::assemble::weights::{Point, Weight};
@@ -155,7 +155,7 @@ impl<'a> Wavefront<'a> {
         let Some(band) = self.band else {
             let mut sums = Vec::new();
             for _ in 0..count {
-                sweep(self.operator, p, omega, 0..n, x, &mut sums);
+                sweep_with(self.operator, p, omega, 0..n, x, &mut sums);
             }
             return;
         };

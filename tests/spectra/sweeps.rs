@@ -24,8 +24,8 @@ fn spectral_radii_of_sweeps_agree_with_dense_ones() {
         let system = assemble(&named(name), scheme);
         let zero = vec![DVec3::ZERO; system.len()];
         for omega in [0.8, 1.0, 1.3] {
-            let plain = |x: &mut [DVec3]| sweep(&system, &zero, omega, 0..zero.len(), x, &mut Vec::new());
-            let both = |x: &mut [DVec3]| symmetric_sweep(&system, &zero, omega, None, x, &mut Vec::new());
+            let plain = |x: &mut [DVec3]| sweep(&system, &zero, omega, 0..zero.len(), x);
+            let both = |x: &mut [DVec3]| symmetric_sweep(&system, &zero, omega, None, x);
             let exact = dense::spectral_radius(&system, plain).expect("small");
             let found = spectral_radius(&system, plain).expect("a value");
             assert!((found.value - exact).abs() < 1e-5 * exact, "{name} SOR({omega}): {found:?} {exact}");
@@ -42,7 +42,7 @@ fn radii_are_found_where_eigenvalues_crowd_the_circle() {
     let system = assemble(&named("torus:24x24"), Scheme::CatmullClark);
     let zero = vec![DVec3::ZERO; system.len()];
     for omega in [1.1, 1.5, 1.7, 1.9] {
-        let plain = |x: &mut [DVec3]| sweep(&system, &zero, omega, 0..zero.len(), x, &mut Vec::new());
+        let plain = |x: &mut [DVec3]| sweep(&system, &zero, omega, 0..zero.len(), x);
         let exact = dense::spectral_radius(&system, plain).expect("small");
         let found = spectral_radius(&system, plain).expect("a value");
         assert!((found.value - exact).abs() < 1e-4 * exact, "SOR({omega}): {found:?} {exact}");
@@ -61,7 +61,7 @@ fn radii_are_found_where_eigenvalues_are_few() {
         let system = assemble(&named(name), scheme);
         let zero = vec![DVec3::ZERO; system.len()];
         for omega in [1e-12, 1e-6, 0.8, 1.0, 1.3] {
-            let plain = |x: &mut [DVec3]| sweep(&system, &zero, omega, 0..zero.len(), x, &mut Vec::new());
+            let plain = |x: &mut [DVec3]| sweep(&system, &zero, omega, 0..zero.len(), x);
             let exact = dense::spectral_radius(&system, plain).expect("small");
             let found = spectral_radius(&system, plain).expect("a value");
             assert!((found.value - exact).abs() < 1e-5 * exact, "{name}, {scheme}, ω = {omega}: {found:?} {exact}");
