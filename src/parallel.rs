@@ -151,6 +151,54 @@ pub fn append<T: Copy + Send + Sync>(vector: &mut Vec<T>, values: &[T]) {
     extend(vector, values.len(), |_| |i| values[i]);
 }
 
+/// Where parts of such lengths start, one after the other, and where the last ends.
+pub fn starts(lengths: impl Iterator<Item = usize>) -> Vec<usize> {
+    let mut starts = vec![0];
+    let mut end = 0;
+    starts.extend(lengths.map(|length| {
+        end += length;
+        end
+    }));
+    starts
+}
+
+/// Appends `item(k, x)` for the elements x of every part, the k-th, one part after the other.
+pub fn append_parts<T: Copy + Send + Sync>(
+    vector: &mut Vec<T>,
+    parts: &[&[T]],
+    item: impl Fn(usize, T) -> T + Send + Sync,
+) {
+    let starts = starts(parts.iter().map(|part| part.len()));
+    extend(vector, starts[parts.len()], |first| {
+        // The last part that starts here or before, which is not empty.
+        let mut k = starts[..parts.len()].partition_point(|&start| start <= first) - 1;
+        let mut rest = parts[k][first - starts[k]..].iter();
+        let item = &item;
+        move |_| loop {
+            match rest.next() {
+                Some(&x) => return item(k, x),
+                None => {
+                    k += 1;
+                    rest = parts[k].iter();
+                }
+            }
+        }
+    });
+}
+
+/// Does `work` by all threads while `here` runs on this one, and gives what that gives once both are done.
+pub fn beside<R>(work: impl FnOnce() + Send, here: impl FnOnce() -> R) -> R {
+    rayon::in_place_scope(|scope| {
+        scope.spawn(|_| work());
+        here()
+    })
+}
+
+/// The number of threads.
+pub fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
 /// The first number below `count` of which `is_it` holds.
 pub fn find_first(count: usize, is_it: impl Fn(usize) -> bool + Sync) -> Option<usize> {
     fn shared(count: usize, chunk: &(dyn Fn(Range<usize>) -> Option<usize> + Sync)) -> Option<usize> {

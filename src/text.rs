@@ -1,12 +1,13 @@
 //! Text files as tokens that know their line, and numbers as text that reads back equal.
 
 use std::fmt::Display;
-use std::io::{self, Write};
 use std::path::Path;
 
 use glam::DVec3;
 
 use crate::{Error, Result};
+
+pub(crate) mod parts;
 
 /// A place in the bytes of a text file. Lines end with `\n`, `\r\n` or `\r`, in a file whose first line does so with
 /// `\n\r`, and are counted from 1. A token ends at white space and at a `\` that ends its line, which continues it;
@@ -138,8 +139,7 @@ impl<'a> Scanner<'a> {
 
     pub fn skip_to_line_end(&mut self) {
         let rest = self.rest();
-        let length = rest.iter().position(|&b| is_line_end(b));
-        self.at += length.unwrap_or(rest.len());
+        self.at += memchr::memchr2(b'\n', b'\r', rest).unwrap_or(rest.len());
     }
 
     /// Skips one line end if the place is at one.
@@ -181,7 +181,7 @@ impl<'a> Scanner<'a> {
     /// The floating-point number here, correctly rounded; `NaN` and `inf` are numbers. Otherwise `None`, and the
     /// place stays.
     pub fn number(&mut self) -> Option<f64> {
-        if let Some((number, length)) = short_decimal(self.rest()) {
+        if let Some((number, length)) = decimal(self.rest(), is_separator) {
             self.at += length;
             return Some(number);
         }
@@ -195,11 +195,12 @@ impl<'a> Scanner<'a> {
     /// Otherwise `None`, and the place stays.
     pub fn number_in_list(&mut self) -> Option<f64> {
         let rest = self.rest();
+        if let Some((number, length)) = decimal(rest, ends_word_in_list) {
+            self.at += length;
+            return Some(number);
+        }
         let word = &rest[..word_in_list(rest)];
-        let number = match short_decimal(word) {
-            Some((number, _)) => number,
-            None => std::str::from_utf8(word).ok()?.parse().ok()?,
-        };
+        let number = std::str::from_utf8(word).ok()?.parse().ok()?;
         self.at += word.len();
         Some(number)
     }
@@ -275,6 +276,22 @@ impl<'a> Scanner<'a> {
             self.number()
         };
         Some(DVec3::new(coordinate()?, coordinate()?, coordinate()?))
+    }
+
+    /// The three numbers after `keyword` bytes, and the length of all, if each is a decimal and they have spaces and the end
+    /// of a line around them. The place stays.
+    pub fn plain_point(&self, keyword: usize) -> Option<(DVec3, usize)> {
+        let rest = self.rest();
+        let mut at = keyword;
+        let mut point = DVec3::ZERO;
+        for axis in 0..3 {
+            at += spaces(&rest[at..]);
+            let (number, length) = decimal(&rest[at..], |b| b == b' ' || is_line_end(b))?;
+            point[axis] = number;
+            at += length;
+        }
+        at += spaces(&rest[at..]);
+        rest.get(at).is_some_and(|&b| is_line_end(b)).then_some((point, at))
     }
 
     /// The whole number here, if it fits `T`. Otherwise `None`, and the place stays.
@@ -362,44 +379,28 @@ fn hint(word: &[u8]) -> Option<&'static str> {
     })
 }
 
-/// A decimal without exponent of at most 15 digits and its length, where a separator or the end follows; `None` for
-/// all else. Digits and power of ten are exact doubles, so that their quotient is correctly rounded (Clinger 1990).
-fn short_decimal(bytes: &[u8]) -> Option<(f64, usize)> {
-    const MAX_DIGITS: usize = 15;
-    const POWERS: [f64; MAX_DIGITS + 1] =
-        [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
-    let sign = usize::from(bytes.first() == Some(&b'-'));
-    let mut digits = 0u64;
-    let mut at = sign;
-    let mut point = None;
-    loop {
-        match bytes.get(at) {
-            Some(b @ b'0'..=b'9') => digits = digits.wrapping_mul(10).wrapping_add(u64::from(b - b'0')),
-            Some(b'.') if point.is_none() => point = Some(at),
-            Some(&b) if !is_separator(b) => return None,
-            _ => break,
-        }
-        at += 1;
-        if at > sign + 1 + MAX_DIGITS {
-            return None;
-        }
-    }
-    let length = at - sign - usize::from(point.is_some());
-    if length == 0 || length > MAX_DIGITS {
+/// The decimal here, correctly rounded, and its length, where it starts with a digit or with `-` and a digit, and what
+/// `ends` it or the end follows; `None` for all else, which may be a number too.
+#[inline]
+fn decimal(bytes: &[u8], ends: fn(u8) -> bool) -> Option<(f64, usize)> {
+    let first = if bytes.first() == Some(&b'-') { 1 } else { 0 };
+    if !bytes.get(first)?.is_ascii_digit() {
         return None;
     }
-    let decimals = point.map_or(0, |p| at - p - 1);
-    let size = digits as f64 / POWERS[decimals];
-    Some((if sign == 1 { -size } else { size }, at))
+    let (number, length) = fast_float2::parse_partial(bytes).ok()?;
+    bytes.get(length).is_none_or(|&b| ends(b)).then_some((number, length))
 }
 
 /// The number that the digits at the start of `bytes` form, and how many digits they are. `None` without digits, or
 /// if the number does not fit.
 pub(crate) fn leading_digits(bytes: &[u8]) -> Option<(u64, usize)> {
+    /// So many digits always fit.
+    const FITTING: usize = 19;
     let mut value = 0u64;
     let mut length = 0;
     while let Some(digit @ b'0'..=b'9') = bytes.get(length) {
-        value = value.checked_mul(10)?.checked_add(u64::from(digit - b'0'))?;
+        let digit = u64::from(digit - b'0');
+        value = if length < FITTING { value * 10 + digit } else { value.checked_mul(10)?.checked_add(digit)? };
         length += 1;
     }
     (length > 0).then_some((value, length))
@@ -425,6 +426,11 @@ fn is_separator(b: u8) -> bool {
     is_blank(b) || is_line_end(b) || b == b'\\'
 }
 
+/// How many spaces are here.
+fn spaces(bytes: &[u8]) -> usize {
+    bytes.iter().take_while(|&&b| b == b' ').count()
+}
+
 /// How long the word here is, among marks.
 pub(crate) fn word_in_list(rest: &[u8]) -> usize {
     rest.iter().position(|&b| ends_word_in_list(b)).unwrap_or(rest.len())
@@ -440,25 +446,30 @@ pub(crate) fn continues_line(rest: &[u8]) -> bool {
 }
 
 /// Appends the shortest decimal that reads back equal, with an exponent where plain digits would be long.
-pub(crate) fn push_number(text: &mut Vec<u8>, x: f64) -> io::Result<()> {
+pub(crate) fn push_number(text: &mut Vec<u8>, x: f64) {
     let size = x.abs();
-    if (size < 1e-5 && size > 0.0) || (1e17..f64::INFINITY).contains(&size) {
-        write!(text, "{x:e}")
+    if (1e-5..1e16).contains(&size) || size == 0.0 {
+        // Plain digits here too, but for the decimal of whole numbers.
+        let mut buffer = zmij::Buffer::new();
+        let digits = buffer.format_finite(x);
+        text.extend_from_slice(digits.strip_suffix(".0").unwrap_or(digits).as_bytes());
+    } else if (size < 1e-5 && size > 0.0) || (1e17..f64::INFINITY).contains(&size) {
+        text.extend_from_slice(format!("{x:e}").as_bytes());
     } else {
-        write!(text, "{x}")
+        text.extend_from_slice(format!("{x}").as_bytes());
     }
 }
 
 /// Appends a number of at most nine significant digits, which hold every number in single precision; `nan` and `inf` for
 /// what is not finite.
-pub(crate) fn push_nine_digits(text: &mut Vec<u8>, x: f64) -> io::Result<()> {
+pub(crate) fn push_nine_digits(text: &mut Vec<u8>, x: f64) {
     const LEAST: i32 = -4;
     const TENS: [f64; 13] = [1e-4, 1e-3, 1e-2, 1e-1, 1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8];
     const POWERS: [f64; 13] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12];
     let size = x.abs();
     if x.is_nan() {
         text.extend_from_slice(b"nan");
-        return Ok(());
+        return;
     }
     if !(TENS[0]..1e9).contains(&size) {
         let rounded = if size == 0.0 || !x.is_finite() { x } else { format!("{x:.8e}").parse().unwrap_or(x) };
@@ -485,16 +496,15 @@ pub(crate) fn push_nine_digits(text: &mut Vec<u8>, x: f64) -> io::Result<()> {
         push_unsigned(text, unit + digits % unit);
         text.remove(start);
     }
-    Ok(())
 }
 
 /// Appends the three coordinates, separated by spaces.
-pub(crate) fn push_point(text: &mut Vec<u8>, p: DVec3) -> io::Result<()> {
-    push_number(text, p.x)?;
+pub(crate) fn push_point(text: &mut Vec<u8>, p: DVec3) {
+    push_number(text, p.x);
     text.push(b' ');
-    push_number(text, p.y)?;
+    push_number(text, p.y);
     text.push(b' ');
-    push_number(text, p.z)
+    push_number(text, p.z);
 }
 
 /// Appends a whole number; the formatting machinery would take most of a writer's time.
@@ -670,7 +680,7 @@ mod tests {
             (f64::NEG_INFINITY, "-inf"),
         ] {
             let mut out = Vec::new();
-            push_number(&mut out, x).unwrap();
+            push_number(&mut out, x);
             assert_eq!(String::from_utf8(out).unwrap(), text);
         }
     }
@@ -691,25 +701,24 @@ mod tests {
         }
 
         #[test]
-        fn short_decimals_are_those_of_the_standard_library(text in r"-?[0-9]{0,8}\.?[0-9]{0,8}") {
-            let expected = text.parse::<f64>().ok().map(f64::to_bits);
-            let digits = text.bytes().filter(u8::is_ascii_digit).count();
-            let found = short_decimal(text.as_bytes());
-            prop_assert_eq!(found.is_some(), (1..=15).contains(&digits));
-            if let Some((number, length)) = found {
-                prop_assert_eq!(Some(number.to_bits()), expected);
-                prop_assert_eq!(length, text.len());
-            }
-        }
-
-        #[test]
         fn every_double_reads_back_with_its_bits(bits: u64) {
             let x = f64::from_bits(bits);
             let mut text = Vec::new();
-            push_number(&mut text, x).unwrap();
+            push_number(&mut text, x);
             prop_assert!(text.len() <= 24);
             let back = Scanner::new(&text, Path::new("t")).number().unwrap();
             prop_assert!(back.to_bits() == bits || (x.is_nan() && back.is_nan()));
+        }
+
+        #[test]
+        fn numbers_are_written_as_the_standard_library_has_them(bits: u64, small in -1e6..1e6f64, whole: i64) {
+            for x in [f64::from_bits(bits), small, small.round(), small / 1e9, whole as f64, (small * 1e3).round() / 1e3] {
+                let size = x.abs();
+                let long = (size < 1e-5 && size > 0.0) || (1e17..f64::INFINITY).contains(&size);
+                let mut text = Vec::new();
+                push_number(&mut text, x);
+                prop_assert_eq!(String::from_utf8(text).unwrap(), if long { format!("{x:e}") } else { x.to_string() });
+            }
         }
 
         #[test]

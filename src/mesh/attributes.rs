@@ -7,6 +7,7 @@ use std::fmt;
 use std::io::{self, Write};
 
 use super::topology::NONE;
+use crate::parallel;
 
 /// What an OBJ file says of the faces of a mesh and of their corners beyond its geometry and its
 /// [sharpness](super::file_tags).
@@ -25,6 +26,8 @@ pub struct Attributes {
 /// Lines that the corners of faces refer to.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CornerLines {
+    /// Those of the parts of the file before, while a part is read.
+    before: usize,
     count: usize,
     /// One after the other, each with its end.
     lines: Vec<u8>,
@@ -55,6 +58,29 @@ impl CornerLines {
         self.of_corner.get(corner).copied().filter(|&line| line != NONE)
     }
 
+    /// Forgets what was read, to read a part of a file that has so many lines before it.
+    pub(super) fn begin_part(&mut self, before: usize) {
+        self.before = before;
+        self.count = 0;
+        self.lines.clear();
+        self.of_corner.clear();
+    }
+
+    /// Adds those of the part that follows; `corners` is the number of all corners before it.
+    fn append(&mut self, next: &CornerLines, corners: usize) {
+        self.count += next.count;
+        parallel::append(&mut self.lines, &next.lines);
+        if !next.of_corner.is_empty() {
+            self.of_corner.resize(corners, NONE);
+            parallel::append(&mut self.of_corner, &next.of_corner);
+        }
+    }
+
+    /// Takes back the references of the corners from the `first` on.
+    pub(super) fn forget_corners(&mut self, first: usize) {
+        self.of_corner.truncate(first);
+    }
+
     /// Adds a line, without its end.
     pub(super) fn push(&mut self, line: &[u8]) {
         self.lines.extend_from_slice(line);
@@ -65,7 +91,7 @@ impl CornerLines {
     /// Lets `corner`, which comes after all that refer to a line so far, refer to one: from 1, or back from −1 for the last
     /// one here. The line may come later.
     pub(super) fn refer(&mut self, corner: usize, reference: i64) {
-        let line = if reference < 0 { self.count as i64 + reference } else { reference - 1 };
+        let line = if reference < 0 { (self.before + self.count) as i64 + reference } else { reference - 1 };
         self.of_corner.resize(corner, NONE);
         // What reaches before the first is no line, as what lies beyond the last.
         self.of_corner.push(u32::try_from(line).unwrap_or(NONE - 1));
@@ -102,6 +128,14 @@ impl Attributes {
     /// Whether the file says nothing of the kind.
     pub fn is_empty(&self) -> bool {
         self.texture.is_empty() && self.normals.is_empty() && self.statements.is_empty()
+    }
+
+    /// Adds those of the part that follows; `corners` is the number of all before it, and `faces` is added to the numbers of
+    /// its faces.
+    pub(super) fn append(&mut self, next: &Attributes, corners: usize, faces: u32) {
+        self.texture.append(&next.texture, corners);
+        self.normals.append(&next.normals, corners);
+        self.statements.extend(next.statements.iter().map(|(face, text)| (face + faces, text.clone())));
     }
 
     /// Those of a mesh whose faces and corners were these, the faces in their order.

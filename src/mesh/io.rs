@@ -4,7 +4,7 @@
 //! vertex, coordinates that are not finite, and so on, are for [`validate`](super::validate) to collect.
 
 use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::str::FromStr;
 
@@ -19,8 +19,15 @@ use super::weld::{Welded, weld};
 use super::{Faces, Mesh, gltf, obj, obj_normals, off, ply, stl, usd};
 use crate::memory::require;
 use crate::output::write_file;
+use crate::text::parts::write_in_parts;
 use crate::text::{push_point, push_unsigned};
-use crate::{Error, Result, names};
+use crate::{Error, Result, names, pages, parallel};
+
+/// Bytes by which a format is told, before the rest is read.
+const HEAD: usize = 1 << 16;
+
+/// Bytes that a thread reads at once.
+const READ_AT_ONCE: usize = 1 << 20;
 
 /// A mesh with what its file tells about it.
 #[derive(Clone, Debug)]
@@ -182,24 +189,35 @@ impl Format {
         let refused = |e| Error::io(path, "read", e);
         let file = File::open(path).map_err(refused)?;
         let found = file.metadata().map_err(refused)?;
-        self.read_all(file, path, found.is_file().then_some(found.len()))
+        if !found.is_file() {
+            return self.read_all(file, path);
+        }
+        let head = self.read_head(&file, path)?;
+        if head.len() < HEAD {
+            return Ok(head);
+        }
+        self.require_room(found.len(), path)?;
+        read_whole(&file, head, found.len()).map_err(refused)
     }
 
-    /// Reads all bytes, of which there are so many if that is known, only if the first can be of this format and memory
-    /// has room for the mesh.
-    fn read_all(self, mut source: impl Read, path: &Path, size: Option<u64>) -> Result<Vec<u8>> {
-        const HEAD: u64 = 1 << 16;
-        let refused = |e| Error::io(path, "read", e);
-        let has_room = |size: u64| {
-            require(
-                self.memory_per_byte().saturating_mul(size),
-                || format!("{}: the mesh", path.display()),
-                "use a smaller one",
-            )
-        };
+    /// Reads all bytes of a stream, only if the first can be of this format and memory has room for the mesh.
+    fn read_all(self, mut source: impl Read, path: &Path) -> Result<Vec<u8>> {
+        let mut bytes = self.read_head(&mut source, path)?;
+        let mut there = 0;
+        // As much again as is there already, until there is no more.
+        while bytes.len() >= HEAD.max(2 * there) {
+            there = bytes.len();
+            self.require_room(2 * there as u64, path)?;
+            source.by_ref().take(there as u64).read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
+        }
+        Ok(bytes)
+    }
+
+    /// Reads the first bytes, [`HEAD`] unless there are fewer, and refuses what cannot be of this format.
+    fn read_head(self, source: impl Read, path: &Path) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
-        source.by_ref().take(HEAD).read_to_end(&mut bytes).map_err(refused)?;
-        if (bytes.len() as u64) < HEAD {
+        source.take(HEAD as u64).read_to_end(&mut bytes).map_err(|e| Error::io(path, "read", e))?;
+        if bytes.len() < HEAD {
             return Ok(bytes);
         }
         // Whole lines, unless the last is longer than a header's lines are.
@@ -213,20 +231,15 @@ impl Format {
             Format::Stl => stl::check_head(&bytes, path),
             Format::Gltf => gltf::check_head(&bytes, path),
         }?;
-        if let Some(size) = size {
-            has_room(size)?;
-            source.read_to_end(&mut bytes).map_err(refused)?;
-            return Ok(bytes);
-        }
-        // As much again as is there already, until there is no more.
-        loop {
-            let there = bytes.len();
-            has_room(2 * there as u64)?;
-            source.by_ref().take(there as u64).read_to_end(&mut bytes).map_err(refused)?;
-            if bytes.len() < 2 * there {
-                return Ok(bytes);
-            }
-        }
+        Ok(bytes)
+    }
+
+    fn require_room(self, size: u64, path: &Path) -> Result<()> {
+        require(
+            self.memory_per_byte().saturating_mul(size),
+            || format!("{}: the mesh", path.display()),
+            "use a smaller one",
+        )
     }
 
     fn parse(self, bytes: &[u8], path: &Path) -> Result<Loaded> {
@@ -238,8 +251,47 @@ impl Format {
             Format::Stl => stl::read_bytes(bytes, path),
             Format::Gltf => gltf::read_bytes(bytes, path),
         }?;
-        Ok(Loaded { checksum: Some(crc32fast::hash(bytes)), ..loaded })
+        Ok(Loaded { checksum: Some(checksum(bytes)), ..loaded })
     }
+}
+
+/// CRC-32, by parts.
+fn checksum(bytes: &[u8]) -> u32 {
+    let parts = parallel::map(bytes.len(), READ_AT_ONCE, |range| {
+        let mut part = crc32fast::Hasher::new();
+        part.update(&bytes[range]);
+        part
+    });
+    let mut all = crc32fast::Hasher::new();
+    parts.iter().for_each(|part| all.combine(part));
+    all.finalize()
+}
+
+/// The bytes of a file of which `head` has been read, and which has `size` in all, as far as is known.
+fn read_whole(mut file: &File, head: Vec<u8>, size: u64) -> io::Result<Vec<u8>> {
+    let size = usize::try_from(size).unwrap_or(usize::MAX);
+    let mut bytes = head;
+    #[cfg(unix)]
+    if let Some(rest) = size.checked_sub(bytes.len()) {
+        use std::os::unix::fs::FileExt;
+        // Memory that the system clears anyway, in large pages, by all threads.
+        let head = std::mem::replace(&mut bytes, pages::large(vec![0; size]));
+        let (start, end) = bytes.split_at_mut(head.len());
+        start.copy_from_slice(&head);
+        let mut results: Vec<io::Result<()>> = (0..rest.div_ceil(READ_AT_ONCE)).map(|_| Ok(())).collect();
+        parallel::chunks_with(end, READ_AT_ONCE, &mut results, |first, part, result| {
+            *result = file.read_exact_at(part, (head.len() + first) as u64);
+        });
+        match results.into_iter().collect::<io::Result<()>>() {
+            Ok(()) => file.seek(SeekFrom::Start(size as u64)).map(|_| ())?,
+            // It has become shorter.
+            Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => bytes = head,
+            Err(e) => return Err(e),
+        }
+    }
+    // What has been added since, or all.
+    file.read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// Whether a name ends as mesh files do.
@@ -279,7 +331,7 @@ pub fn read(path: &Path) -> Result<Loaded> {
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn read_from(source: impl Read, format: Format, name: &Path) -> Result<Loaded> {
-    format.parse(&format.read_all(source, name, None)?, name)
+    format.parse(&format.read_all(source, name)?, name)
 }
 
 /// Reads the normals of a mesh file, one a vertex and zero for a vertex without, as in the file; `None` if it has none.
@@ -375,32 +427,29 @@ pub(super) fn check_normals(mesh: &Mesh, normals: Option<&[DVec3]>) {
     assert!(normals.is_none_or(|n| n.len() == mesh.len()), "one normal for each vertex");
 }
 
-/// Writes `rows` lines, each filled by `push` into an empty buffer.
+/// Writes `rows` lines, whose text `push` appends.
 pub(super) fn write_rows(
     out: &mut dyn Write,
     rows: usize,
-    mut push: impl FnMut(&mut Vec<u8>, usize) -> io::Result<()>,
+    push: impl Fn(&mut Vec<u8>, usize) + Sync,
 ) -> io::Result<()> {
-    let mut text = Vec::new();
-    for row in 0..rows {
-        text.clear();
-        push(&mut text, row)?;
-        text.push(b'\n');
-        out.write_all(&text)?;
-    }
-    Ok(())
+    write_in_parts(out, rows, &|rows, text| {
+        for row in rows {
+            push(text, row);
+            text.push(b'\n');
+        }
+    })
 }
 
 /// Writes positions and faces as OFF and text PLY have them: `x y z` and, where there are normals, `nx ny nz`; then a face's
 /// size and its vertices.
 pub(super) fn write_text_rows(out: &mut dyn Write, mesh: &Mesh, normals: Option<&[DVec3]>) -> io::Result<()> {
     write_rows(out, mesh.len(), |text, v| {
-        push_point(text, mesh.positions[v])?;
+        push_point(text, mesh.positions[v]);
         if let Some(normals) = normals {
             text.push(b' ');
-            push_point(text, normals[v])?;
+            push_point(text, normals[v]);
         }
-        Ok(())
     })?;
     write_rows(out, mesh.faces.len(), |text, f| {
         let face = mesh.faces.face(f);
@@ -409,13 +458,14 @@ pub(super) fn write_text_rows(out: &mut dyn Write, mesh: &Mesh, normals: Option<
             text.push(b' ');
             push_unsigned(text, u64::from(v));
         }
-        Ok(())
     })
 }
 
 /// A mesh while it is read, within the limits of 32-bit indices. What is refused is said without the place, which
 /// the reader knows.
 pub(super) struct Builder {
+    /// Vertices, faces and corners of the parts of the file before, if this is a part.
+    before: [usize; 3],
     positions: Vec<DVec3>,
     offsets: Vec<u32>,
     corners: Vec<u32>,
@@ -425,44 +475,109 @@ pub(super) struct Builder {
 impl Builder {
     /// `lines` is empty, or `None` where they are not kept.
     pub fn new(lines: Option<Lines>) -> Self {
-        Builder { positions: Vec::new(), offsets: vec![0], corners: Vec::new(), lines }
+        Builder { before: [0; 3], positions: Vec::new(), offsets: vec![0], corners: Vec::new(), lines }
+    }
+
+    /// Forgets what was read, to read a part of a file that has so many vertices, faces and corners before it.
+    pub fn begin_part(&mut self, before: [usize; 3]) {
+        self.before = before;
+        self.positions.clear();
+        self.offsets.truncate(1);
+        self.corners.clear();
+        if let Some(lines) = &mut self.lines {
+            lines.vertices.clear();
+            lines.faces.clear();
+        }
+    }
+
+    /// Another one that keeps lines if this does.
+    pub fn empty(&self) -> Self {
+        Builder::new(self.lines.is_some().then(Lines::default))
+    }
+
+    /// Vertices, faces and corners so far, with those before the part.
+    pub fn counts(&self) -> [usize; 3] {
+        let here = [self.positions.len(), self.offsets.len() - 1, self.corners.len()];
+        [0, 1, 2].map(|k| self.before[k] + here[k])
+    }
+
+    /// Adds the parts that follow, whose lines are counted from one after `lines[k]`. If they are more than 32-bit
+    /// indices can name, nothing is added, and the answer is no.
+    pub fn append(&mut self, parts: &[&Builder], lines: &[usize]) -> bool {
+        let [vertices, faces, corners]: [usize; 3] =
+            [0, 1, 2].map(|k| parts.iter().map(|part| part.counts()[k] - part.before[k]).sum());
+        let before = self.corners.len();
+        if (self.positions.len() + vertices).max(before + corners) > u32::MAX as usize {
+            return false;
+        }
+        make_room(&mut self.positions, vertices);
+        make_room(&mut self.corners, corners);
+        make_room(&mut self.offsets, faces);
+        if let Some(lines) = &mut self.lines {
+            make_room(&mut lines.vertices, vertices);
+            make_room(&mut lines.faces, faces);
+        }
+        fn of<'a, T>(parts: &[&'a Builder], array: impl Fn(&'a Builder) -> &'a [T]) -> Vec<&'a [T]> {
+            parts.iter().map(|part| array(part)).collect()
+        }
+        let starts = parallel::starts(parts.iter().map(|part| part.corners.len()));
+        parallel::append_parts(&mut self.positions, &of(parts, |part| &part.positions), |_, p| p);
+        parallel::append_parts(&mut self.corners, &of(parts, |part| &part.corners), |_, v| v);
+        parallel::append_parts(&mut self.offsets, &of(parts, |part| &part.offsets[1..]), |k, end| {
+            end + (before + starts[k]) as u32
+        });
+        if let Some(all) = &mut self.lines {
+            let shifted = |k: usize, line: u32| saturate(lines[k] + line as usize);
+            let of_parts = || parts.iter().filter_map(|part| part.lines.as_ref());
+            let [vertices, faces] =
+                [Vec::from_iter(of_parts().map(|l| &l.vertices[..])), Vec::from_iter(of_parts().map(|l| &l.faces[..]))];
+            parallel::append_parts(&mut all.vertices, &vertices, shifted);
+            parallel::append_parts(&mut all.faces, &faces, shifted);
+        }
+        true
     }
 
     /// Makes room for the vertices that a header announces, at most as many as the file can still hold, so that an
     /// absurd count asks for no memory.
     pub fn reserve_vertices(&mut self, count: u64, at_most: usize) {
         let count = capped(count, at_most);
-        self.positions.reserve(count);
+        make_room(&mut self.positions, count);
         if let Some(lines) = &mut self.lines {
-            lines.vertices.reserve(count);
+            make_room(&mut lines.vertices, count);
         }
     }
 
     /// The same for faces.
     pub fn reserve_faces(&mut self, count: u64, at_most: usize) {
         let count = capped(count, at_most);
-        self.offsets.reserve(count);
-        self.corners.reserve(3 * count);
+        make_room(&mut self.offsets, count);
+        make_room(&mut self.corners, 3 * count);
         if let Some(lines) = &mut self.lines {
-            lines.faces.reserve(count);
+            make_room(&mut lines.faces, count);
         }
     }
 
+    /// Those of the parts before too, as everywhere where nothing else is said.
     pub fn vertices(&self) -> usize {
-        self.positions.len()
+        self.before[0] + self.positions.len()
     }
 
     pub fn faces(&self) -> usize {
-        self.offsets.len() - 1
+        self.before[1] + self.offsets.len() - 1
     }
 
-    /// Those of the face being read too.
+    /// Those of this part alone, and of the face being read too.
     pub fn corners(&self) -> usize {
         self.corners.len()
     }
 
+    /// Takes back the corners from the `first` on, of a face that is not ended.
+    pub fn forget_corners(&mut self, first: usize) {
+        self.corners.truncate(first);
+    }
+
     pub fn vertex(&mut self, position: DVec3, line: usize) -> std::result::Result<(), String> {
-        if self.positions.len() == u32::MAX as usize {
+        if self.vertices() == u32::MAX as usize {
             return Err("more vertices than 32-bit indices can name, 4294967295".into());
         }
         self.positions.push(position);
@@ -478,14 +593,14 @@ impl Builder {
     }
 
     pub fn end_face(&mut self, line: usize) -> std::result::Result<(), String> {
-        let size = self.corners.len() - self.offsets[self.faces()] as usize;
+        let size = self.corners.len() - self.offsets[self.offsets.len() - 1] as usize;
         if size < 3 {
             return Err(few_corners(self.faces(), size));
         }
-        let Ok(end) = u32::try_from(self.corners.len()) else {
+        if self.before[2] + self.corners.len() > u32::MAX as usize {
             return Err("more face corners than 32-bit indices can name, 4294967295".into());
-        };
-        self.offsets.push(end);
+        }
+        self.offsets.push(self.corners.len() as u32);
         if let Some(lines) = &mut self.lines {
             lines.faces.push(saturate(line));
         }
@@ -531,6 +646,14 @@ pub(super) fn joined(loaded: Loaded, what: &str, why: &str) -> Loaded {
     Loaded { mesh, lines, remarks, ..loaded }
 }
 
+/// Makes room for more items, of what has to grow for twice as many.
+fn make_room<T>(vector: &mut Vec<T>, more: usize) {
+    if vector.capacity() - vector.len() < more {
+        vector.reserve(more.max(vector.len()));
+        *vector = pages::large(std::mem::take(vector));
+    }
+}
+
 fn capped(count: u64, at_most: usize) -> usize {
     usize::try_from(count).unwrap_or(usize::MAX).min(at_most)
 }
@@ -542,6 +665,7 @@ fn saturate(line: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     #[test]
     fn formats_are_known_by_extension() {
@@ -627,6 +751,133 @@ mod tests {
             let path = folder.path().join(name);
             std::fs::write(&path, text).unwrap();
             assert_eq!(read(&path).unwrap().mesh.faces.len(), 1, "{name}");
+        }
+    }
+
+    /// A mesh with all that is told about it, or the message.
+    fn told(result: Result<Loaded>) -> String {
+        result.map_or_else(|error| error.to_string(), |loaded| format!("{loaded:?}"))
+    }
+
+    const STATEMENTS: [&str; 36] = [
+        "v 0 0 0",
+        "v 1.5 -2e3 .5",
+        "v 1 2 3 0.5",
+        "v\t1 2\\",
+        "3",
+        "vt 0.25 1 # a",
+        "vn 0 0 1",
+        "vt 1 \\",
+        "f 1 2 3",
+        "f 1 2 3 4 ",
+        "f -1 -2 -3",
+        "f 1/1/1 2/2/2 3//1",
+        "f 1/-1/-1 2/1 -2//-1",
+        " f 2 1 4294967295 # all",
+        "f 1 2 \\",
+        "3 # b",
+        "f 1 2",
+        "f 1 2 0",
+        "f 1/x 2 3",
+        "f -9 1 2",
+        "v 1 2 x",
+        "v 1 2",
+        "g a \\",
+        "usemtl c:\\d\\",
+        "o b",
+        "s off",
+        "l 1 2",
+        "blob 1",
+        "blob \\",
+        "t crease 2/1/0 0 1 10",
+        "t corner 1/1/0 0 2.5",
+        "t interpolateboundary 1/0/0 2",
+        "t crease 2/1 0",
+        "# c \\",
+        "",
+        " \t",
+    ];
+    const ROWS: [&str; 12] = [
+        "0 0 0",
+        "1 2.5 -3e1 ",
+        "1 2",
+        "1 2 x",
+        "0 0 0 255 0 0",
+        "0 0 0 0 1 0 9 9 9",
+        "",
+        "# a",
+        "\t0 1 0 # b",
+        "3 0 1 2",
+        "4 0 1 2 3",
+        "0 0 0 1 1 1",
+    ];
+    const FACES: [&str; 9] =
+        ["3 0 1 2", "4 0 1 2 3 ", "3 2 1 0 1 0 0", "3 0 1", "2 0 1", "3 0 1 -2", " # b", "", "5 0 1 2 3 4"];
+
+    proptest! {
+        /// However a file is cut, its mesh, lines and remarks are the same, or what is wrong with it.
+        #[test]
+        fn parts_of_all_sizes_give_the_same_mesh_or_message(
+            statements in prop::collection::vec(prop::sample::select(&STATEMENTS[..]), 0..30),
+            plain in prop::collection::vec(prop::sample::select(&["v 0 0 1", "v 1 2 3", "f 1 2 3", "f -1 1 2", "vt 1", "f 1/1 2/-1 1", "g x"][..]), 0..30),
+            rows in prop::collection::vec((prop::sample::select(&ROWS[..]), 0..4usize), 0..20),
+            faces in prop::collection::vec((prop::sample::select(&FACES[..]), 0..4usize), 0..20),
+            wrong in (-1..=1i64, -1..=1i64),
+            end in prop::sample::select(&["\n", "\r\n", "\r", "\n\r", "\n\n", " \n#\n"][..]),
+            header in prop::sample::select(&["OFF", "COFF", "NOFF", "CNOFF"][..]),
+            size in 1..120usize,
+            cut in 0..3usize,
+        ) {
+            // Three in four rows are what nearly all files have.
+            let usual = |rows: &[(&str, usize)], usual: &str| -> Vec<String> {
+                rows.iter().map(|&(odd, k)| if k == 0 { odd } else { usual }.to_owned()).collect()
+            };
+            let row = if header == "OFF" { "0.5 1 2" } else { "0.5 1 2 0 0 1" };
+            let (rows, faces) = (usual(&rows, row), usual(&faces, "3 0 1 2"));
+            let count = |rows: &[String], wrong: i64| {
+                let there = rows.iter().filter(|row| !matches!(row.trim_ascii().bytes().next(), None | Some(b'#'))).count();
+                (there as i64 + wrong).max(0)
+            };
+            let counts = (count(&rows, wrong.0), count(&faces, wrong.1));
+            let off = vec![header.to_owned(), format!("{} {} 0", counts.0, counts.1)];
+            let ply = format!("ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty double y\nproperty int z\n\
+                              element face {}\nproperty list uchar int vertex_index\nend_header", counts.0, counts.1);
+            let ply = ply.lines().map(str::to_owned).collect();
+            for (name, read, head, body) in [
+                ("a.obj", obj::read_in_parts as fn(&[u8], &Path, usize) -> Result<Loaded>, Vec::new(), Vec::from_iter(statements.iter().map(|&s| s.to_owned()))),
+                ("b.obj", obj::read_in_parts, Vec::new(), Vec::from_iter(plain.iter().map(|&s| s.to_owned()))),
+                ("a.off", off::read_in_parts, off, [rows.clone(), faces.clone()].concat()),
+                ("a.ply", ply::read_in_parts, ply, [rows, faces].concat()),
+            ] {
+                let text = [head, body].concat().join(end) + end;
+                let bytes = &text.as_bytes()[..text.len().saturating_sub(cut)];
+                let one = told(read(bytes, Path::new(name), usize::MAX));
+                prop_assert_eq!(told(read(bytes, Path::new(name), size)), one, "{}: {:?}", name, text);
+            }
+        }
+
+        #[test]
+        fn parts_of_binary_files_give_the_same_mesh_or_message(
+            faces in prop::collection::vec(prop::collection::vec(0..9u32, 2..6), 0..30),
+            points in prop::collection::vec(-9..9i32, 0..30),
+            big: bool,
+            size in 1..100usize,
+            cut in 0..40usize,
+        ) {
+            let order = |x: u32| if big { x.to_be_bytes() } else { x.to_le_bytes() };
+            let format = if big { "big" } else { "little" };
+            let mut bytes = format!("ply\nformat binary_{format}_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty \
+                float z\nelement face {}\nproperty uchar a\nproperty list uchar uint vertex_index\nend_header\n", points.len(), faces.len()).into_bytes();
+            for &x in &points {
+                [x, 2 * x, -x].iter().for_each(|&x| bytes.extend_from_slice(&order((x as f32).to_bits())));
+            }
+            for face in &faces {
+                bytes.extend_from_slice(&[7, face.len() as u8]);
+                face.iter().for_each(|&v| bytes.extend_from_slice(&order(v)));
+            }
+            bytes.truncate(bytes.len() - cut.saturating_sub(30).min(bytes.len()));
+            let one = told(ply::read_in_parts(&bytes, Path::new("a.ply"), usize::MAX));
+            prop_assert_eq!(told(ply::read_in_parts(&bytes, Path::new("a.ply"), size)), one);
         }
     }
 

@@ -13,8 +13,9 @@ use super::io::{Builder, Lines, Loaded, WriteOptions, check_normals, write_rows}
 use super::magic::other_kind;
 use super::validate::Boundary;
 use crate::error::counted;
+use crate::text::parts::{PART, at_once, write_in_parts};
 use crate::text::{Scanner, continues_line, leading_digits, push_number, push_point, push_unsigned};
-use crate::{Error, Result};
+use crate::{Error, Result, parallel};
 
 /// Statements that are read over, by what they are about.
 const DROPPED: [(&str, &[&[u8]]); 4] = [
@@ -79,90 +80,318 @@ const NAMES: [&[u8]; 6] = [b"g", b"o", b"usemtl", b"mtllib", b"usemap", b"maplib
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
+    read_in_parts(bytes, path, PART)
+}
+
+/// As [`read_bytes`], in parts of about `size` bytes.
+pub(super) fn read_in_parts(bytes: &[u8], path: &Path, size: usize) -> Result<Loaded> {
     check_kind(bytes, path)?;
     let mut s = Scanner::new(bytes, path);
-    let mut builder = Builder::new(Some(Lines::default()));
-    let mut oddities = Oddities::default();
-    let mut tags = TagLines::default();
-    let mut attributes = Attributes::default();
-    loop {
-        s.skip_space();
-        skip_blanks(&mut s);
-        if s.at_end() {
-            break;
+    let mut file = Part::default();
+    let mut spare: Vec<Part> = Vec::new();
+    while !s.at_end() {
+        // All parts are read as if they were the first.
+        let start = Place { line: s.line(), counts: file.counts() };
+        let places = s.parts(size, at_once());
+        let mut tasks = Vec::with_capacity(places.len());
+        for s in &places {
+            let mut part = spare.pop().unwrap_or_default();
+            part.begin(start);
+            tasks.push(Task { s: s.clone(), part, start, result: Ok(()) });
         }
-        if s.at_line_end() {
-            continue;
+        parallel::chunks(&mut tasks, 1, |_, task| task[0].read());
+        // Where they start is known now, up to one that is refused, and it matters to some.
+        let mut next = start;
+        for task in &mut tasks {
+            task.start = next;
+            next.line += task.s.line() - start.line;
+            let counts = task.part.counts();
+            next.counts = [0, 1, 2, 3, 4].map(|k| next.counts[k] + counts[k] - start.counts[k]);
         }
-        let line = s.line();
-        let at = |what| Error::parse(path, Some(line), what);
-        match s.peek_token() {
-            b"v" => {
-                s.advance(1);
-                let vertex = builder.vertices();
-                let position = coordinates(&mut s, vertex)?;
-                match more_numbers(&mut s, vertex)? {
-                    (0, _) => {}
-                    (1, weight) => {
-                        oddities.weighted += 1;
-                        oddities.unequal += usize::from(weight != 1.0);
-                    }
-                    _ => oddities.coloured += 1,
-                }
-                builder.vertex(position, line).map_err(at)?;
+        let last = tasks.iter().position(|task| task.result.is_err()).map_or(tasks.len(), |k| k + 1);
+        tasks.truncate(last);
+        let is_too_large = next.counts.iter().any(|&count| count > u32::MAX as usize);
+        parallel::chunks(&mut tasks, 1, |k, task| {
+            let task = &mut task[0];
+            if task.start != start && (task.part.needs_place || task.result.is_err() || is_too_large) {
+                task.s = places[k].clone().at_line(task.start.line);
+                task.part.begin(task.start);
+                task.read();
             }
-            b"f" => {
-                s.advance(1);
-                loop {
-                    skip_blanks(&mut s);
-                    if s.at_line_end() {
-                        break;
-                    }
-                    let (vertex, references) = corner(&mut s, &builder)?;
-                    if !references.is_empty() {
-                        let [texture, normal] = parsed(references);
-                        texture.into_iter().for_each(|t| attributes.texture.refer(builder.corners(), t));
-                        normal.into_iter().for_each(|n| attributes.normals.refer(builder.corners(), n));
-                    }
-                    builder.corner(vertex);
-                }
-                builder.end_face(line).map_err(at)?;
-            }
-            b"t" if is_sharpness(&s) => {
-                s.advance(1);
-                tags.read(&mut s, line)?;
-            }
-            keyword => {
-                let unexpected = s.clone();
-                let (statement, ends_with_backslash) = skip_statement(&mut s, keyword);
-                if ends_with_backslash {
-                    oddities.not_continued.get_or_insert(line);
-                }
-                match (keyword, kind_of(keyword)) {
-                    (b"vt", _) => attributes.texture.push(statement),
-                    (b"vn", _) => attributes.normals.push(statement),
-                    (_, Some(Kind::Kept)) => attributes.statements.push((builder.faces() as u32, statement.into())),
-                    (_, Some(Kind::Dropped(kind))) => oddities.dropped[kind] += 1,
-                    (_, None) => match &mut oddities.unknown {
-                        Some((count, _)) => *count += 1,
-                        None => oddities.unknown = Some((1, unexpected.unexpected("an OBJ statement"))),
-                    },
-                }
-            }
+        });
+        for task in &mut tasks {
+            std::mem::replace(&mut task.result, Ok(()))?;
+        }
+        file.append(&mut tasks);
+        if let Some(Task { s: end, part, start, .. }) = tasks.last() {
+            let line = start.line + end.line() - part.start.line;
+            s.follow(&end.clone().at_line(line));
+        }
+        spare.extend(tasks.into_iter().map(|task| task.part));
+    }
+    file.finish(&s, path)
+}
+
+/// A place in a file: its line, and of what comes before the vertices, faces, corners, texture coordinates and normals.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Place {
+    line: usize,
+    counts: [usize; 5],
+}
+
+/// The reading of a part.
+struct Task<'a> {
+    /// Where it has come to.
+    s: Scanner<'a>,
+    part: Part,
+    /// Where the part starts, as far as that is known.
+    start: Place,
+    result: Result<()>,
+}
+
+impl Task<'_> {
+    fn read(&mut self) {
+        self.result = self.part.read(&mut self.s);
+    }
+}
+
+/// What was read of a file, or of a part of it.
+struct Part {
+    /// Where it starts, or what was taken for that.
+    start: Place,
+    builder: Builder,
+    oddities: Oddities,
+    tags: TagLines,
+    attributes: Attributes,
+    /// Whether what was read depends on the place: numbers that count back, lines that are named.
+    needs_place: bool,
+}
+
+impl Default for Part {
+    fn default() -> Self {
+        Part {
+            start: Place { line: 1, counts: [0; 5] },
+            builder: Builder::new(Some(Lines::default())),
+            oddities: Oddities::default(),
+            tags: TagLines::default(),
+            attributes: Attributes::default(),
+            needs_place: false,
         }
     }
-    if builder.vertices() == 0 {
-        let (_, none) = oddities.unknown.unwrap_or_else(|| (0, s.unexpected("a vertex (v x y z)")));
-        return Err(none);
+}
+
+impl Part {
+    /// Forgets what was read, to read what starts there.
+    fn begin(&mut self, start: Place) {
+        let [vertices, faces, corners, texture, normals] = start.counts;
+        self.builder.begin_part([vertices, faces, corners]);
+        self.attributes.texture.begin_part(texture);
+        self.attributes.normals.begin_part(normals);
+        self.attributes.statements.clear();
+        self.tags = TagLines::default();
+        self.oddities = Oddities::default();
+        self.needs_place = false;
+        self.start = start;
     }
 
-    let corners = builder.corners();
-    oddities.missing = attributes.texture.finish(corners) + attributes.normals.finish(corners);
-    oddities.is_cut_off = s.ends_within_a_line();
-    oddities.boundary_is_none = tags.boundary_is_none;
-    tags.found.check_vertices(path, builder.vertices())?;
-    let loaded = builder.finish(path, None, oddities.remarks());
-    Ok(Loaded { tags: tags.found, attributes, ..loaded })
+    /// Those of the [`Place`] after what was read.
+    fn counts(&self) -> [usize; 5] {
+        let [vertices, faces, corners] = self.builder.counts();
+        let [_, _, _, texture, normals] = self.start.counts;
+        [vertices, faces, corners, texture + self.attributes.texture.len(), normals + self.attributes.normals.len()]
+    }
+
+    /// Reads all statements.
+    fn read(&mut self, s: &mut Scanner) -> Result<()> {
+        loop {
+            s.skip_space();
+            skip_blanks(s);
+            let line = s.line();
+            let at = |s: &Scanner, what| s.error_at(line, what);
+            let is_plain = match s.rest() {
+                [b'v', b' ', ..] => self.plain_vertex(s),
+                [b'f', b' ', ..] => self.plain_face(s),
+                _ => false,
+            };
+            if is_plain {
+                continue;
+            }
+            if s.at_end() {
+                return Ok(());
+            }
+            if s.at_line_end() {
+                continue;
+            }
+            match s.peek_token() {
+                b"v" => {
+                    s.advance(1);
+                    let vertex = self.builder.vertices();
+                    let position = coordinates(s, vertex)?;
+                    match more_numbers(s, vertex)? {
+                        (0, _) => {}
+                        (1, weight) => {
+                            self.oddities.weighted += 1;
+                            self.oddities.unequal += usize::from(weight != 1.0);
+                        }
+                        _ => self.oddities.coloured += 1,
+                    }
+                    self.builder.vertex(position, line).map_err(|what| at(s, what))?;
+                }
+                b"f" => {
+                    s.advance(1);
+                    loop {
+                        skip_blanks(s);
+                        if s.at_line_end() {
+                            break;
+                        }
+                        self.corner(s)?;
+                    }
+                    self.builder.end_face(line).map_err(|what| at(s, what))?;
+                }
+                b"t" if is_sharpness(s) => {
+                    s.advance(1);
+                    self.tags.read(s, line)?;
+                }
+                keyword => self.other_statement(s, keyword),
+            }
+        }
+    }
+
+    /// Reads the vertex here if it is three plain numbers on one line, as nearly all are; otherwise the place stays.
+    fn plain_vertex(&mut self, s: &mut Scanner) -> bool {
+        let Some((point, length)) = s.plain_point(1) else { return false };
+        let is_read = self.builder.vertex(point, s.line()).is_ok();
+        s.advance(if is_read { length } else { 0 });
+        is_read
+    }
+
+    /// Reads the face here if its corners are plain numbers on one line, as nearly all are; otherwise the place stays.
+    fn plain_face(&mut self, s: &mut Scanner) -> bool {
+        let first = self.builder.corners();
+        if let Some(length) = self.plain_corners(s.rest(), s.line()) {
+            s.advance(length);
+            return true;
+        }
+        self.builder.forget_corners(first);
+        self.attributes.texture.forget_corners(first);
+        self.attributes.normals.forget_corners(first);
+        false
+    }
+
+    /// Reads the corners of a face after its `f`, and gives the length of all. What is not plain gives `None`, in the midst
+    /// of it.
+    fn plain_corners(&mut self, face: &[u8], line: usize) -> Option<usize> {
+        let mut at = 1;
+        loop {
+            while face.get(at) == Some(&b' ') {
+                at += 1;
+            }
+            if matches!(face.get(at)?, b'\n' | b'\r') {
+                return self.builder.end_face(line).is_ok().then_some(at);
+            }
+            let vertex = plain_index(face, &mut at)?;
+            if face.get(at) == Some(&b'/') {
+                at += 1;
+                let corner = self.builder.corners();
+                if face.get(at) != Some(&b'/') {
+                    self.attributes.texture.refer(corner, plain_index(face, &mut at)?.into());
+                }
+                if face.get(at) == Some(&b'/') {
+                    at += 1;
+                    self.attributes.normals.refer(corner, plain_index(face, &mut at)?.into());
+                }
+            }
+            if !matches!(face.get(at)?, b' ' | b'\n' | b'\r') {
+                return None;
+            }
+            self.builder.corner(vertex - 1);
+        }
+    }
+
+    /// Reads one corner of the present face.
+    fn corner(&mut self, s: &mut Scanner) -> Result<()> {
+        let is_back = s.peek() == Some(b'-');
+        let (vertex, references) = corner(s, &self.builder)?;
+        let corner = self.builder.corners();
+        let references = if references.is_empty() { [None; 2] } else { parsed(references) };
+        for (lines, reference) in
+            [&mut self.attributes.texture, &mut self.attributes.normals].into_iter().zip(references)
+        {
+            if let Some(reference) = reference {
+                lines.refer(corner, reference);
+            }
+        }
+        self.needs_place |= is_back || references.iter().flatten().any(|&reference| reference < 0);
+        self.builder.corner(vertex);
+        Ok(())
+    }
+
+    fn other_statement(&mut self, s: &mut Scanner, keyword: &[u8]) {
+        let unexpected = s.clone();
+        let (statement, ends_with_backslash) = skip_statement(s, keyword);
+        if ends_with_backslash {
+            self.oddities.not_continued.get_or_insert(unexpected.line());
+            self.needs_place = true;
+        }
+        match (keyword, kind_of(keyword)) {
+            (b"vt", _) => self.attributes.texture.push(statement),
+            (b"vn", _) => self.attributes.normals.push(statement),
+            (_, Some(Kind::Kept)) => {
+                self.attributes.statements.push((self.builder.faces() as u32, statement.into()));
+            }
+            (_, Some(Kind::Dropped(kind))) => self.oddities.dropped[kind] += 1,
+            (_, None) => {
+                match &mut self.oddities.unknown {
+                    Some((count, _)) => *count += 1,
+                    None => self.oddities.unknown = Some((1, unexpected.unexpected("an OBJ statement"))),
+                }
+                self.needs_place = true;
+            }
+        }
+    }
+
+    /// Adds the parts that follow.
+    fn append(&mut self, tasks: &mut [Task]) {
+        let mut corners = self.builder.corners();
+        for Task { part, start, .. } in &mut *tasks {
+            let lines = (start.line - part.start.line) as u32;
+            let faces = (start.counts[1] - part.start.counts[1]) as u32;
+            self.attributes.append(&part.attributes, corners, faces);
+            self.tags.append(&part.tags, lines);
+            self.oddities.append(&mut part.oddities);
+            corners += part.builder.corners();
+        }
+        let builders: Vec<&Builder> = tasks.iter().map(|task| &task.part.builder).collect();
+        let lines: Vec<usize> = tasks.iter().map(|task| task.start.line - task.part.start.line).collect();
+        assert!(self.builder.append(&builders, &lines), "the parts are within the limits");
+    }
+
+    /// The mesh of the file, at whose end `s` is.
+    fn finish(mut self, s: &Scanner, path: &Path) -> Result<Loaded> {
+        if self.builder.vertices() == 0 {
+            let (_, none) = self.oddities.unknown.unwrap_or_else(|| (0, s.unexpected("a vertex (v x y z)")));
+            return Err(none);
+        }
+        let corners = self.builder.corners();
+        self.oddities.missing = self.attributes.texture.finish(corners) + self.attributes.normals.finish(corners);
+        self.oddities.is_cut_off = s.ends_within_a_line();
+        self.oddities.boundary_is_none = self.tags.rule == Some(None);
+        self.tags.found.boundary = self.tags.rule.flatten();
+        self.tags.found.check_vertices(path, self.builder.vertices())?;
+        let loaded = self.builder.finish(path, None, self.oddities.remarks());
+        Ok(Loaded { tags: self.tags.found, attributes: self.attributes, ..loaded })
+    }
+}
+
+/// The whole number from 1 on here, of no more than nine digits, which is passed over.
+fn plain_index(bytes: &[u8], at: &mut usize) -> Option<u32> {
+    let start = *at;
+    let mut number = 0u32;
+    while let Some(digit @ b'0'..=b'9') = bytes.get(*at) {
+        number = number.wrapping_mul(10).wrapping_add(u32::from(digit - b'0'));
+        *at += 1;
+    }
+    (*at - start <= 9 && number > 0).then_some(number)
 }
 
 /// What a file holds that its mesh does not keep, or that is odd.
@@ -183,6 +412,20 @@ struct Oddities {
 }
 
 impl Oddities {
+    /// Adds those of the part that follows.
+    fn append(&mut self, next: &mut Oddities) {
+        self.dropped.iter_mut().zip(next.dropped).for_each(|(sum, count)| *sum += count);
+        self.weighted += next.weighted;
+        self.unequal += next.unequal;
+        self.coloured += next.coloured;
+        match (&mut self.unknown, next.unknown.take()) {
+            (Some((sum, _)), Some((count, _))) => *sum += count,
+            (None, first) => self.unknown = first,
+            (Some(_), None) => {}
+        }
+        self.not_continued = self.not_continued.or(next.not_continued);
+    }
+
     /// One for each kind that occurs.
     fn remarks(self) -> Vec<String> {
         let mut not_kept: Vec<String> = DROPPED
@@ -322,12 +565,22 @@ fn is_sharpness(s: &Scanner) -> bool {
 #[derive(Default)]
 struct TagLines {
     found: FileTags,
-    boundary_is_none: bool,
+    /// The last rule of the boundary, `None` within for 0.
+    rule: Option<Option<Boundary>>,
     whole: Vec<u32>,
     numbers: Vec<f64>,
 }
 
 impl TagLines {
+    /// Adds the tags that follow, and `lines` to their lines.
+    fn append(&mut self, next: &TagLines, lines: u32) {
+        let shifted = |line: u32| line.saturating_add(lines);
+        let FileTags { creases, corners, .. } = &mut self.found;
+        creases.extend(next.found.creases.iter().map(|tag| CreaseTag { line: shifted(tag.line), ..*tag }));
+        corners.extend(next.found.corners.iter().map(|tag| CornerTag { line: shifted(tag.line), ..*tag }));
+        self.rule = next.rule.or(self.rule);
+    }
+
     /// Reads a tag of sharpness from its name on.
     fn read(&mut self, s: &mut Scanner, line: usize) -> Result<()> {
         skip_blanks(s);
@@ -393,8 +646,7 @@ impl TagLines {
                     return Err(s.error_at(line, format!("{other} {what}")));
                 }
             };
-            self.boundary_is_none = rule.is_none();
-            self.found.boundary = rule;
+            self.rule = Some(rule);
             return Ok(());
         }
         let line = u32::try_from(line).unwrap_or(u32::MAX);
@@ -506,42 +758,46 @@ pub fn write_control_to(out: &mut dyn Write, mesh: &Mesh, options: &WriteOptions
     options.write_comments(out, "#")?;
     write_rows(out, mesh.len(), |text, v| {
         text.extend_from_slice(b"v ");
-        push_point(text, mesh.positions[v])
+        push_point(text, mesh.positions[v]);
     })?;
     attributes.texture.write_to(out)?;
     if let Some(normals) = normals {
         write_rows(out, normals.len(), |text, v| {
             text.extend_from_slice(b"vn ");
-            push_point(text, normals[v])
+            push_point(text, normals[v]);
         })?;
     } else {
         attributes.normals.write_to(out)?;
     }
-    let mut statements = attributes.statements.iter().peekable();
-    write_rows(out, mesh.faces.len(), |text, f| {
-        while let Some((_, statement)) = statements.next_if(|(face, _)| *face as usize <= f) {
-            text.extend_from_slice(statement);
+    let statements = &attributes.statements[..];
+    write_in_parts(out, mesh.faces.len(), &|range, text| {
+        let mut next = statements.partition_point(|(face, _)| (*face as usize) < range.start);
+        for f in range {
+            while let Some((_, statement)) = statements.get(next).filter(|(face, _)| *face as usize <= f) {
+                text.extend_from_slice(statement);
+                text.push(b'\n');
+                next += 1;
+            }
+            text.push(b'f');
+            for c in mesh.faces.range(f) {
+                let vertex = mesh.faces.corners()[c];
+                text.push(b' ');
+                push_unsigned(text, u64::from(vertex) + 1);
+                let texture = attributes.texture.of_corner(c);
+                let normal = if normals.is_some() { Some(vertex) } else { attributes.normals.of_corner(c) };
+                if texture.is_some() || normal.is_some() {
+                    text.push(b'/');
+                    texture.into_iter().for_each(|t| push_unsigned(text, u64::from(t) + 1));
+                }
+                if let Some(normal) = normal {
+                    text.push(b'/');
+                    push_unsigned(text, u64::from(normal) + 1);
+                }
+            }
             text.push(b'\n');
         }
-        text.push(b'f');
-        for c in mesh.faces.range(f) {
-            let vertex = mesh.faces.corners()[c];
-            text.push(b' ');
-            push_unsigned(text, u64::from(vertex) + 1);
-            let texture = attributes.texture.of_corner(c);
-            let normal = if normals.is_some() { Some(vertex) } else { attributes.normals.of_corner(c) };
-            if texture.is_some() || normal.is_some() {
-                text.push(b'/');
-                texture.into_iter().for_each(|t| push_unsigned(text, u64::from(t) + 1));
-            }
-            if let Some(normal) = normal {
-                text.push(b'/');
-                push_unsigned(text, u64::from(normal) + 1);
-            }
-        }
-        Ok(())
     })?;
-    for (_, statement) in statements {
+    for (_, statement) in &statements[statements.partition_point(|(face, _)| (*face as usize) < mesh.faces.len())..] {
         out.write_all(statement)?;
         out.write_all(b"\n")?;
     }
@@ -567,14 +823,14 @@ fn write_tags_to(out: &mut dyn Write, tags: &Tags) -> io::Result<()> {
         text.push(b' ');
         push_unsigned(text, b.into());
         text.push(b' ');
-        push_number(text, sharpness)
+        push_number(text, sharpness);
     })?;
     write_rows(out, tags.corners.len(), |text, k| {
         let (vertex, sharpness) = tags.corners[k];
         text.extend_from_slice(b"t corner 1/1/0 ");
         push_unsigned(text, vertex.into());
         text.push(b' ');
-        push_number(text, sharpness)
+        push_number(text, sharpness);
     })
 }
 

@@ -8,9 +8,10 @@ use glam::DVec3;
 use super::Mesh;
 use super::io::{Builder, Lines, Loaded, WriteOptions, check_normals, write_text_rows};
 use super::magic::other_kind;
+use crate::Result;
 use crate::error::counted;
+use crate::text::parts::{Output, PART, read_rows, rows_in_parts};
 use crate::text::{Scanner, quoted};
-use crate::{Error, Result};
 
 /// What a vertex holds besides its position, by the letters before `OFF`.
 #[derive(Default)]
@@ -47,6 +48,11 @@ struct Header {
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
+    read_in_parts(bytes, path, PART)
+}
+
+/// As [`read_bytes`], in parts of about `size` bytes.
+pub(super) fn read_in_parts(bytes: &[u8], path: &Path, size: usize) -> Result<Loaded> {
     let mut s = Scanner::new(bytes, path);
     let header = header(&mut s)?;
     let (vertices, faces) = counts(&mut s)?;
@@ -54,57 +60,17 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
     // The least: "0 0 0\n" and "3 0 1 2\n".
     builder.reserve_vertices(vertices, s.rest().len() / 6);
     builder.reserve_faces(faces, s.rest().len() / 8);
+    let mut read = Read { builder, normals: Normals::default(), extras: Vec::new(), coloured: 0 };
+    let parts = rows_in_parts(size);
 
-    let mut normals = Normals::default();
-    let mut extras = Vec::new();
     s.begin_rows();
-    for v in 0..vertices {
-        let line = s.begin_row();
-        let position =
-            s.point().ok_or_else(|| s.unexpected(format_args!("a coordinate of vertex {v} of {vertices}")))?;
-        if !header.is_plain() {
-            vertex_extras(&mut s, &header, v, vertices, &mut extras)?;
-            if header.normals {
-                normals.push(&extras, &header);
-            }
-        }
-        s.end_row(format_args!("vertex {v} of {vertices}"))?;
-        builder.vertex(position, line).map_err(|what| Error::parse(path, Some(line), what))?;
-    }
-    let normals = header.normals.then(|| normals.decide(&header));
-
-    let mut coloured = 0;
+    read_rows(&mut s, vertices, &mut read, &parts, &Scanner::follow, &|s, v, read| {
+        read.vertex(s, &header, v, vertices)
+    })?;
     if faces > 0 {
         s.begin_rows();
     }
-    for f in 0..faces {
-        let line = s.begin_row();
-        let size: u64 =
-            s.unsigned().ok_or_else(|| s.unexpected(format_args!("the number of corners of face {f} of {faces}")))?;
-        for _ in 0..size {
-            s.next_in_row();
-            builder.corner(
-                s.unsigned()
-                    .ok_or_else(|| s.unexpected(format_args!("a corner (0, 1, 2, …) of face {f} of {faces}")))?,
-            );
-        }
-        builder.end_face(line).map_err(|what| s.error_at(line, what))?;
-        let mut extra = 0;
-        if s.line() == line {
-            numbers_to_line_end(&mut s, |_| extra += 1)?;
-        }
-        match extra {
-            0 => {}
-            1 | 3 | 4 => coloured += 1,
-            extra => {
-                return Err(s.error(format!(
-                    "face {f} has {extra} numbers after its {size} corners, a colour has 1, 3 or 4: \
-                     correct the number of corners, or put each face on its own line"
-                )));
-            }
-        }
-        s.end_row(format_args!("face {f} of {faces}"))?;
-    }
+    read_rows(&mut s, faces, &mut read, &parts, &Scanner::follow, &|s, f, read| read.face(s, f, faces))?;
     s.skip_space();
     if !s.at_end() {
         return Err(s.error(format!(
@@ -112,6 +78,8 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
         )));
     }
 
+    let Read { builder, normals, coloured, .. } = read;
+    let normals = header.normals.then(|| normals.decide(&header));
     let mut not_kept = Vec::new();
     if header.colours {
         not_kept.push("vertex colours".to_string());
@@ -131,6 +99,85 @@ pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
         remarks.push(format!("not kept: {}", not_kept.join(", ")));
     }
     Ok(builder.finish(path, normals.flatten(), remarks))
+}
+
+/// The rows of a file or of a part of it.
+struct Read {
+    builder: Builder,
+    normals: Normals,
+    /// What follows the position of the present vertex.
+    extras: Vec<f64>,
+    /// How many faces have colours.
+    coloured: usize,
+}
+
+impl Read {
+    fn vertex(&mut self, s: &mut Scanner, header: &Header, v: u64, vertices: u64) -> Result<()> {
+        let line = s.begin_row();
+        let position =
+            s.point().ok_or_else(|| s.unexpected(format_args!("a coordinate of vertex {v} of {vertices}")))?;
+        if !header.is_plain() {
+            vertex_extras(s, header, v, vertices, &mut self.extras)?;
+            if header.normals {
+                self.normals.push(&self.extras, header);
+            }
+        }
+        s.end_row(format_args!("vertex {v} of {vertices}"))?;
+        self.builder.vertex(position, line).map_err(|what| s.error_at(line, what))
+    }
+
+    fn face(&mut self, s: &mut Scanner, f: u64, faces: u64) -> Result<()> {
+        let line = s.begin_row();
+        let size: u64 =
+            s.unsigned().ok_or_else(|| s.unexpected(format_args!("the number of corners of face {f} of {faces}")))?;
+        for _ in 0..size {
+            s.next_in_row();
+            self.builder.corner(
+                s.unsigned()
+                    .ok_or_else(|| s.unexpected(format_args!("a corner (0, 1, 2, …) of face {f} of {faces}")))?,
+            );
+        }
+        self.builder.end_face(line).map_err(|what| s.error_at(line, what))?;
+        let mut extra = 0;
+        if s.line() == line {
+            numbers_to_line_end(s, |_| extra += 1)?;
+        }
+        match extra {
+            0 => {}
+            1 | 3 | 4 => self.coloured += 1,
+            extra => {
+                return Err(s.error(format!(
+                    "face {f} has {extra} numbers after its {size} corners, a colour has 1, 3 or 4: \
+                     correct the number of corners, or put each face on its own line"
+                )));
+            }
+        }
+        s.end_row(format_args!("face {f} of {faces}"))
+    }
+}
+
+impl Output for Read {
+    fn empty(&self) -> Self {
+        Read { builder: self.builder.empty(), normals: Normals::default(), extras: Vec::new(), coloured: 0 }
+    }
+
+    fn clear(&mut self) {
+        self.builder.begin_part([0; 3]);
+        self.normals = Normals::default();
+        self.coloured = 0;
+    }
+
+    fn append(&mut self, parts: &[&Self]) -> bool {
+        let builders: Vec<&Builder> = parts.iter().map(|part| &part.builder).collect();
+        let fits = self.builder.append(&builders, &vec![0; parts.len()]);
+        if fits {
+            for part in parts {
+                self.normals.append(&part.normals);
+                self.coloured += part.coloured;
+            }
+        }
+        fits
+    }
 }
 
 /// Refuses the first bytes of a file, whole lines, if they are no OFF.
@@ -274,6 +321,13 @@ impl Normals {
         let (colour, late) = both.split_at(both.len() - 3);
         self.fit[1] &= can_be_normal(late) && can_be_colour(colour);
         self.after.push(DVec3::from_slice(late));
+    }
+
+    /// Adds those of the vertices that follow.
+    fn append(&mut self, next: &Normals) {
+        self.before.extend_from_slice(&next.before);
+        self.after.extend_from_slice(&next.after);
+        self.fit = [0, 1].map(|k| self.fit[k] && next.fit[k]);
     }
 
     fn decide(self, header: &Header) -> Option<Vec<DVec3>> {

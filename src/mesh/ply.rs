@@ -7,8 +7,9 @@ use glam::DVec3;
 
 use super::Mesh;
 use super::io::{Builder, Lines, Loaded, WriteOptions, check_normals, write_text_rows};
-use crate::Result;
 use crate::text::Scanner;
+use crate::text::parts::{Output, PART, read_rows};
+use crate::{Result, parallel};
 
 mod header;
 mod values;
@@ -38,18 +39,23 @@ use values::{Binary, ByteOrder, Text, Values};
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn read_bytes(bytes: &[u8], path: &Path) -> Result<Loaded> {
+    read_in_parts(bytes, path, PART)
+}
+
+/// As [`read_bytes`], in parts of about `size` bytes.
+pub(super) fn read_in_parts(bytes: &[u8], path: &Path, size: usize) -> Result<Loaded> {
     let mut scanner = Scanner::new(bytes, path);
     let Header { format, elements } = Header::read(&mut scanner, path)?;
     let order = match format {
         Format::Ascii => {
             let values = Text { scanner };
-            return read_elements(&elements, values, Some(Lines::default()), path);
+            return read_elements(&elements, values, Some(Lines::default()), path, size);
         }
         Format::BinaryLittleEndian => ByteOrder::Little,
         Format::BinaryBigEndian => ByteOrder::Big,
     };
     let values = Binary { path, bytes, at: scanner.offset(), order };
-    read_elements(&elements, values, None, path)
+    read_elements(&elements, values, None, path, size)
 }
 
 /// Refuses the first bytes of a file, whole lines, if they are no PLY.
@@ -60,13 +66,30 @@ pub(super) fn check_head(head: &[u8], path: &Path) -> Result<()> {
     if s.at_end() { Ok(()) } else { read.map(|_| ()) }
 }
 
-fn read_elements<V: Values>(elements: &[Element], mut values: V, lines: Option<Lines>, path: &Path) -> Result<Loaded> {
-    let mut builder = Builder::new(lines);
-    let mut normals = Vec::new();
+fn read_elements<V: Values>(
+    elements: &[Element],
+    mut values: V,
+    lines: Option<Lines>,
+    path: &Path,
+    size: usize,
+) -> Result<Loaded> {
+    let mut read = Read { builder: Builder::new(lines), normals: Vec::new() };
     for element in elements {
         // Each row takes room in the file, so that the end of the file ends an absurd count.
         if !element.properties.is_empty() && element.count > 0 {
-            read_rows(element, &mut values, &mut builder, &mut normals)?;
+            let least: usize =
+                element.properties.iter().map(|p| values.least_bytes(p.length.unwrap_or(p.scalar))).sum();
+            let rows_at_most = values.bytes_left() / least;
+            match element.kind {
+                Kind::Vertex => read.builder.reserve_vertices(element.count, rows_at_most),
+                Kind::Face => read.builder.reserve_faces(element.count, rows_at_most),
+                Kind::Other => {}
+            }
+            let parts = |values: &V, wanted: u64| values.parts(element, wanted, size);
+            values.begin_rows();
+            read_rows(&mut values, element.count, &mut read, &parts, &V::follow, &|values, row, read| {
+                read.row(values, element, row)
+            })?;
         }
     }
     if !values.at_end() {
@@ -76,28 +99,21 @@ fn read_elements<V: Values>(elements: &[Element], mut values: V, lines: Option<L
     }
     let has_normals = elements.iter().flat_map(|e| &e.properties).any(|p| matches!(p.keep, Keep::Coordinate(3..)));
     let remarks = Vec::from_iter(not_kept(elements));
-    Ok(builder.finish(path, has_normals.then_some(normals), remarks))
+    Ok(read.builder.finish(path, has_normals.then_some(read.normals), remarks))
 }
 
-fn read_rows<V: Values>(
-    element: &Element,
-    values: &mut V,
-    builder: &mut Builder,
-    normals: &mut Vec<DVec3>,
-) -> Result<()> {
-    let (name, count) = (&element.name, element.count);
-    let row_bytes: usize = element.properties.iter().map(|p| values.least_bytes(p.length.unwrap_or(p.scalar))).sum();
-    let rows_at_most = values.bytes_left() / row_bytes;
-    let has_normals = element.properties.iter().any(|p| matches!(p.keep, Keep::Coordinate(3..)));
-    match element.kind {
-        Kind::Vertex => builder.reserve_vertices(count, rows_at_most),
-        Kind::Face => builder.reserve_faces(count, rows_at_most),
-        Kind::Other => {}
-    }
-    values.begin_rows();
-    for row in 0..count {
+/// The rows of a file or of a part of it.
+struct Read {
+    builder: Builder,
+    normals: Vec<DVec3>,
+}
+
+impl Read {
+    fn row<V: Values>(&mut self, values: &mut V, element: &Element, row: u64) -> Result<()> {
+        let (name, count) = (&element.name, element.count);
         let place = values.place();
         let mut coordinates = [0.0; 6];
+        let mut has_normal = false;
         for property in &element.properties {
             let scalar = property.scalar;
             let wanted = |what: &str| format!("{what} {} of {name} {row} of {count}", property.name);
@@ -110,13 +126,14 @@ fn read_rows<V: Values>(
             match property.keep {
                 Keep::Coordinate(k) => {
                     coordinates[k] = values.number(scalar).ok_or_else(|| values.unexpected(wanted("the number")))?;
+                    has_normal |= k >= 3;
                 }
                 Keep::Corners => {
                     for _ in 0..items {
                         let corner = values
                             .unsigned(scalar)
                             .ok_or_else(|| values.unexpected(wanted("an index (0, 1, 2, …) in")))?;
-                        builder.corner(corner);
+                        self.builder.corner(corner);
                     }
                 }
                 Keep::No => values.skip(scalar, items).ok_or_else(|| values.unexpected(wanted("a value of")))?,
@@ -124,17 +141,38 @@ fn read_rows<V: Values>(
         }
         let [x, y, z, nx, ny, nz] = coordinates;
         match element.kind {
-            Kind::Vertex => builder.vertex(DVec3::new(x, y, z), place),
-            Kind::Face => builder.end_face(place),
+            Kind::Vertex => self.builder.vertex(DVec3::new(x, y, z), place),
+            Kind::Face => self.builder.end_face(place),
             Kind::Other => Ok(()),
         }
         .map_err(|what| values.error(place, what))?;
         values.end_row(format_args!("{name} {row} of {count}"))?;
-        if has_normals {
-            normals.push(DVec3::new(nx, ny, nz));
+        if has_normal {
+            self.normals.push(DVec3::new(nx, ny, nz));
         }
+        Ok(())
     }
-    Ok(())
+}
+
+impl Output for Read {
+    fn empty(&self) -> Self {
+        Read { builder: self.builder.empty(), normals: Vec::new() }
+    }
+
+    fn clear(&mut self) {
+        self.builder.begin_part([0; 3]);
+        self.normals.clear();
+    }
+
+    fn append(&mut self, parts: &[&Self]) -> bool {
+        let builders: Vec<&Builder> = parts.iter().map(|part| &part.builder).collect();
+        let fits = self.builder.append(&builders, &vec![0; parts.len()]);
+        if fits {
+            let normals: Vec<&[DVec3]> = parts.iter().map(|part| &part.normals[..]).collect();
+            parallel::append_parts(&mut self.normals, &normals, |_, n| n);
+        }
+        fits
+    }
 }
 
 /// The remark on what the mesh does not keep, if there is such.

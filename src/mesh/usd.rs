@@ -14,6 +14,7 @@ use super::io::{Loaded, WriteOptions, check_normals};
 use super::magic::other_kind;
 use super::validate::Boundary;
 use super::{Mesh, bounding_box};
+use crate::text::parts::write_in_parts;
 use crate::text::{push_nine_digits, push_number, push_unsigned};
 use crate::{Error, Result};
 
@@ -137,7 +138,6 @@ pub fn write_control_to(out: &mut dyn Write, mesh: &Mesh, options: &WriteOptions
             }
             push_unsigned(text, v.into());
         }
-        Ok(())
     })?;
     out.write_all(b"\n")?;
     write_points(out, "point3f[] points", &mesh.positions)?;
@@ -169,15 +169,19 @@ fn boundary_token(boundary: Boundary) -> Option<&'static str> {
     }
 }
 
-fn write_whole(out: &mut dyn Write, name: &str, count: usize, number: impl Fn(usize) -> u32) -> io::Result<()> {
+fn write_whole(out: &mut dyn Write, name: &str, count: usize, number: impl Fn(usize) -> u32 + Sync) -> io::Result<()> {
     write_list(out, &format!("int[] {name}"), count, PER_LINE, |text, k| {
         push_unsigned(text, number(k).into());
-        Ok(())
     })?;
     out.write_all(b"\n")
 }
 
-fn write_numbers(out: &mut dyn Write, name: &str, count: usize, number: impl Fn(usize) -> f64) -> io::Result<()> {
+fn write_numbers(
+    out: &mut dyn Write,
+    name: &str,
+    count: usize,
+    number: impl Fn(usize) -> f64 + Sync,
+) -> io::Result<()> {
     write_list(out, &format!("float[] {name}"), count, PER_LINE, |text, k| push_number(text, number(k)))?;
     out.write_all(b"\n")
 }
@@ -191,11 +195,10 @@ fn write_points(out: &mut dyn Write, name: &str, points: &[DVec3]) -> io::Result
             } else {
                 text.push(before);
             }
-            push_nine_digits(text, coordinate)?;
+            push_nine_digits(text, coordinate);
             before = b',';
         }
         text.push(b')');
-        Ok(())
     })
 }
 
@@ -205,18 +208,17 @@ fn write_list(
     name: &str,
     count: usize,
     per_line: usize,
-    mut push: impl FnMut(&mut Vec<u8>, usize) -> io::Result<()>,
+    push: impl Fn(&mut Vec<u8>, usize) + Sync,
 ) -> io::Result<()> {
     write!(out, "    {name} = [")?;
-    let mut text = Vec::new();
-    for k in 0..count {
-        text.clear();
-        if k > 0 {
-            text.push(b',');
+    write_in_parts(out, count, &|range, text| {
+        for k in range {
+            if k > 0 {
+                text.push(b',');
+            }
+            text.extend_from_slice(if k % per_line == 0 { b"\n        " } else { b" " });
+            push(text, k);
         }
-        text.extend_from_slice(if k % per_line == 0 { b"\n        " } else { b" " });
-        push(&mut text, k)?;
-        out.write_all(&text)?;
-    }
+    })?;
     out.write_all(if count > 0 { b"\n    ]" } else { b"]" })
 }

@@ -3,12 +3,20 @@
 use std::fmt::Display;
 use std::path::Path;
 
-use super::header::Scalar;
+use super::header::{Element, Scalar};
 use crate::text::Scanner;
+use crate::text::parts::at_once;
 use crate::{Error, Result};
 
 /// Values in file order. A method that gives `None` leaves the place for [`unexpected`](Values::unexpected).
-pub(super) trait Values {
+pub(super) trait Values: Clone + Send + Sync {
+    /// Parts of about `size` bytes of what follows, with the number of rows of `element` in each, no more than `wanted` in
+    /// all. None where they cannot be told without reading.
+    fn parts(&self, element: &Element, wanted: u64, size: usize) -> Vec<(Self, u64)>;
+
+    /// Goes on where `part` has come to.
+    fn follow(&mut self, part: &Self);
+
     /// The least number of bytes that a value takes.
     fn least_bytes(&self, scalar: Scalar) -> usize;
 
@@ -41,11 +49,21 @@ pub(super) trait Values {
     fn error(&self, place: usize, what: String) -> Error;
 }
 
+#[derive(Clone)]
 pub(super) struct Text<'a> {
     pub scanner: Scanner<'a>,
 }
 
 impl Values for Text<'_> {
+    fn parts(&self, _: &Element, wanted: u64, size: usize) -> Vec<(Self, u64)> {
+        let parts = self.scanner.rows_in_parts(wanted, size);
+        parts.into_iter().map(|(scanner, rows)| (Text { scanner }, rows)).collect()
+    }
+
+    fn follow(&mut self, part: &Self) {
+        self.scanner.follow(&part.scanner);
+    }
+
     fn least_bytes(&self, _: Scalar) -> usize {
         2 // a digit and a separator
     }
@@ -103,6 +121,7 @@ pub(super) enum ByteOrder {
     Big,
 }
 
+#[derive(Clone)]
 pub(super) struct Binary<'a> {
     pub path: &'a Path,
     pub bytes: &'a [u8],
@@ -111,6 +130,34 @@ pub(super) struct Binary<'a> {
 }
 
 impl Binary<'_> {
+    /// Passes over whole rows, until they take `size` bytes, and says how many: at most `wanted`.
+    fn pass_rows(&mut self, element: &Element, wanted: u64, size: usize) -> u64 {
+        if element.properties.iter().all(|p| p.length.is_none()) {
+            let row: usize = element.properties.iter().map(|p| p.scalar.bytes()).sum();
+            let rows = size.div_ceil(row).min(self.bytes_left() / row);
+            let rows = usize::try_from(wanted).map_or(rows, |wanted| rows.min(wanted));
+            self.at += rows * row;
+            return rows as u64;
+        }
+        let end = self.at.saturating_add(size);
+        let mut rows = 0;
+        while rows < wanted && self.at < end {
+            let start = self.at;
+            for property in &element.properties {
+                let items = match property.length {
+                    None => Some(1),
+                    Some(length) => self.unsigned(length),
+                };
+                if items.and_then(|items| self.skip(property.scalar, items)).is_none() {
+                    self.at = start;
+                    return rows;
+                }
+            }
+            rows += 1;
+        }
+        rows
+    }
+
     /// The bytes of one value, the least significant first; moves to the end if there are too few.
     fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
         let Some(&(mut value)) = self.bytes[self.at..].first_chunk::<N>() else {
@@ -126,6 +173,26 @@ impl Binary<'_> {
 }
 
 impl Values for Binary<'_> {
+    fn parts(&self, element: &Element, wanted: u64, size: usize) -> Vec<(Self, u64)> {
+        let mut parts = Vec::new();
+        let mut ahead = self.clone();
+        let mut left = wanted;
+        while left > 0 && parts.len() < at_once() {
+            let start = ahead.clone();
+            let rows = ahead.pass_rows(element, left, size);
+            if rows == 0 {
+                break;
+            }
+            left -= rows;
+            parts.push((start, rows));
+        }
+        parts
+    }
+
+    fn follow(&mut self, part: &Self) {
+        self.at = part.at;
+    }
+
     fn least_bytes(&self, scalar: Scalar) -> usize {
         scalar.bytes()
     }
