@@ -29,6 +29,18 @@ fn the_program_prints_the_agreed_fields() {
     close(&json["optimal_omega"]["w-pia"], 1.8);
     close(&json["optimal_omega"]["jacobi"], 0.8);
     close(&json["critical_omega_jacobi"], 8.0 / 9.0);
+    for (field, exact) in
+        [("lambda_min", 1.0 / 9.0), ("lambda_max", 1.0), ("jacobi_lambda_min", 0.25), ("jacobi_lambda_max", 2.25)]
+    {
+        let [bound, attained] = ["certified", "attained"].map(|side| json[side][field].as_f64().expect("a number"));
+        let (low, high) = if field.ends_with("min") { (bound, attained) } else { (attained, bound) };
+        assert!(low < exact + 1e-15 && exact - 1e-15 < high && high - low < 1e-7, "{field}: {low} {high}");
+    }
+    for (method, exact) in [("pia", 8.0 / 9.0), ("thall", 7.0 / 8.0), ("cg", 0.5), ("pcg-jacobi", 0.5)] {
+        let proven = json["certified_rho"][method].as_f64().expect("a number");
+        assert!(exact < proven && proven < exact + 1e-7, "{method}: {proven}");
+    }
+    assert_eq!(json["certified_rho"]["gauss-seidel"], serde_json::Value::Null);
     assert_eq!(json["singular"], false);
     assert_eq!(json["kernel_dimension"], 0);
     assert_eq!(json["eigenvalues"]["a"].as_array().map(Vec::len), Some(80));

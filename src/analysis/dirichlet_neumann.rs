@@ -18,8 +18,8 @@
 //! (Dirichlet-Neumann bracketing: Reed and Simon IV, XIII.15). Modes below μ decay exponentially away from the
 //! exceptional vertices, so the two sides meet as the patches grow. Where they meet they give the end of the
 //! spectrum, and the number of eigenvalues that are equal to it within the accuracy. The counts come from
-//! factorizations (Sylvester's law of inertia), one for each kind of patch: patches that a renumbering maps onto each
-//! other are computed once. The cost does not depend on N but for one look at every vertex.
+//! factorizations (Sylvester's law of inertia) at shifts that are moved by more than rounding may hide, one for each kind of
+//! patch: patches that a renumbering maps onto each other are computed once. The cost does not depend on N but for one look at every vertex.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 
-use super::inertia::inertia;
+use super::inertia::{LARGEST_BACKWARD_ERROR, inertia};
 use super::lanczos;
 use super::subspace_iteration::End;
 use super::symmetric::SymmetricForm;
@@ -65,6 +65,9 @@ const FACTORED: usize = 3;
 const STARTS: usize = 48;
 /// Lanczos steps for the lowest eigenvalue of a patch at most.
 const STEPS: usize = 4000;
+/// What rounding may hide in a count: that of the factorization, and as much again, which is far above that of the entries of
+/// a patch (fewer than 10³ roundings each, of rows that sum to a few units).
+const ALLOWANCE: f64 = 2.0 * LARGEST_BACKWARD_ERROR;
 /// Potentials closer than this are one: they differ by rounding.
 const ROUNDING: f64 = 1e-12;
 const CHUNK: usize = 4096;
@@ -72,9 +75,9 @@ const CHUNK: usize = 4096;
 /// An end of the spectrum between two proven bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bracket {
-    /// A Rayleigh quotient: the end of the spectrum lies here or further out.
+    /// The least eigenvalue of the patches, as the Lanczos process has it.
     pub value: f64,
-    /// It lies no further out than this much.
+    /// The end of the spectrum lies within this distance of the value.
     pub width: f64,
     /// Eigenvalues within `width` of the value, with multiplicity.
     pub multiplicity: usize,
@@ -315,8 +318,7 @@ struct Attempt {
     rings: usize,
     patches: Patches,
     dirichlet: Vec<Csr>,
-    /// The least Dirichlet eigenvalue of each kind, and of all.
-    lowest: Vec<f64>,
+    /// The least Dirichlet eigenvalue.
     value: f64,
 }
 
@@ -337,7 +339,7 @@ impl Attempt {
         let dirichlet: Vec<Csr> = patches.kinds.iter().map(|k| k.matrix(form, true)).collect();
         let lowest: Vec<f64> = dirichlet.iter().map(lowest).collect::<Result<_>>()?;
         let value = lowest.iter().copied().fold(f64::INFINITY, f64::min);
-        Ok(Attempt { rings, patches, dirichlet, lowest, value })
+        Ok(Attempt { rings, patches, dirichlet, value })
     }
 
     /// By how much the value of the last of these attempts is still too high, about.
@@ -357,26 +359,23 @@ impl Attempt {
             }
             Some(sum)
         };
+        // Counts that rounding can only make greater, and smaller.
+        let at_most = |matrices: &[Csr], s: f64| count(matrices, s + ALLOWANCE);
+        let at_least = |matrices: &[Csr], s: f64| count(matrices, s - ALLOWANCE);
         let kinds = &self.patches.kinds;
         let neumann: Vec<Csr> = kinds.iter().map(|k| k.matrix(form, false)).collect();
         let highest = self.value + width;
         let half = 0.5 * (self.value + level);
-        let (beneath, to_half) = rayon::join(|| count(&neumann, self.value - width), || count(&neumann, half));
+        let (beneath, to_half) = rayon::join(|| at_most(&neumann, self.value - width), || at_most(&neumann, half));
         if beneath? > 0 {
             return None;
         }
-        // At least one eigenvalue for each patch with so low a Rayleigh quotient.
-        let seen = self.lowest.iter().zip(counts);
-        let seen: usize = seen.filter(|(v, _)| **v <= highest).map(|(_, c)| c).sum();
-        let (multiplicity, next) = if to_half? == seen {
-            (seen, half)
-        } else {
-            let most = count(&neumann, highest)?;
-            if most > seen && most != count(&self.dirichlet, highest)? {
-                return None;
-            }
-            (most, highest)
-        };
+        let multiplicity = at_least(&self.dirichlet, highest)?;
+        // No matter if that one factorization is not stable.
+        let next = if to_half == Some(multiplicity) { half } else { highest };
+        if multiplicity == 0 || next == highest && at_most(&neumann, highest)? != multiplicity {
+            return None;
+        }
         Some(Bracket {
             value: sign * self.value,
             width,

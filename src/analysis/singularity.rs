@@ -208,7 +208,7 @@ fn neighbours<'a>(surface: &'a Surface, v: usize) -> impl Iterator<Item = usize>
 pub const ZERO: f64 = 1e-10;
 
 /// The number of eigenvalues of A that are zero to [`ZERO`], by numbers alone: dense for small systems, else the
-/// inertia of A − [`ZERO`]. Holds for any matrix with λ_min ≥ 0.
+/// inertia of A − [`ZERO`], which rounding moves by a tenth of that at most. Holds for any matrix with λ_min ≥ 0.
 ///
 /// # Errors
 /// As [`eigenvalues_below`].

@@ -162,7 +162,7 @@ pub struct Estimate {
 }
 
 /// How many eigenvalues are equal to an end of the spectrum, where that was decided: among all eigenvalues, by
-/// proof, or by counts.
+/// proof, or by counts, which rounding moves by [`LARGEST_BACKWARD_ERROR`](super::inertia::LARGEST_BACKWARD_ERROR) at most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Multiplicity {
     /// Equal eigenvalues at the end of the spectrum.

@@ -51,7 +51,8 @@ pub struct Arguments {
     /// are those of the smooth vertices, and 0 elsewhere
     #[arg(long, value_name = "K", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=56))]
     modes: u16,
-    /// Prove the ends by Cholesky factorizations of M − σH⁻¹ and the like (memory: the factor)
+    /// Enclose the ends between proven numbers, by Cholesky factorizations of M − σH⁻¹ and the like and by Rayleigh
+    /// quotients, with all rounding bounded; and bound the rates (memory: the factor)
     #[arg(long)]
     certify: bool,
     /// Leave out the spectral radii of Gauss-Seidel, SOR and SSOR, which take the longest on large meshes
@@ -77,6 +78,8 @@ const STEMS: [&str; 6] =
 /// What `spectrum` runs on without arguments.
 const BUILT_IN: [&str; 4] = ["torus:32x32", "quad-sphere:4", "icosphere:3", "prism:9"];
 const BINS: usize = 60;
+/// How near the ends certificates are tried first, relative.
+const WITHIN: f64 = 1e-8;
 
 /// Runs the program.
 pub fn main(mut arguments: Arguments, provenance: Provenance) -> ExitCode {
@@ -107,12 +110,23 @@ struct Findings {
     corners: usize,
 }
 
+/// A method's factor per iteration.
+struct Rate {
+    method: &'static str,
+    parameter: String,
+    /// The spectral radius of the error matrix, or what follows from the condition number.
+    rho: f64,
+    /// No greater, as the certificates prove.
+    certified: Option<f64>,
+}
+
 /// An end of a spectrum.
 struct Quantity {
     name: &'static str,
     estimate: Estimate,
     bound: f64,
-    certified: Option<f64>,
+    /// What factorizations prove of it: a bound, and that some eigenvalue reaches as far as this.
+    certificate: Option<Certificate>,
     /// The end of what the points excite.
     excited: Option<f64>,
 }
@@ -120,10 +134,8 @@ struct Quantity {
 impl Findings {
     /// The ends of the spectra of A and D⁻¹A.
     fn quantities(&self) -> [Quantity; 4] {
-        let quantity = |name, estimate, bound, certificate: Option<Certificate>, excited| {
-            let certified = certificate.map(|c| c.bound);
-            Quantity { name, estimate, bound, certified, excited }
-        };
+        let quantity =
+            |name, estimate, bound, certificate, excited| Quantity { name, estimate, bound, certificate, excited };
         let (e, b) = (&self.ends, &self.bounds);
         let [a, jacobi] = self.data;
         let [lowest, highest, jacobi_lowest, jacobi_highest] = self.certificates;
@@ -162,28 +174,53 @@ impl Findings {
         }
     }
 
-    /// Method, its parameter, the spectral radius of its error matrix or its factor per iteration.
-    fn radii(&self) -> Vec<(&'static str, String, f64)> {
-        let Spectrum { a, jacobi } = self.spectrum();
-        let mut rows = vec![
-            ("pia", "ω=1".into(), a.radius(1.0)),
-            ("w-pia", format!("ω={:.6} (optimal)", a.optimal_omega()), a.radius(a.optimal_omega())),
-            ("thall", "ω=0.5".into(), jacobi.radius(0.5)),
-            ("jacobi", "ω=1".into(), jacobi.radius(1.0)),
-            (
-                "jacobi_optimal",
-                format!("ω={:.6} (optimal)", jacobi.optimal_omega()),
-                jacobi.radius(jacobi.optimal_omega()),
-            ),
+    /// The intervals that the certificates prove to hold the spectra of A and of D⁻¹A.
+    fn certified(&self) -> Option<Spectrum> {
+        let [a_min, a_max, jacobi_min, jacobi_max] = self.certificates;
+        let pair =
+            |min: Option<Certificate>, max: Option<Certificate>| Some(Extremes { min: min?.bound, max: max?.bound });
+        Some(Spectrum { a: pair(a_min, a_max)?, jacobi: pair(jacobi_min, jacobi_max)? })
+    }
+
+    fn rates(&self) -> Vec<Rate> {
+        let of_ends = |ends: &Spectrum, omegas: &Spectrum| {
+            let (a, jacobi) = (ends.a, ends.jacobi);
+            let rates = [a, a, jacobi].map(Extremes::krylov_rate);
+            let radii = [
+                a.radius(1.0),
+                a.radius(omegas.a.optimal_omega()),
+                jacobi.radius(0.5),
+                jacobi.radius(1.0),
+                jacobi.radius(omegas.jacobi.optimal_omega()),
+            ];
+            (radii, rates)
+        };
+        let spectrum = self.spectrum();
+        let (radii, rates) = of_ends(&spectrum, &spectrum);
+        let certified = self.certified().map(|ends| of_ends(&ends, &spectrum));
+        // A rate is computed in a dozen roundings of numbers of size 1.
+        let up = |rho: f64| rho + 16.0 * f64::EPSILON;
+        let best = |omega: f64| format!("ω={omega:.6} (optimal)");
+        let names = [
+            ("pia", "ω=1".into()),
+            ("w-pia", best(spectrum.a.optimal_omega())),
+            ("thall", "ω=0.5".into()),
+            ("jacobi", "ω=1".into()),
+            ("jacobi_optimal", best(spectrum.jacobi.optimal_omega())),
         ];
+        let mut all = Vec::new();
+        for (k, (method, parameter)) in names.into_iter().enumerate() {
+            all.push(Rate { method, parameter, rho: radii[k], certified: certified.map(|c| up(c.0[k])) });
+        }
         for (method, omega, radius) in &self.sweeps {
-            rows.push((method.name(), format!("ω={omega}, file order"), radius.value));
+            let parameter = format!("ω={omega}, file order");
+            all.push(Rate { method: method.name(), parameter, rho: radius.value, certified: None });
         }
-        for (name, ends) in [("chebyshev", a), ("cg", a), ("pcg-jacobi", jacobi)] {
-            let rate = if ends.min > 0.0 { ends.krylov_rate() } else { 1.0 };
-            rows.push((name, "(√κ−1)/(√κ+1)".into(), rate));
+        for (k, method) in ["chebyshev", "cg", "pcg-jacobi"].into_iter().enumerate() {
+            let parameter = "(√κ−1)/(√κ+1)".into();
+            all.push(Rate { method, parameter, rho: rates[k], certified: certified.map(|c| up(c.1[k])) });
         }
-        rows
+        all
     }
 }
 
@@ -320,7 +357,7 @@ fn analyse_any(
             (SymmetricForm::Jacobi, End::Lowest, jacobi.min),
             (SymmetricForm::Jacobi, End::Highest, jacobi.max),
         ]) {
-            *slot = certify(system, which, end, estimate)?;
+            *slot = certify(system, which, end, estimate, WITHIN)?;
         }
     }
     progress.step();
@@ -414,7 +451,8 @@ fn eigenvalue_table(subject: &Subject, found: &Findings, n: usize) -> Table {
         .col(Column::count("multiplicity"), |q| q.estimate.multiplicity.map(|m| m.count))
         .col(Column::number("equal_within", 1e-3, 1), |q| q.estimate.multiplicity.map(|m| m.within))
         .col(Column::number("proven_bound", 1e-9, 10), |q| q.bound)
-        .col(Column::number("certified", 1e-6, 10), |q| q.certified)
+        .col(Column::number("certified", 1e-6, 10), |q| q.certificate.map(|c| c.bound))
+        .col(Column::number("attained", 1e-6, 10), |q| q.certificate.map(|c| c.attained))
         .col(Column::number("excited_by_data", 1e-3, 6), |q| q.excited);
     let title = format!("Spectrum of {}", subject.title);
     let mut table = columns.table(subject.stem("spectrum"), title, &found.quantities());
@@ -426,13 +464,20 @@ fn eigenvalue_table(subject: &Subject, found: &Findings, n: usize) -> Table {
         "`residual` is ‖Sx − λx‖₂ of the symmetric matrix similar to A or D⁻¹A: an eigenvalue lies that close. `error` \
          estimates the error of the value as the end of the spectrum. {} products of a matrix with a vector were made. \
          `multiplicity` counts the eigenvalues that equal this \
-         end up to `equal_within`, relative, where that was decided. `proven_bound` follows from {}; `certified` from a Cholesky factorization \
-         (--certify). ω of Jacobi is safe below {:.6} by proof, below {:.6} by the spectrum; of W-PIA below {:.6}.",
+         end up to `equal_within`, relative, where that was decided. ω of Jacobi is safe below {:.6} by proof, below {:.6} by \
+         the spectrum; of W-PIA below {:.6}.",
         found.ends.applications,
-        if found.verdict.is_some() { "valences and face sizes alone" } else { "the entries (Gershgorin)" },
         found.promise.safe_omega_jacobi,
         found.spectrum().jacobi.critical_omega(),
         found.promise.safe_omega_pia
+    ));
+    table.note(format!(
+        "Proven: `proven_bound`, by a theorem, from {} (its formula, to rounding); that the end lies between `certified` and `attained` (--certify), by a \
+         Cholesky factorization and a Rayleigh quotient whose rounding is bounded before they are made; values of `source` \
+         proven (a vector attains the bound, to rounding) and bracketed (within `error`, by counts of eigenvalues whose rounding \
+         is bounded). Converged to `residual`, but not proven to be the end: lanczos; dense is as good as the backward error of \
+         a dense eigenvalue solver. Measured: unconverged, and what the points excite.",
+        if found.verdict.is_some() { "valences and face sizes alone" } else { "the entries (Gershgorin)" },
     ));
     if let Some((least, greatest)) = found.ends_of_curves() {
         table.note(format!(
@@ -505,15 +550,19 @@ fn promised(count: f64) -> String {
 }
 
 fn radius_table(subject: &Subject, found: &Findings) -> Table {
-    let columns = Columns::<(&str, String, f64)>::new()
-        .col(Column::key("method"), |&(method, ..)| method)
-        .col(Column::key("parameter"), |(_, parameter, _)| parameter.clone())
-        .col(Column::number("rho", 1e-5, 6), |&(.., rho)| rho);
+    let mut columns = Columns::<Rate>::new()
+        .col(Column::key("method"), |r| r.method)
+        .col(Column::key("parameter"), |r| r.parameter.clone())
+        .col(Column::number("rho", 1e-5, 6), |r| r.rho);
+    if found.certified().is_some() {
+        columns = columns.col(Column::number("certified", 1e-5, 6), |r| r.certified);
+    }
     let title = format!("Predicted rates on {}", subject.title);
-    let mut table = columns.table(subject.stem("spectrum-rates"), title, &found.radii());
+    let mut table = columns.table(subject.stem("spectrum-rates"), title, &found.rates());
     table.note(
         "Factors per iteration: the spectral radius of the error matrix; for Chebyshev and conjugate gradients the bound \
-         from the condition number."
+         from the condition number. They are as well known as the ends that they follow from; those of Gauss-Seidel, SOR and \
+         SSOR are measured. What --certify proves stands in a column `certified`: no rate is greater."
             .to_string(),
     );
     table
@@ -550,8 +599,9 @@ fn json(subject: &Subject, found: &Findings, n: usize) -> Value {
     let each = |value: fn(&Quantity) -> Value| quantities.iter().map(|q| (q.name, value(q))).collect::<Value>();
     let promised = |count: fn(&IterationCounts) -> f64| found.counts.as_ref().map(|c| number(count(c)));
     let mut rho = Map::new();
-    for (method, _, value) in found.radii() {
-        rho.insert(method.into(), number(value));
+    let rates = found.rates();
+    for rate in &rates {
+        rho.insert(rate.method.into(), number(rate.rho));
     }
     let mut object = json!({
         "lambda_min": number(e.lambda_min.value),
@@ -590,10 +640,15 @@ fn json(subject: &Subject, found: &Findings, n: usize) -> Value {
         "kernel_excited": found.verdict.as_ref().map(|v| v.excited),
     });
     if let Value::Object(map) = &mut object {
-        let proofs: Map<String, Value> =
-            quantities.iter().filter_map(|q| Some((q.name.to_owned(), number(q.certified?)))).collect();
-        if !proofs.is_empty() {
-            map.insert("certified".into(), Value::Object(proofs));
+        let of_ends = |value: fn(&Certificate) -> f64| {
+            let proven = |q: &Quantity| Some((q.name.to_owned(), number(value(q.certificate.as_ref()?))));
+            quantities.iter().filter_map(proven).collect::<Map<_, _>>()
+        };
+        let of_rates = rates.iter().filter_map(|r| Some((r.method.to_owned(), number(r.certified?)))).collect();
+        let proofs =
+            [("certified", of_ends(|c| c.bound)), ("attained", of_ends(|c| c.attained)), ("certified_rho", of_rates)];
+        for (field, values) in proofs.into_iter().filter(|(_, values)| !values.is_empty()) {
+            map.insert(field.into(), Value::Object(values));
         }
         if let Some(verdict) = found.verdict.as_ref().filter(|v| v.is_singular()) {
             let all = Method::ALL.iter().map(|&m| (m.name().to_owned(), Value::from(verdict.prediction(m).name())));
