@@ -316,7 +316,10 @@ fn page(context: &Context, records: &[Record]) -> String {
          the printed one does not. *Refuted*: by the counterexample given. *Settled*: left open or not said in the \
          paper, decided here. *In part*: as printed as far as the numbers go; the remark names the rest. *Not decided*: \
          the paper names nothing that the numbers could be held against. *Not reproducible*: with the reason. *Not confirmed*: a number is on the wrong side of \
-         its threshold. Random meshes are {} closed ones of at most {} vertices with valences from 3, from fixed \
+         its threshold. Numbers are measurements, not proofs: eigenvalues come from dense decompositions, good to \
+         rounding, those of large meshes from Lanczos processes that end by their residuals, rates and counts from runs. What is \
+         proven of all meshes has its theorem in [findings](findings.md); `spectrum --certify` encloses the ends of the spectra \
+         of one mesh between proven numbers. Random meshes are {} closed ones of at most {} vertices with valences from 3, from fixed \
          seeds; L is the diagonal of a mesh's bounding box. `claims.csv` has a row for every number, `claims.json` \
          both, `claims--times.csv` (written with `--times`) the durations.\n\n{} claims: {}.\n",
         LEDGER.title,
