@@ -4,6 +4,7 @@
 mod bounds;
 mod certificates;
 mod ends;
+mod hypotheses;
 mod singular;
 mod sweeps;
 
