@@ -15,6 +15,7 @@
 //!
 //! This room builds on meshes, subdivision, assembly, solvers and analysis, and knows no plotting.
 
+pub mod fair_refinement;
 pub mod halstead;
 pub mod lin_luo;
 pub mod nasri;

@@ -39,7 +39,7 @@ pub(crate) struct Elements {
 
 /// Elements whose surroundings look alike.
 #[derive(Clone, Debug)]
-struct Kind {
+pub(in crate::interpolate) struct Kind {
     points: usize,
     /// Thin plate and membrane: `points` rows of [`stride`] numbers.
     forms: [Vec<f64>; 2],
@@ -214,7 +214,8 @@ fn ring(fine: &Surface, c: u32) -> [u32; 4] {
 }
 
 impl Kind {
-    fn new(points: usize, entry: impl Fn(usize, usize) -> [f64; 2]) -> Self {
+    /// `entry(i, j)`: of thin plate and membrane, symmetric.
+    pub(in crate::interpolate) fn new(points: usize, entry: impl Fn(usize, usize) -> [f64; 2]) -> Self {
         let mut forms = [(); 2].map(|()| vec![0.0; points * stride(points)]);
         for i in 0..points {
             for j in 0..points {
@@ -281,15 +282,10 @@ impl Elements {
         let what = || format!("the energy of the surface of {} vertices", given.len());
         require(BYTES * fine.len() as u64, what, "use a coarser mesh, or another method")?;
         let greatest = (0..fine.len()).map(|v| fine.incidence().face_count(v)).max().unwrap_or(0);
-        require_room(greatest)?;
+        // Two rings, and what the other corners see.
+        require_room(2 * greatest + 8, greatest)?;
         let (numbering, ranges) = numbered(given, &owner);
-        let block_of = {
-            let mut block_of = vec![0u32; fine.len()];
-            for (k, range) in ranges.iter().enumerate() {
-                numbering.order()[range.clone()].iter().for_each(|&v| block_of[v as usize] = k as u32);
-            }
-            block_of
-        };
+        let block_of = blocks_of(&numbering, &ranges);
         let masks = StepMasks::new(fine);
         let grams: Vec<[Gram; 2]> = (0..16).map(patch_grams).collect();
         // Where each kind occurs first, and which blocks each element touches.
@@ -334,40 +330,87 @@ impl Elements {
             }
         }
         let blocks = parallel::map(ranges.len(), 1, |k| {
-            let (vertices, elements) = (ranges[k.start].clone(), &elements_of[k.start]);
-            Block::new(fine, vertices, elements, &known, &kinds, &numbering)
+            let mut probe = Probe::default();
+            let look = &mut |element, vertices: &mut Vec<u32>| {
+                let kind = match probe.look(fine, element)? {
+                    Look::Patch(sharp) => sharp as u32,
+                    Look::Four => FOUR as u32,
+                    Look::Quarters => known[&probe.signature],
+                };
+                vertices.extend_from_slice(&probe.vertices);
+                Some(kind)
+            };
+            Block::new(ranges[k.start].clone(), &elements_of[k.start], look, &numbering)
+        });
+        Ok(Elements { owner, numbering, kinds, blocks: blocks.into_iter().collect::<Result<_>>()? })
+    }
+
+    /// `count` elements over as many vertices, those that belong to given ones: `list` appends the vertices of an
+    /// element, no two of them the same, and tells its kind.
+    ///
+    /// # Errors
+    /// Elements that are too large for a block.
+    pub(in crate::interpolate) fn of_list(
+        given: &Surface,
+        owner: Vec<u32>,
+        kinds: Vec<Kind>,
+        list: &(dyn Fn(u32, &mut Vec<u32>) -> u32 + Sync),
+    ) -> Result<Self> {
+        let (numbering, ranges) = numbered(given, &owner);
+        let block_of = blocks_of(&numbering, &ranges);
+        let touched = parallel::map(owner.len(), CHUNK, |range| {
+            let mut touched: Vec<(u32, Element)> = Vec::new();
+            let mut vertices = Vec::new();
+            for element in range {
+                vertices.clear();
+                list(element as Element, &mut vertices);
+                let start = touched.len();
+                for &v in &vertices {
+                    let block = block_of[v as usize];
+                    if touched[start..].iter().all(|t| t.0 != block) {
+                        touched.push((block, element as Element));
+                    }
+                }
+            }
+            touched
+        });
+        let mut elements_of = vec![Vec::new(); ranges.len()];
+        touched.into_iter().flatten().for_each(|(block, element)| elements_of[block as usize].push(element));
+        let blocks = parallel::map(ranges.len(), 1, |k| {
+            let look = &mut |element, vertices: &mut Vec<u32>| Some(list(element, vertices));
+            Block::new(ranges[k.start].clone(), &elements_of[k.start], look, &numbering)
         });
         Ok(Elements { owner, numbering, kinds, blocks: blocks.into_iter().collect::<Result<_>>()? })
     }
 
     /// Values in the order within.
-    pub(super) fn there<T: Copy + Send + Sync>(&self, values: &[T]) -> Vec<T> {
+    pub(in crate::interpolate) fn there<T: Copy + Send + Sync>(&self, values: &[T]) -> Vec<T> {
         self.numbering.there(values)
     }
 
     /// Values in the order of the mesh.
-    pub(super) fn back<T: Copy + Send + Sync>(&self, values: &[T]) -> Vec<T> {
+    pub(in crate::interpolate) fn back<T: Copy + Send + Sync>(&self, values: &[T]) -> Vec<T> {
         self.numbering.back(values)
     }
 
     /// For each fine vertex, in the order within, the point of the given vertex that it belongs to.
-    pub(super) fn spread(&self, points: &[DVec3]) -> Vec<DVec3> {
+    pub(in crate::interpolate) fn spread(&self, points: &[DVec3]) -> Vec<DVec3> {
         let order = self.numbering.order();
         parallel::collect(order.len(), |i| points[self.owner[order[i] as usize] as usize])
     }
 
     /// The place of each vertex in the order within.
-    pub(super) fn place(&self) -> &[u32] {
+    pub(in crate::interpolate) fn place(&self) -> &[u32] {
         self.numbering.place()
     }
 
     /// The vertices of the blocks, in the order within.
-    pub(super) fn blocks(&self) -> impl ExactSizeIterator<Item = Range<usize>> + '_ {
+    pub(in crate::interpolate) fn blocks(&self) -> impl ExactSizeIterator<Item = Range<usize>> + '_ {
         self.blocks.iter().map(|block| block.vertices.clone())
     }
 
     /// The matrices of all kinds for one energy.
-    pub(super) fn weighted(&self, weights: Weights) -> Vec<Vec<f64>> {
+    pub(in crate::interpolate) fn weighted(&self, weights: Weights) -> Vec<Vec<f64>> {
         let kinds = self.kinds.iter();
         kinds
             .map(|kind| {
@@ -380,7 +423,7 @@ impl Elements {
 
     /// y = K x. When a block of y is done, `then` sees its number, x and the block, and what it makes of them comes back in
     /// the order of the blocks.
-    pub(super) fn apply<R: Send>(
+    pub(in crate::interpolate) fn apply<R: Send>(
         &self,
         forms: &[Vec<f64>],
         x: &[DVec3],
@@ -403,7 +446,7 @@ impl Elements {
     }
 
     /// xᵀKx of thin plate and membrane, the elements of faces counted once.
-    pub(super) fn energies(&self, x: &[DVec3]) -> [f64; 2] {
+    pub(in crate::interpolate) fn energies(&self, x: &[DVec3]) -> [f64; 2] {
         [[1.0, 0.0], [0.0, 1.0]].map(|[thin_plate, membrane]| {
             let forms = self.weighted(Weights { thin_plate, membrane });
             let mut product = vec![DVec3::ZERO; x.len()];
@@ -416,7 +459,7 @@ impl Elements {
     }
 
     /// The diagonal of K.
-    pub(super) fn diagonal(&self, forms: &[Vec<f64>]) -> Vec<f64> {
+    pub(in crate::interpolate) fn diagonal(&self, forms: &[Vec<f64>]) -> Vec<f64> {
         let mut diagonal = vec![0.0; self.numbering.order().len()];
         parallel::parts(self.parts(&mut diagonal), |k, part| {
             let block = &self.blocks[k.start];
@@ -455,27 +498,22 @@ impl Elements {
 }
 
 impl Block {
+    /// `look` appends the vertices of an element, and tells its kind.
     fn new(
-        fine: &Surface,
         vertices: Range<usize>,
         touching: &[Element],
-        known: &HashMap<Signature, u32>,
-        kinds: &[Kind],
+        look: &mut dyn FnMut(Element, &mut Vec<u32>) -> Option<u32>,
         numbering: &Numbering,
     ) -> Result<Self> {
-        let mut probe = Probe::default();
-        let mut elements: Vec<(u32, u32)> = Vec::with_capacity(touching.len());
+        let mut elements: Vec<(u32, Range<usize>)> = Vec::with_capacity(touching.len());
         let mut all = Vec::new();
         for &element in touching {
-            let kind = match probe.look(fine, element) {
-                Some(Look::Patch(sharp)) => sharp as u32,
-                Some(Look::Four) => FOUR as u32,
-                Some(Look::Quarters) => known[&probe.signature],
-                None => continue,
-            };
-            elements.push((kind, all.len() as u32));
-            all.extend(probe.vertices.iter().map(|&v| numbering.place()[v as usize]));
+            let start = all.len();
+            if let Some(kind) = look(element, &mut all) {
+                elements.push((kind, start..all.len()));
+            }
         }
+        all.iter_mut().for_each(|v| *v = numbering.place()[*v as usize]);
         let is_inside = |v: u32| vertices.contains(&(v as usize));
         let mut around: Vec<u32> = all.iter().copied().filter(|&v| !is_inside(v)).collect();
         around.sort_unstable();
@@ -487,13 +525,12 @@ impl Block {
         elements.sort_by_key(|e| e.0);
         let mut runs: Vec<(u32, u32)> = Vec::new();
         let mut places = Vec::with_capacity(all.len());
-        for (kind, start) in elements {
+        for (kind, own) in elements {
             match runs.last_mut() {
                 Some((last, count)) if *last == kind => *count += 1,
                 _ => runs.push((kind, 1)),
             }
-            let own = &all[start as usize..start as usize + kinds[kind as usize].points];
-            places.extend(own.iter().map(|&v| {
+            places.extend(all[own].iter().map(|&v| {
                 let place = match is_inside(v) {
                     true => v as usize - vertices.start,
                     false => vertices.len() + around.partition_point(|&w| w < v),
@@ -538,6 +575,15 @@ fn numbered(given: &Surface, owner: &[u32]) -> (Numbering, Vec<Range<usize>>) {
     (Numbering::new(order), ranges)
 }
 
+/// The block of each vertex.
+fn blocks_of(numbering: &Numbering, ranges: &[Range<usize>]) -> Vec<u32> {
+    let mut block_of = vec![0u32; numbering.order().len()];
+    for (k, range) in ranges.iter().enumerate() {
+        numbering.order()[range.clone()].iter().for_each(|&v| block_of[v as usize] = k as u32);
+    }
+    block_of
+}
+
 fn too_great() -> Error {
     Error::TooLarge {
         what: "the energy about a vertex or face takes more than 65 535 control points".into(),
@@ -545,16 +591,14 @@ fn too_great() -> Error {
     }
 }
 
-/// The matrix of the faces about a vertex with so many.
-fn require_room(faces: usize) -> Result<()> {
-    // Two rings, and what the other corners see.
-    let points = 2 * faces + 8;
+/// The matrix of an element of so many points, about a vertex or in a face of such a valence.
+pub(in crate::interpolate) fn require_room(points: usize, valence: usize) -> Result<()> {
     if points > usize::from(u16::MAX) {
         return Err(too_great());
     }
     // Two forms, and their weighted sum.
     let bytes = 24 * (points * stride(points)) as u64;
-    let what = || format!("the energy of the surface about a vertex or in a face of valence {faces}");
+    let what = || format!("the energy of the surface about a vertex or in a face of valence {valence}");
     require(bytes, what, "use a mesh of smaller valences")
 }
 

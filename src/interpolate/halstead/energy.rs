@@ -24,6 +24,7 @@ use super::LEVELS;
 use super::elements::{self, Elements};
 use crate::assemble::Csr;
 use crate::assemble::csr::Pattern;
+use crate::error::short;
 use crate::memory::require;
 use crate::mesh::features::{Features, Rule};
 use crate::mesh::incidence::{next_in, prev_in};
@@ -45,6 +46,23 @@ pub struct Weights {
 impl Default for Weights {
     fn default() -> Self {
         Weights { thin_plate: 1.0, membrane: 1.0 }
+    }
+}
+
+impl Weights {
+    /// # Errors
+    /// Weights that are negative, not finite, or without a membrane part, which makes the minimum unique.
+    pub(in crate::interpolate) fn check(self) -> Result<()> {
+        let valid = |w: f64| w >= 0.0 && w.is_finite();
+        if valid(self.thin_plate) && valid(self.membrane) && self.membrane > 0.0 {
+            return Ok(());
+        }
+        Err(Error::Computation(format!(
+            "the fairness weights {} (thin plate) and {} (membrane) must be finite, none negative, and the second \
+             positive",
+            short(self.thin_plate),
+            short(self.membrane)
+        )))
     }
 }
 
@@ -165,7 +183,7 @@ impl Fairness {
 
 /// Halving the parameters' sides: second derivatives ×4, their squares ×16, areas ×¼; the first energy stays. Twice for
 /// quarters of faces.
-pub(super) const WHOLE: f64 = 4.0;
+pub(in crate::interpolate) const WHOLE: f64 = 4.0;
 pub(super) const QUARTER: f64 = 16.0;
 
 /// One entry of WᵀGW, from two columns of W.
@@ -382,7 +400,7 @@ pub(super) fn regular_patch(surface: &Surface, f: usize) -> Option<Patch> {
 }
 
 /// Vertices with their weights.
-pub(super) type Row = Vec<(u32, f64)>;
+pub(in crate::interpolate) type Row = Vec<(u32, f64)>;
 
 /// The rules of vertices on curves and at corners as masks of single vertices.
 pub(super) struct SharpMasks<'a> {

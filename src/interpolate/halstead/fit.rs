@@ -7,12 +7,12 @@ use glam::DVec3;
 use super::direct::{by_normals, by_points};
 use super::energy::{Energies, Fairness, Row, SharpMasks, Weights};
 use super::projected::{Conditions, minimise};
-use crate::error::short;
 use crate::interpolate::normals::unit_normals;
 use crate::interpolate::zheng_cai::Constraints;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Surface, diagonal};
 use crate::schemes::catmull_clark::{limit_mask, tangent_constant};
+use crate::solvers::iteration::largest;
 use crate::solvers::system::Rows;
 use crate::solvers::{Errors, Outcome, Report, Step, Stop};
 use crate::{Error, Result};
@@ -83,14 +83,27 @@ const MISS: f64 = 1e-8;
 pub fn fit(fairness: &Fairness, points: &[DVec3], wishes: &Constraints, weights: Weights) -> Result<Fit> {
     let stop = Stop { tolerance: TOLERANCE * diagonal(points), max_iterations: MAX_ITERATIONS };
     let mut watch = |_: &Step| ControlFlow::Continue(());
-    let fit = fit_watched(fairness, points, wishes, weights, Solver::Iterations, &stop, &mut watch)?;
-    match fit.report.outcome {
-        Outcome::Converged | Outcome::Rounding => Ok(fit),
-        outcome => Err(Error::Computation(format!(
-            "the fairest surface was not found in {} iterations ({outcome}): raise the membrane weight, or interpolate more \
-             vertices",
-            fit.report.iterations
-        ))),
+    fit_watched(fairness, points, wishes, weights, Solver::Iterations, &stop, &mut watch)?.found()
+}
+
+impl Fit {
+    /// The fit itself, if it is the fairest as far as was asked.
+    ///
+    /// # Errors
+    /// Iterations that ended elsewhere than at the tolerance, at rounding, or where the watch said stop.
+    pub fn found(self) -> Result<Self> {
+        match self.report.outcome {
+            Outcome::Converged | Outcome::Rounding | Outcome::Stopped => Ok(self),
+            outcome @ (Outcome::Diverged
+            | Outcome::MaxIterations
+            | Outcome::Stagnated
+            | Outcome::Singular
+            | Outcome::Breakdown) => Err(Error::Computation(format!(
+                "the fairest surface was not found in {} iterations ({outcome}): raise the membrane weight, or interpolate \
+                 more vertices",
+                self.report.iterations
+            ))),
+        }
     }
 }
 
@@ -111,15 +124,7 @@ pub fn fit_watched(
     stop: &Stop,
     watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
 ) -> Result<Fit> {
-    let valid = |w: f64| w >= 0.0 && w.is_finite();
-    if !(valid(weights.thin_plate) && valid(weights.membrane) && weights.membrane > 0.0) {
-        return Err(Error::Computation(format!(
-            "the fairness weights {} (thin plate) and {} (membrane) must be finite, none negative, and the second \
-             positive",
-            short(weights.thin_plate),
-            short(weights.membrane)
-        )));
-    }
+    weights.check()?;
     assert!(points.len() < fairness.fine.len(), "the given points, not the fine ones");
     wishes.check(points.len())?;
     if wishes.handles.is_some() {
@@ -129,7 +134,7 @@ pub fn fit_watched(
         });
     }
     wishes.check_smooth(&fairness.fine)?;
-    require_anchors(fairness, wishes, points.len())?;
+    require_anchors(&fairness.fine, wishes, points.len())?;
     let normals = wishes.normals.map(unit_normals).transpose()?;
     let normals = normals.filter(|n| n.iter().any(Option::is_some));
     let chosen: Vec<usize> = (0..points.len()).filter(|&v| wishes.is_interpolated(v)).collect();
@@ -141,7 +146,9 @@ pub fn fit_watched(
                 let tangents = normal.map(|normal| (masks.tangents(v), normal));
                 Conditions { limit: masks.limit(v), point: points[v], tangents }
             };
-            minimise(&fairness.elements, weights, points, &chosen, conditions, stop, watch)?
+            // Every control point begins at the given point that is next to it.
+            let start = fairness.elements.spread(points);
+            minimise(&fairness.elements, weights, start, largest(points), &chosen, conditions, stop, watch)?
         }
         Solver::Factorization => {
             let x = match normals {
@@ -173,12 +180,12 @@ pub fn fit_watched(
     Ok(Fit { energies: fairness.energies(surface.positions()), surface, errors: totals.errors, report })
 }
 
-/// Every component needs a point that holds it.
-fn require_anchors(fairness: &Fairness, wishes: &Constraints, originals: usize) -> Result<()> {
+/// Every component needs a point that holds it. The given vertices are the first of the surface's.
+pub(in crate::interpolate) fn require_anchors(surface: &Surface, wishes: &Constraints, originals: usize) -> Result<()> {
     if wishes.interpolated.is_none() {
         return Ok(());
     }
-    let (component, count) = fairness.fine.topology().components(fairness.fine.faces());
+    let (component, count) = surface.topology().components(surface.faces());
     let mut held = vec![false; count];
     for v in (0..originals).filter(|&v| wishes.is_interpolated(v)) {
         held[component[v] as usize] = true;

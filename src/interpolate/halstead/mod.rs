@@ -10,11 +10,11 @@
 //! iterative methods against it.
 
 mod direct;
-mod elements;
+pub(super) mod elements;
 pub mod energy;
 pub mod fit;
 pub mod follow;
-mod projected;
+pub(super) mod projected;
 
 pub use energy::{Energies, Fairness, Weights};
 pub use fit::{Fit, Solver, fit, fit_watched};

@@ -14,17 +14,17 @@ use glam::DVec3;
 use super::elements::Elements;
 use super::energy::{Row, Weights};
 use crate::parallel;
-use crate::solvers::iteration::{largest, solve_in_scale};
+use crate::solvers::iteration::solve_in_scale;
 use crate::solvers::{Errors, Failure, Iterate, Outcome, Report, Step, Stop};
 use crate::{Error, Result};
 
 /// What is asked at one given vertex.
-pub(super) struct Conditions {
+pub(in crate::interpolate) struct Conditions {
     /// The limit mask over fine vertices, and the point that it gives.
-    pub(super) limit: Row,
-    pub(super) point: DVec3,
+    pub(in crate::interpolate) limit: Row,
+    pub(in crate::interpolate) point: DVec3,
     /// The tangent masks, and the unit normal that they are perpendicular to.
-    pub(super) tangents: Option<([Row; 2], DVec3)>,
+    pub(in crate::interpolate) tangents: Option<([Row; 2], DVec3)>,
 }
 
 /// The conditions of one ring as orthonormal rows over the scaled unknowns.
@@ -250,11 +250,12 @@ impl Iterate for Minimiser<'_> {
 
 /// The minimiser of the weighted energy among the control points that meet the conditions at the `chosen` given vertices, in the order of the fine mesh.
 /// The errors of an iterate are the steps, in mesh units, that would take the energy to its least value along one control
-/// point at a time. The start is the point of the next given vertex.
-pub(super) fn minimise(
+/// point at a time. The start, in the order within, need not meet the conditions. `size` is the largest coordinate of the data.
+pub(in crate::interpolate) fn minimise(
     elements: &Elements,
     weights: Weights,
-    points: &[DVec3],
+    start: Vec<DVec3>,
+    size: f64,
     chosen: &[usize],
     conditions: impl Fn(usize) -> Conditions + Sync,
     stop: &Stop,
@@ -285,7 +286,7 @@ pub(super) fn minimise(
         forms,
         scale,
         rings,
-        x: elements.spread(points),
+        x: start,
         rest: vec![DVec3::ZERO; n],
         direction: vec![DVec3::ZERO; n],
         product: vec![DVec3::ZERO; n],
@@ -295,7 +296,6 @@ pub(super) fn minimise(
     };
     minimiser.meet_conditions();
     minimiser.evaluate();
-    let size = largest(points);
     let report = solve_in_scale(&mut minimiser, size, stop, watch);
     minimiser.meet_conditions();
     Ok((elements.back(&minimiser.into_points()), report))
