@@ -6,6 +6,7 @@
 //! | [`thall`] | Thall's iteration by local masks, his error metrics and attributes |
 //! | [`normals`] | given normals: Thall's rotation of 1-rings, for every primal scheme |
 //! | [`zheng_cai`] | Zheng & Cai's two phases: exact centroids, normals, shape handles |
+//! | [`fair_refinement`] | the freedom that they leave: best shape handles, the fairest first refined mesh |
 //! | [`nasri`] | Nasri's method, beside it |
 //! | [`lin_luo`] | Lin & Luo's unified schemes for curves and √3 surfaces |
 //! | [`halstead`] | fair interpolation as a constrained least-squares problem, without a matrix; iterations watched by it |

@@ -272,6 +272,35 @@ fn more_freedom_is_fairer() {
     }
 }
 
+/// On a mesh of several blocks: nothing is left of the gradient along what changes no point, nor along the arms of a face.
+#[test]
+fn large_fair_refinements_are_stationary() {
+    let surface = noisy_surface("irregular-poly:2500");
+    let fairness = FirstFairness::new(&surface).unwrap();
+    let marks: Vec<bool> = (0..surface.len()).map(|v| v % 7 != 3).collect();
+    let wishes = Constraints { interpolated: Some(&marks), ..ALL };
+    let weights = Weights::default();
+    let stop = Stop { tolerance: 1e-10, max_iterations: 200 };
+    let first = two_phase(&surface, &wishes).surface.into_mesh().positions;
+    let points = surface.positions();
+    let free = fairest(&fairness, &first, points, &wishes, weights, &stop, &mut go_on).unwrap();
+    let handles = fair_handles(&fairness, &first, points, &wishes, weights, &stop, &mut go_on).unwrap();
+    assert!([&free, &handles.refined].iter().all(|fair| fair.report.outcome == Outcome::Converged));
+    let [of_free, of_handles] = [&free, &handles.refined].map(|fair| fairness.gradient(&fair.points, weights));
+    let before = fairness.gradient(&first, weights).iter().map(|g| g.length()).fold(0.0, f64::max);
+    for (v, point) in points.iter().enumerate() {
+        let star = surface.incidence().corners_at(v).iter().map(|&c| c as usize);
+        let mean = star.clone().map(|c| of_free[c]).sum::<DVec3>() / star.len() as f64;
+        let along: f64 = star.clone().map(|c| of_handles[c].dot(first[c] - *point)).sum();
+        for c in star {
+            let rest = of_free[c] - if marks[v] { mean } else { DVec3::ZERO };
+            assert!(rest.length() < 1e-7 * before, "{v} {rest}");
+            assert!(marks[v] || handles.refined.points[c] == first[c]);
+        }
+        assert!(!marks[v] || along.abs() < 1e-7 * before, "{v} {along}");
+    }
+}
+
 #[test]
 fn fair_refinements_without_sense_are_errors() {
     let surface = Surface::new(builtin::icosahedron()).unwrap();

@@ -117,7 +117,7 @@ impl<'a> FirstFairness<'a> {
         self.require_points(points);
         let forms = self.elements.weighted(weights);
         let mut product = vec![DVec3::ZERO; points.len()];
-        self.elements.apply(&forms, &self.elements.there(points), &mut product, |_, _, _| ());
+        self.elements.apply(&forms, &self.elements.there(points), &mut product, &|_, _: &[DVec3], _: &mut [DVec3]| ());
         self.elements.back(&product)
     }
 

@@ -15,7 +15,6 @@ use crate::interpolate::halstead::fit::require_anchors;
 use crate::interpolate::halstead::projected::{Conditions, minimise};
 use crate::interpolate::normals::unit_normals;
 use crate::interpolate::zheng_cai::Constraints;
-use crate::solvers::iteration::largest;
 use crate::solvers::{Errors, Report, Step, Stop};
 use crate::{Error, Result};
 
@@ -102,8 +101,7 @@ pub fn fairest(
         Conditions { limit: row(&|_| 1.0 / m), point: points[v], tangents: normal.map(|normal| (tangents(), normal)) }
     };
     let start = fairness.elements.there(start);
-    let size = largest(points);
-    let (found, report) = minimise(&fairness.elements, weights, start, size, &chosen, conditions, stop, watch)?;
+    let (found, report) = minimise(&fairness.elements, weights, start, &chosen, &conditions, stop, watch)?;
     let errors = centroid_errors(fairness, &found, points, &chosen);
     Ok(FairRefinement { energies: fairness.energies(&found), points: found, errors, report })
 }

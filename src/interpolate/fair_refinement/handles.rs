@@ -157,7 +157,7 @@ impl<'a> Scaling<'a> {
 
     /// rest ← −D^{-½} Bᵀ K x.
     fn evaluate(&mut self) {
-        self.fairness.elements.apply(&self.forms, &self.x, &mut self.product, |_, _, _| ());
+        self.fairness.elements.apply(&self.forms, &self.x, &mut self.product, &|_, _: &[DVec3], _: &mut [DVec3]| ());
         let (groups, arms, product) = (&self.groups, &self.arms, &self.product);
         parallel::fill(&mut self.rest, |g| -along(&groups[g], arms, product));
         self.before = None;
@@ -195,9 +195,10 @@ impl Iterate for Scaling<'_> {
         parallel::fill(&mut self.field, |i| direction[group_of[i] as usize] * arms[i]);
         let elements = &self.fairness.elements;
         let blocks: Vec<_> = elements.blocks().collect();
-        let curvatures = elements.apply(&self.forms, &self.field, &mut self.product, |k, p, y| {
-            p[blocks[k].clone()].iter().zip(&*y).map(|(p, y)| p.dot(*y)).sum::<f64>()
-        });
+        let curvatures =
+            elements.apply(&self.forms, &self.field, &mut self.product, &|k, p: &[DVec3], y: &mut [DVec3]| {
+                p[blocks[k].clone()].iter().zip(&*y).map(|(p, y)| p.dot(*y)).sum::<f64>()
+            });
         let curvature: f64 = curvatures.into_iter().sum();
         let step = self.squared / curvature;
         if !(curvature > 0.0 && step.is_finite()) {

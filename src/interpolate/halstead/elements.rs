@@ -409,6 +409,21 @@ impl Elements {
         self.blocks.iter().map(|block| block.vertices.clone())
     }
 
+    /// The block of each given vertex, in which all that belongs to it lies.
+    pub(super) fn block_of_given(&self) -> Vec<u32> {
+        let mut block_of = Vec::new();
+        for (k, block) in self.blocks.iter().enumerate() {
+            for &v in &self.numbering.order()[block.vertices.clone()] {
+                let given = self.owner[v as usize] as usize;
+                if block_of.len() <= given {
+                    block_of.resize(given + 1, 0);
+                }
+                block_of[given] = k as u32;
+            }
+        }
+        block_of
+    }
+
     /// The matrices of all kinds for one energy.
     pub(in crate::interpolate) fn weighted(&self, weights: Weights) -> Vec<Vec<f64>> {
         let kinds = self.kinds.iter();
@@ -428,7 +443,7 @@ impl Elements {
         forms: &[Vec<f64>],
         x: &[DVec3],
         y: &mut [DVec3],
-        then: impl Fn(usize, &[DVec3], &mut [DVec3]) -> R + Sync,
+        then: &(dyn Fn(usize, &[DVec3], &mut [DVec3]) -> R + Sync),
     ) -> Vec<R> {
         parallel::parts(self.parts(y), |k, part| {
             let block = &self.blocks[k.start];
@@ -450,7 +465,7 @@ impl Elements {
         [[1.0, 0.0], [0.0, 1.0]].map(|[thin_plate, membrane]| {
             let forms = self.weighted(Weights { thin_plate, membrane });
             let mut product = vec![DVec3::ZERO; x.len()];
-            let sums = self.apply(&forms, x, &mut product, |k, x, y| {
+            let sums = self.apply(&forms, x, &mut product, &|k, x: &[DVec3], y: &mut [DVec3]| {
                 let x = &x[self.blocks[k].vertices.clone()];
                 x.iter().zip(&*y).map(|(x, y)| x.dot(*y)).sum::<f64>()
             });

@@ -164,7 +164,7 @@ impl Fairness {
         assert_eq!(points.len(), self.fine.len(), "one point a fine vertex");
         let forms = self.elements.weighted(weights);
         let mut product = vec![DVec3::ZERO; points.len()];
-        self.elements.apply(&forms, &self.elements.there(points), &mut product, |_, _, _| ());
+        self.elements.apply(&forms, &self.elements.there(points), &mut product, &|_, _: &[DVec3], _: &mut [DVec3]| ());
         self.elements.back(&product)
     }
 

@@ -12,7 +12,6 @@ use crate::interpolate::zheng_cai::Constraints;
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::{Surface, diagonal};
 use crate::schemes::catmull_clark::{limit_mask, tangent_constant};
-use crate::solvers::iteration::largest;
 use crate::solvers::system::Rows;
 use crate::solvers::{Errors, Outcome, Report, Step, Stop};
 use crate::{Error, Result};
@@ -148,7 +147,7 @@ pub fn fit_watched(
             };
             // Every control point begins at the given point that is next to it.
             let start = fairness.elements.spread(points);
-            minimise(&fairness.elements, weights, start, largest(points), &chosen, conditions, stop, watch)?
+            minimise(&fairness.elements, weights, start, &chosen, &conditions, stop, watch)?
         }
         Solver::Factorization => {
             let x = match normals {

@@ -14,7 +14,7 @@ use glam::DVec3;
 use super::elements::Elements;
 use super::energy::{Row, Weights};
 use crate::parallel;
-use crate::solvers::iteration::solve_in_scale;
+use crate::solvers::iteration::{largest, solve_in_scale};
 use crate::solvers::{Errors, Failure, Iterate, Outcome, Report, Step, Stop};
 use crate::{Error, Result};
 
@@ -168,7 +168,7 @@ impl Minimiser<'_> {
     fn evaluate(&mut self) {
         let (rings, scale, elements) = (&self.rings, &self.scale, self.elements);
         let ranges: Vec<_> = elements.blocks().collect();
-        elements.apply(&self.forms, &self.x, &mut self.rest, |k, _, y| {
+        elements.apply(&self.forms, &self.x, &mut self.rest, &|k, _, y: &mut [DVec3]| {
             let scale = &scale[ranges[k].clone()];
             y.iter_mut().zip(scale).for_each(|(y, s)| *y *= -*s);
             rings[k].iter().for_each(|ring| ring.meet(0.0, y));
@@ -221,13 +221,14 @@ impl Iterate for Minimiser<'_> {
         self.turn(self.before.map_or(0.0, |before| self.squared / before));
         let (rings, scale, elements) = (&self.rings, &self.scale, self.elements);
         let ranges: Vec<_> = elements.blocks().collect();
-        let curvatures = elements.apply(&self.forms, &self.direction, &mut self.product, |k, p, y| {
-            let range = ranges[k].clone();
-            let curvature: f64 = p[range.clone()].iter().zip(&*y).map(|(p, y)| p.dot(*y)).sum();
-            y.iter_mut().zip(&scale[range]).for_each(|(y, s)| *y *= *s);
-            rings[k].iter().for_each(|ring| ring.meet(0.0, y));
-            curvature
-        });
+        let curvatures =
+            elements.apply(&self.forms, &self.direction, &mut self.product, &|k, p: &[DVec3], y: &mut [DVec3]| {
+                let range = ranges[k].clone();
+                let curvature: f64 = p[range.clone()].iter().zip(&*y).map(|(p, y)| p.dot(*y)).sum();
+                y.iter_mut().zip(&scale[range]).for_each(|(y, s)| *y *= *s);
+                rings[k].iter().for_each(|ring| ring.meet(0.0, y));
+                curvature
+            });
         let curvature: f64 = curvatures.into_iter().sum();
         let step = self.squared / curvature;
         if !(curvature > 0.0 && step.is_finite()) {
@@ -250,14 +251,13 @@ impl Iterate for Minimiser<'_> {
 
 /// The minimiser of the weighted energy among the control points that meet the conditions at the `chosen` given vertices, in the order of the fine mesh.
 /// The errors of an iterate are the steps, in mesh units, that would take the energy to its least value along one control
-/// point at a time. The start, in the order within, need not meet the conditions. `size` is the largest coordinate of the data.
+/// point at a time. The start, in the order within, need not meet the conditions.
 pub(in crate::interpolate) fn minimise(
     elements: &Elements,
     weights: Weights,
     start: Vec<DVec3>,
-    size: f64,
     chosen: &[usize],
-    conditions: impl Fn(usize) -> Conditions + Sync,
+    conditions: &(dyn Fn(usize) -> Conditions + Sync),
     stop: &Stop,
     watch: &mut dyn FnMut(&Step) -> ControlFlow<()>,
 ) -> Result<(Vec<DVec3>, Report)> {
@@ -272,15 +272,14 @@ pub(in crate::interpolate) fn minimise(
     let place = elements.place();
     let blocks: Vec<_> = elements.blocks().collect();
     let mut of_block = vec![Vec::new(); blocks.len()];
-    for &v in chosen {
-        of_block[blocks.partition_point(|range| range.end <= place[v] as usize)].push(v);
-    }
+    let block_of = elements.block_of_given();
+    chosen.iter().for_each(|&v| of_block[block_of[v] as usize].push(v));
     let rings = parallel::map(blocks.len(), 1, |b| {
         let first = blocks[b.start].start;
         of_block[b.start].iter().map(|&v| Ring::new(&conditions(v), place, first, &scale)).collect()
     });
     drop(of_block);
-    let n = place.len();
+    let (n, size) = (place.len(), largest(&start));
     let mut minimiser = Minimiser {
         elements,
         forms,
