@@ -23,7 +23,7 @@ fn the_list_names_items_and_claims() {
     let output = reproduce(dir.path(), &["--list"]);
     assert!(output.status.success());
     let ids: Vec<&str> = text(&output.stdout).lines().map(|line| line.split_whitespace().next().unwrap()).collect();
-    for id in ["claims", "findings", "T1", "T29", "Z26", "P17", "L12"] {
+    for id in ["claims", "findings", "T1", "T29", "Z31", "P17", "L16", "B4"] {
         assert_eq!(ids.iter().filter(|i| **i == id).count(), 1, "{id}");
     }
 }

@@ -1,23 +1,29 @@
-//! The ledger: every statement of the four papers that a computation can confirm, correct or refute, with the
-//! numbers that decide it. All numbers are computed in each run, and verdicts follow from them by stated thresholds.
+//! The ledger: every statement of the four papers that a computation can confirm, correct or refute, and questions
+//! beyond them, with the numbers that decide. All numbers are computed in each run, and verdicts follow from them by
+//! stated thresholds.
 //!
 //! - [`finding`]: numbers, thresholds, verdicts;
 //! - [`lab`]: the meshes and small tools that claims share;
 //! - one file a paper, and beside it one each for subjects of their own: [`thall`], [`zheng_cai`], [`pia`], [`lin_luo`];
 //! - [`open`]: what two of them leave to open meshes;
+//! - [`smallest`], [`decay`], [`everywhere`]: what none of them asks, of λ_min, of A⁻¹, of the surface between its vertices;
 //! - [`links`]: claims in pages lead to the ledger;
 //! - [`findings`]: the page on what is settled and what is wrong, filled with the ledger's numbers.
 
+mod decay;
+mod everywhere;
 mod finding;
 pub mod findings;
 mod lab;
 mod lin_luo;
 mod lin_luo_others;
+mod lin_luo_varying;
 pub mod links;
 mod open;
 mod pia;
 mod pia_catmull_clark;
 mod pia_lemma;
+mod smallest;
 mod thall;
 mod thall_masks;
 mod thall_normals;
@@ -25,6 +31,7 @@ mod thall_surfaces;
 mod zheng_cai;
 mod zheng_cai_exact;
 mod zheng_cai_faces;
+mod zheng_cai_orders;
 mod zheng_cai_speed;
 
 use std::fmt::Write as _;
@@ -81,21 +88,23 @@ pub struct Record {
     pub finding: Finding,
 }
 
-/// The papers by the letter of their claims.
-const PAPERS: [(char, &str); 4] = [
+/// The papers by the letter of their claims, and what is said here beyond them.
+const PAPERS: [(char, &str); 5] = [
     ('T', "Thall 2003, Fast C² Interpolating Subdivision Surfaces"),
     ('Z', "Zheng & Cai 2005, Making Doo-Sabin surface interpolation always work"),
     ('P', "Progressive Iterative Interpolation for Subdivision Surfaces"),
     ('L', "Lin & Luo, A Unified √3 Subdivision Scheme"),
+    ('B', "Beyond the papers"),
 ];
 
 /// All claims in the order of the ledger.
 pub fn all() -> impl Iterator<Item = &'static Claim> {
     let thall = [thall::CLAIMS, thall_masks::CLAIMS, thall_normals::CLAIMS];
-    let zheng_cai = [zheng_cai::CLAIMS, open::ZHENG_CAI, zheng_cai_exact::CLAIMS];
+    let zheng_cai = [zheng_cai::CLAIMS, open::ZHENG_CAI, zheng_cai_exact::CLAIMS, zheng_cai_orders::CLAIMS];
     let pia = [pia::CLAIMS, open::PIA, pia_lemma::CLAIMS];
-    let lin_luo = [lin_luo::CLAIMS, lin_luo_others::CLAIMS];
-    thall.into_iter().chain(zheng_cai).chain(pia).chain(lin_luo).flatten()
+    let lin_luo = [lin_luo::CLAIMS, lin_luo_others::CLAIMS, lin_luo_varying::CLAIMS];
+    let beyond = [smallest::CLAIMS, decay::CLAIMS, everywhere::CLAIMS];
+    thall.into_iter().chain(zheng_cai).chain(pia).chain(lin_luo).chain(beyond).flatten()
 }
 
 pub fn find(id: &str) -> Option<&'static Claim> {
