@@ -556,7 +556,8 @@ def splitting(
     valences
         From 3 to 100; at a boundary or corner numbers of faces, from 1 on.
     scheme
-        `catmull-clark`, `loop`, `doo-sabin` (at a face), `sqrt3` or `labsik-greiner`.
+        `catmull-clark`, `loop`, `doo-sabin` (at a face), `sqrt3`, `labsik-greiner`, `kobbelt`, or one with the prefix
+        `blended-` or `pushed-back-` (`catmull-clark`, `loop`).
     alpha
         The blend of `sqrt3`, from 0 to 2.
     at

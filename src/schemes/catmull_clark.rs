@@ -162,7 +162,7 @@ pub fn refine_in_place(mut surface: Surface) -> Result<Mesh> {
 }
 
 /// The faces of the refined mesh: (vertex, edge leaving it, face, edge entering it) for each old corner.
-fn split(surface: &Surface, edges: &EdgeNumbers) -> Faces {
+pub(super) fn split(surface: &Surface, edges: &EdgeNumbers) -> Faces {
     let (mesh, topology) = (surface.mesh(), surface.topology());
     let vertices = topology.incidence.vertices() as u32;
     let first_face = vertices + topology.edges() as u32;

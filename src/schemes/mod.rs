@@ -12,9 +12,10 @@
 //! | [`unified_sqrt3`] | Lin & Luo, α per vertex | triangles | where α = 1 |
 //! | [`blend`] | the same blend of any scheme above that keeps the numbers of its vertices | as of the scheme | where α = 1 |
 //! | [`butterfly`] | modified Butterfly, Zorin, Schröder & Sweldens 1996 | triangles | yes |
+//! | [`kobbelt`] | interpolatory quads, Kobbelt 1996 | quads, closed | yes |
 //! | [`labsik_greiner`] | interpolatory √3, Labsik & Greiner 2000 | triangles | yes |
 //!
-//! All take open and creased meshes too: edges with one face and tagged ones are [sharp](crate::mesh::features), their curves
+//! All but [`kobbelt`] take open and creased meshes too: edges with one face and tagged ones are [sharp](crate::mesh::features), their curves
 //! cubic B-splines, quadratic ones under the dual schemes, or interpolated by cubics. All refuse a boundary that is treated as
 //! interior with an
 //! [`Error::Open`](crate::Error::Open). A step takes time and memory
@@ -39,6 +40,7 @@ pub mod catmull_clark;
 mod chaikin;
 pub mod doo_sabin;
 mod interpolatory;
+pub mod kobbelt;
 pub mod labsik_greiner;
 pub(crate) mod local_limit;
 pub mod loop_scheme;

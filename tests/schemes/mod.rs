@@ -2,6 +2,7 @@
 //! grids, polynomials, and masks evaluated by looking at every face.
 
 mod interpolatory;
+mod kobbelt;
 mod labsik_greiner;
 mod limits;
 mod meshes;

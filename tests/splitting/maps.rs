@@ -6,12 +6,13 @@ use limitlab::analysis::splitting::{Blended, LocalScheme, Net, SplittingMatrix, 
 use super::{EIGEN, SCHEMES};
 
 const VALENCES: [usize; 8] = [3, 4, 5, 6, 7, 8, 12, 50];
-const BLENDS: [LocalScheme; 5] = [
+const BLENDS: [LocalScheme; 6] = [
     LocalScheme::Sqrt3 { alpha: 0.5 },
     LocalScheme::Sqrt3 { alpha: 1.0 },
     LocalScheme::LabsikGreiner,
     LocalScheme::Blend { of: Blended::CatmullClark, alpha: 1.0 },
     LocalScheme::Blend { of: Blended::Loop, alpha: 1.0 },
+    LocalScheme::Kobbelt,
 ];
 
 fn map(scheme: LocalScheme, n: usize) -> Net {

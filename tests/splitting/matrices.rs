@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::{EIGEN, ROUNDING, SCHEMES};
 
-const BLENDS: [LocalScheme; 7] = [
+const BLENDS: [LocalScheme; 10] = [
     LocalScheme::Sqrt3 { alpha: 0.5 },
     LocalScheme::Sqrt3 { alpha: 1.0 },
     LocalScheme::Sqrt3 { alpha: 1.5 },
@@ -13,6 +13,9 @@ const BLENDS: [LocalScheme; 7] = [
     LocalScheme::Blend { of: Blended::CatmullClark, alpha: 0.5 },
     LocalScheme::Blend { of: Blended::CatmullClark, alpha: 1.0 },
     LocalScheme::Blend { of: Blended::Loop, alpha: 1.0 },
+    LocalScheme::PushBack { of: Blended::CatmullClark, beta: 1.0 },
+    LocalScheme::PushBack { of: Blended::Loop, beta: 0.5 },
+    LocalScheme::Kobbelt,
 ];
 
 #[test]
@@ -28,14 +31,15 @@ fn sizes_are_those_of_the_literature() {
 }
 
 #[test]
-fn the_blend_closes_on_three_rings_and_no_fewer() {
+fn a_matrix_closes_on_its_least_rings_and_no_fewer() {
     for scheme in BLENDS {
         for n in [3, 5, 6, 9] {
-            for rings in [1, 2] {
+            let least = scheme.least_rings();
+            for rings in 1..least {
                 let refused = SplittingMatrix::on_rings(scheme, n, rings).unwrap_err().to_string();
-                assert!(refused.contains("take 3 or more"), "{refused}");
+                assert!(refused.contains(&format!("take {least} or more")), "{refused}");
             }
-            assert!(SplittingMatrix::on_rings(scheme, n, 3).is_ok());
+            assert!(SplittingMatrix::on_rings(scheme, n, least).is_ok());
         }
     }
 }
@@ -223,7 +227,11 @@ fn more_rings_keep_the_leading_eigenvalues_and_the_masks() {
 fn the_interpolating_scheme_keeps_its_vertex() {
     for n in [3, 4, 5, 6, 7, 30] {
         for scheme in BLENDS {
-            if matches!(scheme, LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. } if alpha != 1.0) {
+            if let LocalScheme::Sqrt3 { alpha }
+            | LocalScheme::Blend { alpha, .. }
+            | LocalScheme::PushBack { beta: alpha, .. } = scheme
+                && alpha != 1.0
+            {
                 continue;
             }
             let s = SplittingMatrix::new(scheme, n).unwrap();

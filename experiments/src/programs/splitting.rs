@@ -33,10 +33,12 @@ pub struct Arguments {
     /// The vertex: smooth, boundary, crease, corner or dart
     #[arg(long, value_name = "KIND", default_value = "smooth")]
     at: At,
-    /// catmull-clark, loop, doo-sabin (at a face), sqrt3, labsik-greiner, blended-catmull-clark or blended-loop
+    /// catmull-clark, loop, doo-sabin (at a face), sqrt3, labsik-greiner, kobbelt, blended-catmull-clark, blended-loop,
+    /// pushed-back-catmull-clark or pushed-back-loop
     #[arg(long, value_name = "NAME", default_value = "catmull-clark")]
     scheme: String,
-    /// The blend of sqrt3 (0 unless told) and of the blended schemes (1), 0 to 2: 0 approximating, 1 interpolating
+    /// The blend of sqrt3 (0 unless told) and of the blended schemes (1), or how far pushed-back schemes push (1), 0 to 2: 0
+    /// approximating, 1 interpolating
     #[arg(long, value_name = "A")]
     alpha: Option<f64>,
     #[command(flatten)]
@@ -160,8 +162,14 @@ fn run(arguments: &Arguments, scheme: LocalScheme, valences: &[usize], provenanc
     let mut object = json!({
         "scheme": scheme.name(),
         "alpha": match scheme {
-            LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. } => number(alpha),
-            _ => Value::Null,
+            LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. } | LocalScheme::PushBack { beta: alpha, .. } => {
+                number(alpha)
+            }
+            LocalScheme::CatmullClark
+            | LocalScheme::Loop
+            | LocalScheme::DooSabin
+            | LocalScheme::LabsikGreiner
+            | LocalScheme::Kobbelt => Value::Null,
         },
         "rows": rows.iter().map(row_json).collect::<Vec<_>>(),
     });

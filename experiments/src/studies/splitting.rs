@@ -152,6 +152,7 @@ fn stem(scheme: LocalScheme) -> String {
         LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. } if alpha != 0.0 => {
             format!("splitting-{}-alpha-{alpha}", scheme.name())
         }
+        LocalScheme::PushBack { beta, .. } if beta != 0.0 => format!("splitting-{}-beta-{beta}", scheme.name()),
         _ => format!("splitting-{}", scheme.name()),
     }
 }

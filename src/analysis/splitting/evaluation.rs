@@ -70,7 +70,11 @@ impl ExactSurface {
     pub fn new(scheme: LocalScheme, valence: usize) -> Result<Self> {
         match scheme {
             LocalScheme::CatmullClark | LocalScheme::Loop | LocalScheme::DooSabin => {}
-            LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. } | LocalScheme::LabsikGreiner => {
+            LocalScheme::Sqrt3 { .. }
+            | LocalScheme::Blend { .. }
+            | LocalScheme::PushBack { .. }
+            | LocalScheme::LabsikGreiner
+            | LocalScheme::Kobbelt => {
                 let what = format!("surfaces of {scheme} have no polynomial patches to evaluate: refine them");
                 return Err(Error::Computation(what));
             }

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::mesh::{Mesh, Surface};
 use crate::names;
 use crate::schemes::unified_sqrt3::{self, ALPHA_RANGE};
-use crate::schemes::{Refinement, blend, catmull_clark, doo_sabin, labsik_greiner, loop_scheme, sqrt3};
+use crate::schemes::{Refinement, blend, catmull_clark, doo_sabin, kobbelt, labsik_greiner, loop_scheme, sqrt3};
 
 /// Valences of local matrices. Below 3 a star is degenerate; the matrices are dense, and the largest (three rings
 /// of quads) has 12n+1 rows.
@@ -38,11 +38,20 @@ pub enum LocalScheme {
         /// The blend parameter α, from 0 to 2.
         alpha: f64,
     },
+    /// Maillot & Stam's [push-back](blend::push_back) of another scheme; with β = 0 it is that scheme.
+    PushBack {
+        /// The scheme whose vertices are pushed back.
+        of: Blended,
+        /// How far, β, from 0 to 2; at 1 they stay.
+        beta: f64,
+    },
     /// The interpolatory √3 scheme of Labsik & Greiner, two steps turned back as of `Sqrt3`.
     LabsikGreiner,
+    /// Kobbelt's interpolatory scheme, at a vertex among quads.
+    Kobbelt,
 }
 
-/// What is blended in [`LocalScheme::Blend`].
+/// What is blended in [`LocalScheme::Blend`], and pushed back in [`LocalScheme::PushBack`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blended {
     /// Catmull-Clark, at a vertex among quads.
@@ -68,8 +77,9 @@ impl Blended {
 }
 
 impl LocalScheme {
-    /// The scheme called `name`, one of `catmull-clark`, `loop`, `doo-sabin`, `sqrt3`, `labsik-greiner`,
-    /// `blended-catmull-clark` and `blended-loop`; `sqrt3` (0 unless told) and the blends (1) take an `alpha`.
+    /// The scheme called `name`, one of `catmull-clark`, `loop`, `doo-sabin`, `sqrt3`, `labsik-greiner`, `kobbelt`,
+    /// `blended-catmull-clark`, `blended-loop`, `pushed-back-catmull-clark` and `pushed-back-loop`; `sqrt3` (0 unless told), the blends
+    /// and, for β, the last two (1) take an `alpha`.
     ///
     /// # Errors
     /// [`Error::Unknown`] for another name, an `alpha` outside [`ALPHA_RANGE`], or one for a scheme without.
@@ -82,14 +92,24 @@ impl LocalScheme {
             LocalScheme::LabsikGreiner,
             LocalScheme::Blend { of: Blended::CatmullClark, alpha: alpha.unwrap_or(1.0) },
             LocalScheme::Blend { of: Blended::Loop, alpha: alpha.unwrap_or(1.0) },
+            LocalScheme::PushBack { of: Blended::CatmullClark, beta: alpha.unwrap_or(1.0) },
+            LocalScheme::PushBack { of: Blended::Loop, beta: alpha.unwrap_or(1.0) },
+            LocalScheme::Kobbelt,
         ];
         let scheme =
             names::find("scheme with a splitting matrix", name, &all.map(|scheme| (scheme.name(), scheme)), &[])?;
         match (scheme, alpha) {
-            (LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. }, _) if !ALPHA_RANGE.contains(&alpha) => {
+            (
+                LocalScheme::Sqrt3 { alpha }
+                | LocalScheme::Blend { alpha, .. }
+                | LocalScheme::PushBack { beta: alpha, .. },
+                _,
+            ) if !ALPHA_RANGE.contains(&alpha) => {
                 Err(Error::Unknown(format!("α = {alpha} is outside [{}, {}]", ALPHA_RANGE.start(), ALPHA_RANGE.end())))
             }
-            (LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. }, _) | (_, None) => Ok(scheme),
+            (LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. } | LocalScheme::PushBack { .. }, _) | (_, None) => {
+                Ok(scheme)
+            }
             (_, Some(_)) => Err(Error::Unknown(format!("{name} has no parameter α: leave it out or choose sqrt3"))),
         }
     }
@@ -104,25 +124,36 @@ impl LocalScheme {
             LocalScheme::LabsikGreiner => "labsik-greiner",
             LocalScheme::Blend { of: Blended::CatmullClark, .. } => "blended-catmull-clark",
             LocalScheme::Blend { of: Blended::Loop, .. } => "blended-loop",
+            LocalScheme::PushBack { of: Blended::CatmullClark, .. } => "pushed-back-catmull-clark",
+            LocalScheme::PushBack { of: Blended::Loop, .. } => "pushed-back-loop",
+            LocalScheme::Kobbelt => "kobbelt",
         }
     }
 
     /// How the star is filled.
     pub fn layout(self) -> Layout {
         match self {
-            LocalScheme::CatmullClark => Layout::Quads,
+            LocalScheme::CatmullClark | LocalScheme::Kobbelt => Layout::Quads,
             LocalScheme::Loop | LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => Layout::Triangles,
             LocalScheme::DooSabin => Layout::QuadsAboutFace,
-            LocalScheme::Blend { of, .. } => of.scheme().layout(),
+            LocalScheme::Blend { of, .. } | LocalScheme::PushBack { of, .. } => of.scheme().layout(),
         }
     }
 
-    /// The fewest rings on which the local matrix closes: 1, but 3 for blends with α ≠ 0 and Labsik-Greiner.
+    /// The fewest rings on which the local matrix closes: 1, but 2 for push-back and Kobbelt, and 3 for blends with α ≠ 0
+    /// and Labsik-Greiner.
     pub fn least_rings(self) -> usize {
         match self {
             LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. } if alpha != 0.0 => 3,
+            LocalScheme::PushBack { beta, .. } if beta != 0.0 => 2,
             LocalScheme::LabsikGreiner => 3,
-            _ => 1,
+            LocalScheme::Kobbelt => 2,
+            LocalScheme::CatmullClark
+            | LocalScheme::Loop
+            | LocalScheme::DooSabin
+            | LocalScheme::Sqrt3 { .. }
+            | LocalScheme::Blend { .. }
+            | LocalScheme::PushBack { .. } => 1,
         }
     }
 
@@ -168,21 +199,24 @@ impl LocalScheme {
             LocalScheme::LabsikGreiner => labsik_greiner::refine(surface),
             LocalScheme::Blend { of, alpha: 0.0 } => of.scheme().step(surface),
             LocalScheme::Blend { of, alpha } => blend::refine(surface, of.refinement(), alpha),
+            LocalScheme::PushBack { of, beta: 0.0 } => of.scheme().step(surface),
+            LocalScheme::PushBack { of, beta } => blend::push_back(surface, of.refinement(), beta),
+            LocalScheme::Kobbelt => kobbelt::step(surface),
         }
     }
 
     /// Where the half-edge `root` from the middle is found after a step; of √3 turned clockwise by half a sector.
     pub fn root_after_step(self, root: u32) -> u32 {
         match self {
-            LocalScheme::CatmullClark => 4 * root,
+            LocalScheme::CatmullClark | LocalScheme::Kobbelt => 4 * root,
             LocalScheme::Loop => 12 * (root / 3) + 3 * (root % 3),
             LocalScheme::DooSabin => root,
-            LocalScheme::Blend { of, .. } => of.scheme().root_after_step(root),
+            LocalScheme::Blend { of, .. } | LocalScheme::PushBack { of, .. } => of.scheme().root_after_step(root),
             LocalScheme::Sqrt3 { .. } | LocalScheme::LabsikGreiner => 3 * root,
         }
     }
 
-    /// The subdominant eigenvalue λ_1 = λ_2 in closed form; none for the blend with α ≠ 0.
+    /// The subdominant eigenvalue λ_1 = λ_2 in closed form; none for the blend with α ≠ 0, push-back and Kobbelt's scheme.
     ///
     /// Catmull-Clark (4 + A_n)/16 (Thall Eq. 15), Loop 3/8 + ¼cos(2π/n), Doo-Sabin ½, √3 and Labsik-Greiner
     /// (⅔cos(π/n))².
@@ -199,8 +233,13 @@ impl LocalScheme {
             LocalScheme::Loop => Some(0.375 + 0.25 * turn.cos()),
             LocalScheme::DooSabin => Some(0.5),
             LocalScheme::Sqrt3 { alpha: 0.0 } => Some((2.0 / 3.0 * (PI / n as f64).cos()).powi(2)),
-            LocalScheme::Blend { of, alpha: 0.0 } => of.scheme().subdominant_formula(n),
-            LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. } => None,
+            LocalScheme::Blend { of, alpha: 0.0 } | LocalScheme::PushBack { of, beta: 0.0 } => {
+                of.scheme().subdominant_formula(n)
+            }
+            LocalScheme::Sqrt3 { .. }
+            | LocalScheme::Blend { .. }
+            | LocalScheme::PushBack { .. }
+            | LocalScheme::Kobbelt => None,
             LocalScheme::LabsikGreiner => Some(labsik_greiner::subdominant(n).powi(2)),
         }
     }
@@ -238,8 +277,14 @@ impl LocalScheme {
                 all.push((2.0 / 3.0 - sqrt3::relaxation(n)).powi(2));
                 all.extend((1..n).map(|k| (2.0 / 3.0 * half(k)).powi(2)));
             }
-            LocalScheme::Blend { of, alpha: 0.0 } => return of.scheme().eigenvalues_formula(n),
-            LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. } | LocalScheme::LabsikGreiner => return None,
+            LocalScheme::Blend { of, alpha: 0.0 } | LocalScheme::PushBack { of, beta: 0.0 } => {
+                return of.scheme().eigenvalues_formula(n);
+            }
+            LocalScheme::Sqrt3 { .. }
+            | LocalScheme::Blend { .. }
+            | LocalScheme::PushBack { .. }
+            | LocalScheme::LabsikGreiner
+            | LocalScheme::Kobbelt => return None,
         }
         let mut all: Vec<_> = all.into_iter().map(Complex::from).collect();
         super::sort(&mut all);
@@ -254,12 +299,17 @@ impl LocalScheme {
             LocalScheme::Loop => Some(loop_scheme::limit_mask(n).to_vec()),
             LocalScheme::DooSabin => Some(vec![1.0 / n as f64]),
             LocalScheme::Sqrt3 { alpha: 0.0 } => Some(sqrt3::limit_mask(n).to_vec()),
-            LocalScheme::Blend { of, alpha: 0.0 } => of.scheme().limit_mask_formula(n),
-            LocalScheme::Blend { of: Blended::CatmullClark, alpha: 1.0 } => Some(vec![1.0, 0.0, 0.0]),
+            LocalScheme::Blend { of, alpha: 0.0 } | LocalScheme::PushBack { of, beta: 0.0 } => {
+                of.scheme().limit_mask_formula(n)
+            }
+            LocalScheme::Blend { of: Blended::CatmullClark, alpha: 1.0 }
+            | LocalScheme::PushBack { of: Blended::CatmullClark, beta: 1.0 }
+            | LocalScheme::Kobbelt => Some(vec![1.0, 0.0, 0.0]),
             LocalScheme::Sqrt3 { alpha: 1.0 }
             | LocalScheme::Blend { of: Blended::Loop, alpha: 1.0 }
+            | LocalScheme::PushBack { of: Blended::Loop, beta: 1.0 }
             | LocalScheme::LabsikGreiner => Some(vec![1.0, 0.0]),
-            LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. } => None,
+            LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. } | LocalScheme::PushBack { .. } => None,
         }
     }
 
@@ -275,8 +325,14 @@ impl LocalScheme {
             }
             LocalScheme::DooSabin => Some(ring().collect()),
             LocalScheme::Loop | LocalScheme::Sqrt3 { alpha: 0.0 } => Some([0.0].into_iter().chain(ring()).collect()),
-            LocalScheme::Blend { of, alpha: 0.0 } => of.scheme().cosine_mask_formula(n),
-            LocalScheme::Sqrt3 { .. } | LocalScheme::Blend { .. } | LocalScheme::LabsikGreiner => None,
+            LocalScheme::Blend { of, alpha: 0.0 } | LocalScheme::PushBack { of, beta: 0.0 } => {
+                of.scheme().cosine_mask_formula(n)
+            }
+            LocalScheme::Sqrt3 { .. }
+            | LocalScheme::Blend { .. }
+            | LocalScheme::PushBack { .. }
+            | LocalScheme::LabsikGreiner
+            | LocalScheme::Kobbelt => None,
         }
     }
 }
@@ -287,7 +343,12 @@ impl fmt::Display for LocalScheme {
             LocalScheme::Sqrt3 { alpha } | LocalScheme::Blend { alpha, .. } => {
                 write!(f, "{}, α = {alpha}", self.name())
             }
-            _ => f.write_str(self.name()),
+            LocalScheme::PushBack { beta, .. } => write!(f, "{}, β = {beta}", self.name()),
+            LocalScheme::CatmullClark
+            | LocalScheme::Loop
+            | LocalScheme::DooSabin
+            | LocalScheme::LabsikGreiner
+            | LocalScheme::Kobbelt => f.write_str(self.name()),
         }
     }
 }

@@ -84,7 +84,9 @@ impl SharpVertex {
             LocalScheme::DooSabin
             | LocalScheme::Sqrt3 { .. }
             | LocalScheme::Blend { .. }
-            | LocalScheme::LabsikGreiner => Err(Error::Unknown(format!(
+            | LocalScheme::PushBack { .. }
+            | LocalScheme::LabsikGreiner
+            | LocalScheme::Kobbelt => Err(Error::Unknown(format!(
                 "{} has no local matrix at a {self} vertex: choose catmull-clark or loop",
                 scheme.name()
             ))),
