@@ -2,7 +2,9 @@
 
 use glam::DVec3;
 
+use crate::Result;
 use crate::assemble::LimitSystem;
+use crate::mesh::Surface;
 use crate::schemes::{Masks, Scheme};
 use crate::solvers::{Errors, Method, Outcome, Stop, run};
 
@@ -29,6 +31,34 @@ pub fn passes(system: &LimitSystem, points: &[DVec3], tolerance: f64, limit: usi
     let stop = Stop { tolerance, max_iterations: limit };
     let report = run(system, points, Method::Pia, &stop).report;
     Passes { outcome: report.outcome, updates: report.iterations, passes: report.iterations + 1, errors: report.last() }
+}
+
+/// PIA's first step, V = P + (P − A P): a quasi-interpolant, as Litke, Levin & Schröder (2001) fit surfaces by, a fixed mask on the
+/// 1-ring of each vertex in place of a system. On regular meshes A sends a polynomial to itself plus a multiple of its Laplacian
+/// and fourth derivatives, so I − A lowers the degree by two, and (I − A)² P vanishes for cubics: V = 2P − A P has the limit points P
+/// exactly then. k steps do so up to degree 2k + 1 (as far as the scheme has polynomials, which is 3).
+///
+/// Along one direction 2 − (1, 4, 1)/6 = (−1, 8, −1)/6 is the quasi-interpolant of cubic B-splines. Which mask Litke et al. take at
+/// extraordinary vertices, and which of the masks on the 1-ring that reproduce cubics at regular ones (a family of one parameter
+/// under Catmull-Clark; the product of two (−1, 8, −1)/6 is another of it), could not be established.
+///
+/// # Errors
+/// As [`limit_points`](super::limit_points).
+///
+/// ```
+/// use limitlab::interpolate::limit_points;
+/// use limitlab::interpolate::pia::quasi_interpolant;
+/// use limitlab::mesh::{Surface, builtin::builtin};
+/// use limitlab::schemes::Scheme;
+/// let sphere = Surface::new(builtin("icosphere:3")?)?;
+/// let control = sphere.with_positions(quasi_interpolant(&sphere, Scheme::Loop)?);
+/// let error = |limits: Vec<glam::DVec3>| limits[400].distance(sphere.positions()[400]);
+/// assert!(error(limit_points(&control, Scheme::Loop)?) < 0.03 * error(limit_points(&sphere, Scheme::Loop)?));
+/// # Ok::<(), limitlab::Error>(())
+/// ```
+pub fn quasi_interpolant(surface: &Surface, scheme: Scheme) -> Result<Vec<DVec3>> {
+    let limits = super::limit_points(surface, scheme)?;
+    Ok(surface.positions().iter().zip(limits).map(|(p, limit)| 2.0 * p - limit).collect())
 }
 
 /// The masks behind the printed errors of the paper's Mushroom, whose 32 triangles are no quads: weights n², 4 an
@@ -59,7 +89,7 @@ impl Masks for TwoStepsBack {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Surface, builtin};
+    use crate::mesh::builtin;
 
     #[test]
     fn two_steps_back_is_right_on_quads_and_wrong_on_triangles() {
@@ -76,6 +106,28 @@ mod tests {
             for i in 0..mesh.len() {
                 let sum: f64 = printed.a.row_values(i).iter().sum();
                 assert!((sum - 1.0).abs() < 1e-15, "{name}, row {i} sums to {sum}");
+            }
+        }
+    }
+
+    /// Cubic in the numbers of rows and columns, away from where these start again; a quartic is missed.
+    #[test]
+    fn the_first_step_reproduces_cubics_on_regular_meshes() {
+        let n = 16usize;
+        for (name, scheme) in [("torus", Scheme::CatmullClark), ("tri-torus", Scheme::Loop)] {
+            let mut mesh = builtin::builtin(&format!("{name}:{n}x{n}")).expect("a built-in mesh");
+            for (v, p) in mesh.positions.iter_mut().enumerate() {
+                // Of the lattice that the triangles are regular in, or of any other: an affine map keeps the degree.
+                let [x, y] = [v / n, v % n].map(|k| k as f64 - 8.0);
+                *p = DVec3::new(x * x * y - 2.0 * y * y * y, x * x * x + x * y, x.powi(4));
+            }
+            let surface = Surface::new(mesh).expect("closed");
+            let control = surface.with_positions(quasi_interpolant(&surface, scheme).expect("closed"));
+            let limits = crate::interpolate::limit_points(&control, scheme).expect("closed");
+            let inside = (0..n * n).filter(|v| [v / n, v % n].iter().all(|k| (3..n - 3).contains(k)));
+            for v in inside {
+                let off = (limits[v] - surface.positions()[v]).abs();
+                assert!(off.x.max(off.y) < 1e-11 && off.z > 0.1, "{name}, {v}: {off}");
             }
         }
     }
