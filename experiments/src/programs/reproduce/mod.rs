@@ -16,6 +16,7 @@ mod pages;
 mod pia;
 mod popping;
 mod ripples;
+mod rivals;
 mod sparsity;
 mod splitting;
 mod summary;
@@ -102,6 +103,7 @@ const ITEMS: [Item; 19] = [
     valences::VALENCES,
     popping::POPPING,
     ripples::RIPPLES,
+    rivals::RIVALS,
     open_meshes::OPEN_MESHES,
     open_decay::DECAY,
     darts::DARTS,

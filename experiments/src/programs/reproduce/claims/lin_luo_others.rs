@@ -1,4 +1,5 @@
-//! What Lin and Luo leave to the eye and to others: modified Butterfly beside (L14), other schemes blended (L15).
+//! What Lin and Luo leave to the eye and to others: modified Butterfly beside (L14), other schemes blended (L15); and
+//! what they say of Maillot and Stam's push-back (L16).
 
 use glam::DVec3;
 
@@ -30,6 +31,15 @@ pub const CLAIMS: &[Claim] = &[
         printed: "The focus is on √3 subdivision, but some other schemes can be treated in a similar way.",
         slow: true,
         check: other_schemes,
+    },
+    Claim {
+        id: "L16",
+        title: "Push-back cannot have a C¹ limit surface",
+        place: "§1",
+        printed: "Maillot and Stam's way of placing new edge vertices is not based on carrying the curve case over to surfaces: the essential \
+                  reason why it cannot produce a C¹ limit surface.",
+        slow: false,
+        check: push_back,
     },
 ];
 
@@ -173,5 +183,45 @@ fn other_schemes(_: &Lab) -> Result<Finding> {
          vertices the blend of Catmull-Clark has a tangent plane at valences 3 to 12, that of Loop from 4 on; at 3 a complex pair \
          of rotation-invariant modes passes λ_1, as with √3 (L4). Numerical: by eigenvalues, signs of corners' angles of refined maps and \
          jumps on regular meshes; no proof of C¹.",
+    ))
+}
+
+/// By the same criterion as L15: with β = 1 at all vertices, the scheme being Loop's or Catmull-Clark's.
+fn push_back(_: &Lab) -> Result<Finding> {
+    const VALENCES: std::ops::RangeInclusive<usize> = 3..=10;
+    let fails = |of, n| -> Result<bool> {
+        let scheme = LocalScheme::PushBack { of, beta: 1.0 };
+        if !SplittingMatrix::new(scheme, n)?.pair_leads()? {
+            return Ok(true);
+        }
+        let check = characteristic_map(scheme, n, scheme.map_rings())?.refine(3)?.check();
+        Ok(!(check.regular && check.injective))
+    };
+    let count = |of, mut valences: std::ops::RangeInclusive<usize>| -> Result<usize> {
+        valences.try_fold(0, |sum, n| Ok(sum + usize::from(fails(of, n)?)))
+    };
+    let what = "of 3…10 without λ_1 = λ_2 > λ_3 and a regular and injective map";
+    let surface = exact("torus:12x7")?.surface;
+    let columns = random_points(12, 5);
+    let along = surface.with_positions((0..surface.len()).map(|v| columns[v / 7]).collect());
+    let fine = blend::push_back(&along, Refinement::CatmullClark, 1.0)?;
+    let (expected, _) = curve::refine(&columns, &[0.0; 12], Ends::Closed);
+    let off = fine.positions.iter().map(|p| expected.iter().map(|e| e.distance(*p)).fold(f64::INFINITY, f64::min));
+    Ok(Finding::refuted(vec![
+        Evidence::equal(format!("Catmull-Clark pushed back: valences {what}"), count(Blended::CatmullClark, VALENCES)?, 0.0),
+        Evidence::equal(format!("Loop pushed back: valences {what}"), count(Blended::Loop, VALENCES)?, 1.0),
+        Evidence::equal("of these at valence 3", count(Blended::Loop, 3..=3)?, 1.0),
+        Evidence::at_most(
+            "Catmull-Clark pushed back: distance of a step from the four-point scheme's, data of one index alone, torus:12x7",
+            largest(off),
+            1e-13,
+        ),
+    ])
+    .remark(
+        "Old vertices moved back to where they were, new ones by the mean of what their edge's ends, or their face's corners, were moved, as \
+         Lin and Luo tell it. Pushed back, Catmull-Clark meets the condition at every valence tried, as their own blend does (L15), and Loop at all \
+         but 3, where rotation-invariant modes pass λ_1, as their own blend of Loop does. Of data that do not change along one direction \
+         pushed-back Catmull-Clark makes the four-point curves, and their blend does not. Numerical, and no proof of C¹, as in \
+         L15; which smoothing Maillot and Stam themselves took is not known here.",
     ))
 }
