@@ -112,7 +112,12 @@ const PROGRAMS: &[Program] = &[
             ON_MESHES,
             STOP,
             FOLDER,
-            &[("--method", "jacobi|pia,sor|sor|cg||no-such"), ("--order", ORDERS), ("--history", "0.7|0.5,0.9|0|x")],
+            &[
+                ("--method", "jacobi|pia,sor|sor|cg||no-such"),
+                ("--order", ORDERS),
+                ("--history", "0.7|0.5,0.9|0|x"),
+                ("--eigenvalues", SWITCH),
+            ],
         ],
     },
     Program {
@@ -130,6 +135,11 @@ const PROGRAMS: &[Program] = &[
                 ("--certify", SWITCH),
                 ("--no-sweeps", SWITCH),
                 ("--no-data", SWITCH),
+            ],
+            &[
+                ("--iteration-matrix", "pia|sor:1.5,ssor|jacobi,gauss-seidel|cg|sor:0|no-such||thall:"),
+                ("--order", ORDERS),
+                ("--pseudospectra", SWITCH),
             ],
         ],
     },

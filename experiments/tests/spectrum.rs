@@ -55,3 +55,79 @@ fn the_program_prints_the_agreed_fields() {
     let message = String::from_utf8_lossy(&refused.stderr);
     assert!(message.starts_with("error: torus:70x70") && message.lines().count() == 1);
 }
+
+/// Iteration matrices: radii by closed forms, contractions, files; what has none, and what is too large for all of it.
+#[test]
+fn iteration_matrices_have_their_eigenvalues_norms_and_pictures() {
+    let out = tempfile::tempdir().expect("a folder");
+    let run = |arguments: &[&str]| {
+        assert_cmd::Command::new(env!("CARGO_BIN_EXE_spectrum"))
+            .args(arguments)
+            .args(["--json", "--quiet", "--out"])
+            .arg(out.path())
+            .output()
+            .expect("the program runs")
+    };
+    let methods = "pia,jacobi,sor:1.2,ssor:1.2,w-pia:0.5";
+    let done = run(&["torus:6x4", "--iteration-matrix", methods, "--order", "multicolour", "--pseudospectra"]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let json: serde_json::Value = serde_json::from_slice(&done.stdout).expect("one JSON object");
+    let found = |k: usize, field: &str| json["iteration_matrices"][k][field].as_f64().expect("a number");
+    for (k, expected) in [(0, 8.0 / 9.0), (1, 0.8), (4, 1.0 - 0.5 / 9.0)] {
+        assert!((found(k, "rho") - expected).abs() < 1e-9, "{k}: {}", found(k, "rho"));
+    }
+    // The best ω of Jacobi, as its own is open.
+    assert!((found(1, "omega") - 0.8).abs() < 1e-6);
+    // ‖T_SOR‖² in the energy norm is ρ of SSOR.
+    let norm = json["iteration_matrices"][2]["norms"]["energy"].as_f64().expect("M is definite");
+    assert!((norm * norm - found(3, "rho")).abs() < 1e-8 && found(2, "numerical_radius") < norm.max(1.0));
+    assert_eq!(json["iteration_matrices"][2]["order"], "multicolour");
+    assert_eq!(json["iteration_matrices"][2]["eigenvalues"].as_array().map(Vec::len), Some(24));
+    // A pseudospectrum reaches beyond the spectrum.
+    let reach = json["iteration_matrices"][2]["pseudospectral_radii"][1]["radius"].as_f64().expect("a number");
+    assert!(reach > found(2, "rho") && reach < found(2, "rho") + 0.5, "{reach}");
+    for stem in ["", "-powers", "-pseudospectra"] {
+        assert!(out.path().join(format!("spectrum-iteration{stem}-torus-6x4-catmull-clark.png")).is_file(), "{stem}");
+    }
+    assert!(out.path().join("spectrum-iteration-eigenvalues-torus-6x4-catmull-clark.csv").is_file());
+
+    let large = run(&["torus:30x30", "--iteration-matrix", "gauss-seidel"]);
+    let json: serde_json::Value = serde_json::from_slice(&large.stdout).expect("one JSON object");
+    assert_eq!(json["iteration_matrices"][0]["complete"], false);
+    assert!(json["iteration_matrices"][0]["residuals"][0].as_f64().is_some_and(|r| r < 1e-6));
+
+    for (arguments, status) in [
+        (&["cube", "--iteration-matrix", "cg"][..], 2),
+        (&["cube", "--iteration-matrix", "sor:0"], 2),
+        (&["cube", "--order", "bfs"], 2),
+        (&["torus:50x50", "--iteration-matrix", "pia", "--full"], 1),
+        (&["torus:24x24", "--iteration-matrix", "pia", "--pseudospectra"], 1),
+    ] {
+        let refused = run(arguments);
+        assert_eq!(refused.status.code(), Some(status), "{arguments:?}");
+    }
+}
+
+/// `sweep-omega` with the trajectories of eigenvalues: Jacobi's ends are as large at the best ω; SOR's dominant one leaves the axis.
+#[test]
+fn eigenvalues_are_followed_over_omega() {
+    let out = tempfile::tempdir().expect("a folder");
+    let done = assert_cmd::Command::new(env!("CARGO_BIN_EXE_sweep-omega"))
+        .args(["torus:6x4", "--noise", "0.1", "--method", "jacobi,sor", "--omega", "0.6:1.4:0.2", "--eigenvalues"])
+        .args(["--json", "--quiet", "--out"])
+        .arg(out.path())
+        .output()
+        .expect("the program runs");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let json: serde_json::Value = serde_json::from_slice(&done.stdout).expect("one JSON object");
+    let jacobi = &json["eigenvalues"][0];
+    assert_eq!(jacobi["change"]["how"], "is overtaken by a negative one");
+    for field in [&jacobi["change"]["omega"], &jacobi["best_omega"]] {
+        assert!(field.as_f64().is_some_and(|omega| (omega - 0.8).abs() < 2e-3), "{field}");
+    }
+    let sor = &json["eigenvalues"][1];
+    assert!(sor["best_omega"].as_f64().is_some_and(|omega| omega > 1.0 && omega < 1.3), "{sor}");
+    for end in ["csv", "md", "png"] {
+        assert!(out.path().join(format!("sweep-omega-eigenvalues-torus-6x4-catmull-clark.{end}")).is_file(), "{end}");
+    }
+}

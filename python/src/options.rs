@@ -113,5 +113,5 @@ fn checked(name: &str, tolerance: f64) -> PyResult<f64> {
 }
 
 fn without_omega(method: &str) -> PyErr {
-    PyValueError::new_err(format!("{method} takes no omega: jacobi, pia (w-pia) and sor do"))
+    PyValueError::new_err(format!("{method} takes no omega: jacobi, pia (w-pia), sor and ssor do"))
 }

@@ -8,6 +8,7 @@ use nalgebra::Complex;
 use super::symmetric::{SymmetricForm, symmetric};
 use crate::assemble::{Csr, LimitSystem};
 use crate::error::{Error, Result};
+use crate::memory::require;
 use crate::solvers::System;
 
 /// Largest N for which dense eigenvalues are computed: cubic time, about a second here.
@@ -122,6 +123,16 @@ fn to_dense(s: &Csr) -> Mat<f64> {
 pub fn spectral_radius(system: &impl System, mut step: impl FnMut(&mut [DVec3])) -> Result<f64> {
     let n = system.len();
     within_limit(n, LARGEST)?;
+    let Some(dense) = columns(n, &mut step)? else { return Ok(f64::INFINITY) };
+    Ok(unsymmetric_values(&dense)?.iter().map(|z| z.norm()).fold(0.0, f64::max))
+}
+
+/// The N × N matrix of a linear map, three columns at a time from its action on unit vectors; `None` if an entry is not finite.
+///
+/// # Errors
+/// If memory has no room for it.
+pub(super) fn columns(n: usize, step: &mut dyn FnMut(&mut [DVec3])) -> Result<Option<Mat<f64>>> {
+    require(8 * (n * n) as u64, || format!("a dense matrix of order {n}"), "use a coarser mesh")?;
     let mut dense = Mat::<f64>::zeros(n, n);
     let mut x = vec![DVec3::ZERO; n];
     for first in (0..n).step_by(3) {
@@ -131,7 +142,7 @@ pub fn spectral_radius(system: &impl System, mut step: impl FnMut(&mut [DVec3]))
         }
         step(&mut x);
         if !x.iter().all(|v| v.is_finite()) {
-            return Ok(f64::INFINITY);
+            return Ok(None);
         }
         for (i, v) in x.iter().enumerate() {
             for axis in 0..3.min(n - first) {
@@ -139,7 +150,7 @@ pub fn spectral_radius(system: &impl System, mut step: impl FnMut(&mut [DVec3]))
             }
         }
     }
-    Ok(unsymmetric_values(&dense)?.iter().map(|z| z.norm()).fold(0.0, f64::max))
+    Ok(Some(dense))
 }
 
 fn within_limit(n: usize, limit: usize) -> Result<()> {

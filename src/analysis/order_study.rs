@@ -9,7 +9,8 @@
 //!   Catmull-Clark torus, 18 to 28 at ω = 1.1 (ρ from 0.34 to 0.52).
 //! - Orders that advance as a front (breadth first, reverse Cuthill-McKee, the row by row file order of a grid) take the
 //!   most sweeps on regular meshes; a small ρ does not help them (breadth first on that torus: 0.34, yet 27 sweeps), as
-//!   the error is first carried along the front: the error matrix is far from normal.
+//!   the error is first carried along the front: the error matrix is far from normal, and its powers follow the
+//!   [symbol of the front](super::torus_symbol::front).
 //! - Colour by colour is the least or within three sweeps of it, and may run in parallel. A file order that comes from
 //!   subdivision (old vertices, then edges, then faces) acts like one and is as good or a little better.
 //! - Random orders spread by at most three sweeps and are about as good as colour by colour, but on quads with

@@ -28,6 +28,8 @@ const MOST_VECTORS: usize = 320;
 const TOLERANCE: f64 = 1e-8;
 /// A change of the radius from cycle to cycle that is as good as convergence.
 const STILL: f64 = 1e-10;
+/// A next vector of this length is rounding, and what would follow it no longer orthogonal.
+const CLOSED: f64 = 1e-11;
 /// Up to this many vertices the whole matrix is computed.
 const DENSE: usize = 300;
 
@@ -79,10 +81,7 @@ pub fn spectral_radius(system: &impl System, mut step: impl FnMut(&mut [DVec3]))
     // Gram-Schmidt twice on k vectors of 3N numbers takes 12 N k² multiplications.
     let longest = (WORK / (12 * n)).isqrt().min(MOST_VECTORS).min(room);
     let (cycles, last) = if longest > 2 * vectors { (SHORT_CYCLES + 1, longest) } else { (CYCLES, vectors) };
-    let mut rng = ChaCha8Rng::seed_from_u64(0x4172_6e6f);
-    let mut x: Vec<DVec3> =
-        (0..n).map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))).collect();
-    normalize(&mut x);
+    let mut x = random(n);
     for _ in 0..WARM_UP {
         step(&mut x);
         let length = normalize(&mut x);
@@ -112,6 +111,42 @@ pub fn spectral_radius(system: &impl System, mut step: impl FnMut(&mut [DVec3]))
 
 fn exact(value: f64, applications: usize) -> SpectralRadius {
     SpectralRadius { value, residual: 0.0, applications, converged: true }
+}
+
+/// An eigenvalue as an Arnoldi process finds it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RitzValue {
+    /// The value.
+    pub value: Complex<f64>,
+    /// ‖E x − μ x‖ of its unit Ritz vector.
+    pub residual: f64,
+}
+
+/// The `count` Ritz values of largest modulus, the largest first, of a linear map on N points: one Arnoldi process from a
+/// seeded random start, as long as [`spectral_radius`] makes it at the most.
+///
+/// # Errors
+/// If the projected eigenvalues are not found.
+pub(super) fn outermost(n: usize, count: usize, step: &mut dyn FnMut(&mut [DVec3])) -> Result<Vec<RitzValue>> {
+    if n == 0 {
+        return Ok(Vec::new());
+    }
+    let room = (MEMORY / (24 * n)).max(FEWEST_VECTORS);
+    let vectors = (WORK / (12 * n)).isqrt().clamp(VECTORS, MOST_VECTORS).min(room);
+    let krylov = krylov(random(n), vectors.min(n), CLOSED, step);
+    let mut all = ritz_values(&krylov.projected)?;
+    super::iteration_matrix::sort(&mut all);
+    all.truncate(count);
+    Ok(all.into_iter().map(|value| krylov.residual(value)).map(|(ritz, _)| ritz).collect())
+}
+
+/// A unit vector, the same each time.
+fn random(n: usize) -> Vec<DVec3> {
+    let mut rng = ChaCha8Rng::seed_from_u64(0x4172_6e6f);
+    let mut x: Vec<DVec3> =
+        (0..n).map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))).collect();
+    normalize(&mut x);
+    x
 }
 
 struct Cycle {
@@ -149,11 +184,27 @@ fn orthogonalize(w: &mut [DVec3], basis: &[Vec<DVec3>]) -> Vec<f64> {
     coefficients
 }
 
-/// One Arnoldi process from the unit vector `start`.
-///
-/// # Errors
-/// If the eigenvalues of the projected matrix are not found.
-fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut impl FnMut(&mut [DVec3])) -> Result<Cycle> {
+/// What an Arnoldi process leaves.
+struct Krylov {
+    /// Orthonormal.
+    basis: Vec<Vec<DVec3>>,
+    /// The matrix on their span, upper Hessenberg.
+    projected: DMatrix<f64>,
+    /// The length of the next vector.
+    next: f64,
+}
+
+impl Krylov {
+    /// A Ritz value with its residual, and the unit eigenvector of the projected matrix.
+    fn residual(&self, value: Complex<f64>) -> (RitzValue, DVector<Complex<f64>>) {
+        let y = eigenvector(&self.projected, value);
+        let residual = self.next * y[y.len() - 1].norm();
+        (RitzValue { value, residual }, y)
+    }
+}
+
+/// An Arnoldi process from the unit vector `start`, until the next vector is no longer than `closed`.
+fn krylov(start: Vec<DVec3>, vectors: usize, closed: f64, step: &mut dyn FnMut(&mut [DVec3])) -> Krylov {
     let mut basis = vec![start];
     let mut hessenberg = DMatrix::<f64>::zeros(vectors + 1, vectors);
     let mut next = 0.0;
@@ -165,18 +216,26 @@ fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut impl FnMut(&mut [DVec3]
         }
         next = normalize(&mut w);
         hessenberg[(k + 1, k)] = next;
-        if next <= 1e-14 || k + 1 == vectors {
+        if next <= closed || k + 1 == vectors {
             break;
         }
         basis.push(w);
     }
     let m = basis.len();
-    let square = hessenberg.view((0, 0), (m, m)).into_owned();
-    let ritz = ritz_values(&square)?
+    Krylov { basis, projected: hessenberg.view((0, 0), (m, m)).into_owned(), next }
+}
+
+/// One Arnoldi process from the unit vector `start`, and where the next begins.
+///
+/// # Errors
+/// If the eigenvalues of the projected matrix are not found.
+fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut dyn FnMut(&mut [DVec3])) -> Result<Cycle> {
+    let krylov = krylov(start, vectors, 1e-14, step);
+    let ritz = ritz_values(&krylov.projected)?
         .into_iter()
         .fold(Complex::new(0.0, 0.0), |best, z| if z.norm() > best.norm() { z } else { best });
-    let y = eigenvector(&square, ritz);
-    let residual = next * y[m - 1].norm();
+    let (RitzValue { residual, .. }, y) = krylov.residual(ritz);
+    let basis = krylov.basis;
     let mut restart = vec![DVec3::ZERO; basis[0].len()];
     for (v, c) in basis.iter().zip(y.iter()) {
         for (r, v) in restart.iter_mut().zip(v) {
@@ -192,7 +251,7 @@ fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut impl FnMut(&mut [DVec3]
         }
         normalize(&mut restart);
     }
-    Ok(Cycle { ritz, residual, steps: m, restart })
+    Ok(Cycle { ritz, residual, steps: basis.len(), restart })
 }
 
 /// The eigenvalues of a projected matrix. Where many are equal but for rounding, as at a tiny ω or on a mesh of like

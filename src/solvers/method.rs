@@ -242,6 +242,31 @@ impl<'a> Method<'a> {
         }
     }
 
+    /// Whether a step takes the error e to T e with one matrix T: relaxation and sweeps.
+    pub fn is_stationary(self) -> bool {
+        match self {
+            Method::Jacobi { .. }
+            | Method::Thall
+            | Method::GaussSeidel { .. }
+            | Method::Sor { .. }
+            | Method::Ssor { .. }
+            | Method::Pia
+            | Method::WPia { .. } => true,
+            Method::Lu
+            | Method::Cholesky
+            | Method::SecondCholesky
+            | Method::Ldlt
+            | Method::Chebyshev { .. }
+            | Method::Cg
+            | Method::PlainCg
+            | Method::PcgJacobi
+            | Method::PcgSsor { .. }
+            | Method::PcgIc0
+            | Method::Anderson { .. }
+            | Method::HeavyBall { .. } => false,
+        }
+    }
+
     /// The error of a method that [needs symmetry](Self::needs_symmetry), on a matrix that has none because of this vertex.
     pub fn refused_at(self, vertex: usize) -> Error {
         let others = Method::ALL.into_iter().filter(|method| !method.needs_symmetry());
@@ -296,17 +321,40 @@ impl<'a> Method<'a> {
         }
     }
 
-    /// The same with another ω, where it is swept over ω: `jacobi`, `pia` (which becomes `w-pia`) and `sor`.
+    /// The ω of a [stationary](Self::is_stationary) method, where it is set.
+    pub fn omega(self) -> Option<f64> {
+        match self {
+            Method::Jacobi { omega } | Method::WPia { omega } => omega,
+            Method::Sor { omega, .. } | Method::Ssor { omega, .. } => Some(omega),
+            Method::Thall => Some(THALL_OMEGA),
+            Method::GaussSeidel { .. } | Method::Pia => Some(1.0),
+            Method::Lu
+            | Method::Cholesky
+            | Method::SecondCholesky
+            | Method::Ldlt
+            | Method::Chebyshev { .. }
+            | Method::Cg
+            | Method::PlainCg
+            | Method::PcgJacobi
+            | Method::PcgSsor { .. }
+            | Method::PcgIc0
+            | Method::Anderson { .. }
+            | Method::HeavyBall { .. } => None,
+        }
+    }
+
+    /// The same with another ω, where it is [stationary](Self::is_stationary): `thall` becomes `jacobi`, `pia` `w-pia`, and
+    /// `gauss-seidel` `sor`.
     pub fn at_omega(self, omega: f64) -> Option<Self> {
         match self {
             Method::Jacobi { .. } | Method::Thall => Some(Method::Jacobi { omega: Some(omega) }),
             Method::Pia | Method::WPia { .. } => Some(Method::WPia { omega: Some(omega) }),
             Method::GaussSeidel { order } | Method::Sor { order, .. } => Some(Method::Sor { omega, order }),
+            Method::Ssor { order, .. } => Some(Method::Ssor { omega, order }),
             Method::Lu
             | Method::Cholesky
             | Method::SecondCholesky
             | Method::Ldlt
-            | Method::Ssor { .. }
             | Method::Chebyshev { .. }
             | Method::Cg
             | Method::PlainCg
@@ -450,6 +498,35 @@ pub fn run_from<S: System>(
         setup_seconds,
         solve_seconds: begin.elapsed().as_secs_f64(),
         fill,
+    }
+}
+
+/// Gives `work` the map e ↦ T e of a [stationary](Method::is_stationary) method: a step of its own, for P = 0.
+///
+/// # Errors
+/// A method that is not stationary.
+pub(crate) fn error_step<S: System, R>(
+    system: &S,
+    method: Method,
+    work: impl FnOnce(&mut dyn FnMut(&mut [DVec3])) -> R,
+) -> Result<R, Error> {
+    let refused = |why: &str| Error::Computation(format!("{method} has no iteration matrix: {why}"));
+    if !method.is_stationary() {
+        return Err(refused("its step depends on those before, or on the data"));
+    }
+    let nothing = vec![DVec3::ZERO; system.len()];
+    let (mut iterate, _) = prepare(system, &nothing, method).map_err(|failure| refused(&failure.detail))?;
+    let mut failed = None;
+    let result = work(&mut |x| {
+        iterate.start_at(x);
+        // It makes ready for the step.
+        iterate.errors();
+        failed = failed.take().or(iterate.advance().err());
+        x.copy_from_slice(iterate.points());
+    });
+    match failed {
+        None => Ok(result),
+        Some(failure) => Err(refused(&failure.detail)),
     }
 }
 

@@ -5,6 +5,7 @@ mod bounds;
 mod certificates;
 mod ends;
 mod hypotheses;
+mod iteration_matrices;
 mod singular;
 mod sweeps;
 

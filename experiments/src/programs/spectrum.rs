@@ -6,28 +6,36 @@ use clap::{Parser, ValueHint};
 use glam::DVec3;
 use serde_json::{Map, Value, json};
 
-use crate::cli::{self, CommonFlags, Given, Input, MeshFlags, OutputFlags, Progress, StopFlags, Subject, number};
+use crate::cli::{
+    self, CommonFlags, Given, Input, List, Matrix, MeshFlags, OutputFlags, Progress, StopFlags, Subject, number,
+};
 use crate::report::series::Bars;
 use crate::report::{Column, Columns, Figure, LinePlot, Provenance, Rule, Table};
 use crate::studies::complex_spectrum::{ComplexFindings, radii_of_sweeps};
-use crate::studies::modes as mode_study;
+use crate::studies::{iteration_matrix as iteration, modes as mode_study};
 use limitlab::Result;
 use limitlab::analysis::a_priori::{IterationCounts, Promise};
+use limitlab::analysis::complex_spectrum::ComplexSpectrum;
 use limitlab::analysis::dense;
 use limitlab::analysis::inertia::{Certificate, certify};
 use limitlab::analysis::singularity::{Singularity, SlowModes, modes};
 use limitlab::analysis::spectral_radius::SpectralRadius;
-use limitlab::analysis::spectrum::{Estimate, Extremes, Spectrum, SpectrumEnds, ends, excited, mesh_ends};
+use limitlab::analysis::spectrum::{Estimate, Extremes, Spectrum, SpectrumEnds, ends, excited, mesh_ends, spectrum};
 use limitlab::analysis::subspace_iteration::End;
 use limitlab::analysis::symmetric::SymmetricForm;
 use limitlab::assemble::LimitSystem;
 use limitlab::assemble::bounds::SpectralBounds;
 use limitlab::mesh::features::Features;
+use limitlab::mesh::order::Order;
 use limitlab::solvers::direct::SINGULAR;
 use limitlab::solvers::{Method, Stop, System};
 
 /// In its help.
-const EXAMPLES: [&str; 2] = ["spectrum model.off --modes 6", "spectrum icosphere:2 --scheme loop --full --json"];
+const EXAMPLES: [&str; 3] = [
+    "spectrum model.off --modes 6",
+    "spectrum icosphere:2 --scheme loop --full --json",
+    "spectrum torus:16x16 --iteration-matrix gauss-seidel,sor:1.1 --order bfs --pseudospectra",
+];
 
 /// Extreme eigenvalues of A and D⁻¹A, rates of all methods, proven bounds, and whether the system is singular.
 ///
@@ -61,6 +69,17 @@ pub struct Arguments {
     /// Leave out what part of the spectra the points excite
     #[arg(long)]
     no_data: bool,
+    /// In place of all this, the iteration matrices T = I − N⁻¹A of stationary methods (jacobi, thall, gauss-seidel, sor, ssor, pia,
+    /// w-pia): eigenvalues in the complex plane, norms, numerical radius, and the powers of T beside those of its radius. All
+    /// eigenvalues up to 600 vertices, with --full up to 2000; the outermost beyond
+    #[arg(long, value_name = "METHOD[:ω],…", value_parser = stationary)]
+    iteration_matrix: Option<List<Method<'static>>>,
+    /// Vertex order of the sweeps of --iteration-matrix: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
+    #[arg(long, value_name = "NAME", requires = "iteration_matrix", default_value_t = Order::File)]
+    order: Order,
+    /// Draw the ε-pseudospectra of the iteration matrices too (up to 400 vertices)
+    #[arg(long, requires = "iteration_matrix")]
+    pseudospectra: bool,
     #[command(flatten)]
     mesh: MeshFlags,
     #[command(flatten)]
@@ -74,12 +93,24 @@ pub struct Arguments {
 /// What begins the names of its files.
 const STEMS: [&str; 6] =
     ["spectrum", "spectrum-rates", "spectrum-full", "spectrum-modes", "spectrum-histogram", "spectrum-eigenvalues"];
+/// The same, of iteration matrices.
+const ITERATION_STEMS: [&str; 4] = [
+    "spectrum-iteration",
+    "spectrum-iteration-eigenvalues",
+    "spectrum-iteration-powers",
+    "spectrum-iteration-pseudospectra",
+];
 
 /// What `spectrum` runs on without arguments.
 const BUILT_IN: [&str; 4] = ["torus:32x32", "quad-sphere:4", "icosphere:3", "prism:9"];
 const BINS: usize = 60;
 /// How near the ends certificates are tried first, relative.
 const WITHIN: f64 = 1e-8;
+
+/// Methods that have an iteration matrix, as a `value_parser`.
+fn stationary(text: &str) -> std::result::Result<List<Method<'static>>, String> {
+    text.split(',').map(iteration::stationary).collect::<std::result::Result<_, _>>().map(List)
+}
 
 /// Runs the program.
 pub fn main(mut arguments: Arguments, provenance: Provenance) -> ExitCode {
@@ -231,6 +262,10 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     arguments.output.prepare()?;
     let mut results = Vec::new();
     for name in &arguments.meshes {
+        if let Some(methods) = &arguments.iteration_matrix {
+            results.push(iteration_matrices(name, &methods.0, arguments, provenance)?);
+            continue;
+        }
         let (subject, findings, n, mesh) = match arguments.mesh.given(name)? {
             Some(given) => {
                 arguments.output.settle(STEMS.map(|stem| given.subject.stem(stem)))?;
@@ -300,6 +335,49 @@ fn complex(input: &Input, arguments: &Arguments, provenance: &Provenance) -> Res
         arguments.output.figure(&subject.stem("spectrum-eigenvalues"), &found.figure(&subject), made)?;
     }
     Ok(subject.json(found.json(arguments.full)))
+}
+
+/// Writes what there is to say of the iteration matrices of `methods`, and gives the JSON object.
+fn iteration_matrices(
+    name: &str,
+    methods: &[Method<'static>],
+    arguments: &Arguments,
+    provenance: &Provenance,
+) -> Result<Value> {
+    let problem = arguments.mesh.problem(name, &arguments.stop, arguments.order, &arguments.common)?;
+    let subject = &problem.subject;
+    arguments.output.settle(ITERATION_STEMS.map(|stem| subject.stem(stem)))?;
+    let progress = Progress::new(name, methods.len(), arguments.common.quiet);
+    let order = (&problem.order[..], &*arguments.order.to_string());
+    let wish = iteration::Wish { full: arguments.full, pseudospectra: arguments.pseudospectra };
+    let all = match problem.matrix() {
+        Matrix::Symmetric(system) => iteration::all(system, &|| spectrum(system), methods, order, wish, &progress),
+        Matrix::General(system, _) => {
+            iteration::all(system, &|| ComplexSpectrum::new(system), methods, order, wish, &progress)
+        }
+    };
+    let all = all.map_err(|e| limitlab::Error::mesh(name, e.to_string()))?;
+    drop(progress);
+    let (out, made) = (&arguments.output.out, &provenance.about(&subject.source));
+    let table = iteration::table(subject, &all);
+    table.write(out, made)?;
+    if !arguments.output.json {
+        cli::print_table(&table)?;
+    }
+    iteration::eigenvalue_table(subject, &all)
+        .write_csv_file(&out.join(format!("{}.csv", subject.stem(ITERATION_STEMS[1]))), made)?;
+    let (caption, drawn) = (subject.caption(), all.iter().collect::<Vec<_>>());
+    arguments.output.figure(&table.id, &iteration::plane(&caption, &drawn), made)?;
+    if let Some(table) = iteration::power_table(subject, &all) {
+        table.write_csv_file(&out.join(format!("{}.csv", table.id)), made)?;
+    }
+    let further = [iteration::powers(&caption, &drawn), iteration::pseudospectra(&caption, &drawn)];
+    for (stem, figure) in ITERATION_STEMS[2..].iter().zip(further) {
+        if let Some(figure) = figure {
+            arguments.output.figure(&subject.stem(stem), &figure, made)?;
+        }
+    }
+    Ok(subject.json(iteration::json(&all)))
 }
 
 /// All findings: from `acting`, and where entries are asked for, from `system`, which is the same with entries.

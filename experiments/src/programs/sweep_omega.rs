@@ -12,19 +12,22 @@ use crate::cli::{
     self, CommonFlags, Grid, List, Matrix, MeshFlags, MonitorFlags, OutputFlags, Problem, Progress, StopFlags, number,
 };
 use crate::report::{Provenance, Table};
+use crate::studies::trajectories::{self, Followed};
 use crate::studies::{histories, sweep as study};
 use limitlab::Result;
 use limitlab::analysis::complex_spectrum::ComplexSpectrum;
 use limitlab::analysis::spectrum::spectrum;
 use limitlab::analysis::sweep::{OmegaSweep, SweepEvent, rounding_floor, sweep};
+use limitlab::analysis::trajectories::Trajectories;
 use limitlab::error::short;
 use limitlab::mesh::order::Order;
 use limitlab::solvers::{Method, Recorded};
 
 /// In its help.
-const EXAMPLES: [&str; 2] = [
+const EXAMPLES: [&str; 3] = [
     "sweep-omega model.obj --method jacobi,pia --omega 0.05:1.2:0.05",
     "sweep-omega torus:32x32 --noise 0.1 --figure png,svg",
+    "sweep-omega icosphere:2 --scheme loop --method sor --eigenvalues",
 ];
 
 /// Sweeps the damping ω of Jacobi, PIA and SOR: iterations, measured and predicted rate.
@@ -47,6 +50,10 @@ pub struct Arguments {
     /// Keep the errors of every iterate at these ω, which join the values of every method: in a CSV file and in the JSON object
     #[arg(long, value_name = "OMEGA,…", value_parser = omegas)]
     history: Option<List<f64>>,
+    /// Follow all eigenvalues of the iteration matrices over ω too (up to 600 vertices): where the dominant one leaves the real axis, a
+    /// table, and a picture in the complex plane
+    #[arg(long)]
+    eigenvalues: bool,
     /// Vertex order of SOR: file, reverse, bfs, rcm, morton, valence, multicolour, random or random:SEED
     #[arg(long, value_name = "NAME", default_value_t = Order::File)]
     order: Order,
@@ -96,7 +103,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     let mut results = Vec::new();
     for name in &arguments.meshes {
         let problem = arguments.mesh.problem(name, &arguments.stop, arguments.order, &arguments.common)?;
-        arguments.output.settle([problem.subject.stem("sweep-omega")])?;
+        arguments.output.settle(["sweep-omega", "sweep-omega-eigenvalues"].map(|stem| problem.subject.stem(stem)))?;
         let made = provenance.about(&problem.subject.source);
         let table = |sweep: &OmegaSweep| {
             study::table(
@@ -127,9 +134,42 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
             cli::print_table(&table)?;
             cli::print(&study::best(&arguments.method.0, &sweep))?;
         }
-        results.push(json(&problem, arguments, (&sweep, &histories), &table));
+        let mut object = json(&problem, arguments, (&sweep, &histories), &table);
+        if arguments.eigenvalues {
+            let all = eigenvalues(&problem, arguments).map_err(|e| limitlab::Error::mesh(name, e.to_string()))?;
+            let (id, caption) = (problem.subject.stem("sweep-omega-eigenvalues"), &problem.subject.title);
+            let table = trajectories::table(id.clone(), caption, &all);
+            let page = table.to_markdown();
+            trajectories::eigenvalue_table(id, caption, &all).write_with_page(&arguments.output.out, &page, &made)?;
+            let figure = trajectories::figure(&problem.subject.caption(), &all);
+            arguments.output.figure(&table.id, &figure, &made)?;
+            if !arguments.output.json {
+                cli::print_table(&table)?;
+            }
+            object["eigenvalues"] = trajectories::json(&all);
+        }
+        results.push(object);
     }
     cli::finish(results, &arguments.output, &arguments.common, provenance)
+}
+
+/// The eigenvalues of each method over its grid.
+fn eigenvalues(problem: &Problem, arguments: &Arguments) -> Result<Vec<Followed>> {
+    let methods = &arguments.method.0;
+    let name = &problem.subject.name;
+    let progress = Progress::new(name, methods.len(), arguments.monitor.no_bar(&arguments.common));
+    let one = |&method: &Method<'static>| {
+        progress.message(format!("eigenvalues of {method} over ω"));
+        let grid = arguments.omega.as_ref().map_or_else(|| study::default_grid(method), |grid| grid.0.clone());
+        let swept = method.in_order(Some(&problem.order));
+        let found = match problem.matrix() {
+            Matrix::Symmetric(system) => Trajectories::new(system, swept, &grid),
+            Matrix::General(system, _) => Trajectories::new(system, swept, &grid),
+        };
+        progress.step();
+        Ok(Followed::new(method.name(), method, found?))
+    };
+    methods.iter().map(one).collect()
 }
 
 /// Between two times that the rows which are there are written.

@@ -76,6 +76,44 @@ impl Series {
         Series::line(name, indexed.map(|(i, v)| (i as f64, v)))
     }
 
+    /// The line on which a function is `level`, given on a grid: at (`x[k]`, `y[j]`) it is `values[j·n + k]`, n the length of `x`.
+    /// Straight through each cell, linear along its sides; where all four are crossed, by the mean of the corners.
+    ///
+    /// # Panics
+    /// If there is not one value a point of the grid.
+    pub fn contour(name: impl Into<String>, x: &[f64], y: &[f64], values: &[f64], level: f64) -> Self {
+        assert_eq!(values.len(), x.len() * y.len(), "one value a point");
+        let n = x.len();
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        for (j, y) in y.windows(2).enumerate() {
+            for (k, x) in x.windows(2).enumerate() {
+                let corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])];
+                let above =
+                    [j * n + k, j * n + k + 1, (j + 1) * n + k + 1, (j + 1) * n + k].map(|at| values[at] - level);
+                // Where the sides from each corner to the next are crossed.
+                let crossed: Vec<(f64, f64)> = (0..4)
+                    .filter(|&c| (above[c] > 0.0) != (above[(c + 1) % 4] > 0.0))
+                    .map(|c| {
+                        let ((x, y), (to_x, to_y)) = (corners[c], corners[(c + 1) % 4]);
+                        let part = above[c] / (above[c] - above[(c + 1) % 4]);
+                        (x + part * (to_x - x), y + part * (to_y - y))
+                    })
+                    .collect();
+                // Of four the first two are joined where the corner between them is cut off.
+                let cuts_off = (above[1] > 0.0) != (above.iter().sum::<f64>() > 0.0);
+                let pairs: &[[usize; 2]] = match crossed.len() {
+                    0 => &[],
+                    2 => &[[0, 1]],
+                    _ if cuts_off => &[[0, 1], [2, 3]],
+                    _ => &[[3, 0], [1, 2]],
+                };
+                // What is not finite parts one piece from the next.
+                points.extend(pairs.iter().flat_map(|&[a, b]| [crossed[a], crossed[b], (f64::NAN, f64::NAN)]));
+            }
+        }
+        Series::line(name, points)
+    }
+
     /// Circles that are not joined.
     pub fn scatter(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Series { line: Line::None, marker: Some(Marker::Circle), ..Series::line(name, points) }
@@ -202,6 +240,28 @@ impl Bars {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// x² + y² = 1, and a saddle, xy = 0 around a corner of the grid.
+    #[test]
+    fn contours_are_where_the_function_is_the_level() {
+        let grid: Vec<f64> = (0..=40).map(|k| -1.5 + 3.0 * f64::from(k) / 40.0).collect();
+        let values: Vec<f64> = grid.iter().flat_map(|y| grid.iter().map(move |x| x * x + y * y)).collect();
+        let circle = Series::contour("circle", &grid, &grid, &values, 1.0);
+        let pieces: Vec<&[(f64, f64)]> = circle.points.split(|p| p.0.is_nan()).filter(|p| !p.is_empty()).collect();
+        assert!(pieces.iter().all(|piece| piece.len() == 2));
+        let length: f64 = pieces.iter().map(|p| (p[0].0 - p[1].0).hypot(p[0].1 - p[1].1)).sum();
+        assert!((length - std::f64::consts::TAU).abs() < 0.01, "{length}");
+        assert!(pieces.iter().copied().flatten().all(|p| (p.0.hypot(p.1) - 1.0).abs() < 1e-3));
+        // The corners (0, 0) and (1, 1) are above, the middle is not.
+        let saddle = Series::contour("saddle", &[0.0, 1.0], &[0.0, 1.0], &[1.0, -2.0, -2.0, 2.0], 0.0);
+        let third = 1.0 / 3.0;
+        let close = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).hypot(a.1 - b.1) < 1e-12;
+        let wanted = [(0.0, third), (third, 0.0), (1.0, 0.5), (0.5, 1.0)];
+        let found: Vec<(f64, f64)> = saddle.points.iter().copied().filter(|p| p.0.is_finite()).collect();
+        assert!(found.len() == 4 && wanted.iter().all(|&w| found.iter().any(|&f| close(f, w))), "{found:?}");
+        // Each has a piece of its own, first the one about (0, 0).
+        assert!(close(found[0], (0.0, third)) == close(found[1], (third, 0.0)), "{found:?}");
+    }
 
     #[test]
     fn histograms_count_every_finite_value() {

@@ -64,6 +64,22 @@ pub const SWEEPS: List<Scheme> = List {
     ],
 };
 
+/// Of iteration matrices: quick runs take the first.
+pub const SPLITTINGS: List<Scheme> = List {
+    models: &[
+        (SPOT_COARSE, Scheme::CatmullClark),
+        (HORSE, Scheme::Loop),
+        (BOB, Scheme::CatmullClark),
+        (HAT, Scheme::ZhengCai),
+    ],
+    built_in: &[
+        ("torus:12x12", Scheme::CatmullClark),
+        ("icosphere:2", Scheme::Loop),
+        ("irregular-quad:300", Scheme::CatmullClark),
+        ("torus:24x24", Scheme::Nasri),
+    ],
+};
+
 pub const ORDERS: List<&[Scheme]> = List {
     models: &[(HAT, &[Scheme::ZhengCai, Scheme::Loop]), (BOB, &[Scheme::CatmullClark])],
     built_in: &[

@@ -19,6 +19,7 @@ mod ripples;
 mod rivals;
 mod sparsity;
 mod splitting;
+mod splittings;
 mod summary;
 mod thall;
 mod valences;
@@ -98,6 +99,7 @@ const ITEMS: [Item; 19] = [
     methods::ALL,
     sparsity::PATTERNS,
     splitting::LOCAL,
+    splittings::SPLITTINGS,
     orders::ORDERS,
     line_preconditioner::LINES,
     valences::VALENCES,

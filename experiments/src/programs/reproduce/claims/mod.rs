@@ -31,6 +31,7 @@ mod thall_surfaces;
 mod zheng_cai;
 mod zheng_cai_exact;
 mod zheng_cai_faces;
+mod zheng_cai_fronts;
 mod zheng_cai_orders;
 mod zheng_cai_speed;
 
