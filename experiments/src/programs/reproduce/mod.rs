@@ -91,7 +91,7 @@ pub struct Arguments {
 }
 
 /// All items, in the order in which they run.
-const ITEMS: [Item; 19] = [
+const ITEMS: [Item; 21] = [
     pia::TABLE1,
     thall::ITERATIONS,
     zheng_cai::SECTION_3_5,

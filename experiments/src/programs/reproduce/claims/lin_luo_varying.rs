@@ -1,4 +1,4 @@
-//! The unified √3 scheme with an α of its own at every vertex: extraordinary vertices and surfaces (L16).
+//! The unified √3 scheme with an α of its own at every vertex: extraordinary vertices and surfaces (L17).
 
 use glam::{DVec2, DVec3};
 use nalgebra::{DMatrix, DVector};
@@ -14,7 +14,7 @@ use super::finding::{Evidence, Finding};
 use super::lab::{Lab, exact, largest, random_points, smallest};
 
 pub const CLAIMS: &[Claim] = &[Claim {
-    id: "L16",
+    id: "L17",
     title: "Different α at extraordinary vertices and on surfaces",
     place: "§6 and §7",
     printed: "Convergence and smoothness are analysed for one α; those of the non-uniform scheme are left to the future.",
