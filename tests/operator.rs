@@ -15,7 +15,7 @@ use limitlab::mesh::space_filling::{along_curve, is_scattered};
 use limitlab::mesh::validate::Boundary;
 use limitlab::mesh::{Faces, Incidence, Mesh, Surface, builtin::builtin, noise::add_noise};
 use limitlab::schemes::Scheme;
-use limitlab::solvers::chebyshev::Recurrence;
+use limitlab::solvers::chebyshev::{Recurrence, promised_iterations};
 use limitlab::solvers::coloured::Coloured;
 use limitlab::solvers::gauss_seidel::{Sor, by_colours, by_colours_watched, in_waves};
 use limitlab::solvers::iteration::Iterate;
@@ -270,6 +270,60 @@ fn bands_change_no_bit() {
             }
             assert_close(name, &plain, &x, 1e-11);
         }
+    }
+}
+
+#[test]
+fn iterations_go_on_from_a_new_residual_as_if_they_had_not_been_stopped() {
+    let case = both("irregular-quad:3000", surface("irregular-quad:3000"), Scheme::CatmullClark);
+    let r = rough(case.surface.len());
+    let wavefront = Wavefront::in_bands(&case.operator, None);
+    let mut scratch = wavefront.scratch();
+    let start = Recurrence::new((0.1, 1.0));
+    let mut from = |recurrence: Recurrence, momentum: &[DVec3], r: &[DVec3], count| {
+        let (_, tau) = recurrence.coefficients();
+        let mut x: Vec<DVec3> = momentum.iter().zip(r).map(|(&m, &r)| m + tau * r).collect();
+        let next = wavefront.iterate(recurrence, count, r, &mut x, &mut scratch);
+        let (gamma, _) = next.coefficients();
+        let momentum: Vec<DVec3> = x.iter().zip(scratch.before()).map(|(&x, &b)| gamma * (x - b)).collect();
+        (next, momentum, x)
+    };
+    let zero = vec![DVec3::ZERO; r.len()];
+    let (_, _, whole) = from(start, &zero, &r, 17);
+    // Groups of an even and of an odd number, and of one, which makes no product.
+    let (mut recurrence, mut momentum, mut sum) = (start, zero.clone(), zero);
+    for count in [6, 1, 3, 7] {
+        let ax = product(&case.operator, &sum);
+        let rest: Vec<DVec3> = r.iter().zip(ax).map(|(&r, ax)| r - ax).collect();
+        let step;
+        (recurrence, momentum, step) = from(recurrence, &momentum, &rest, count);
+        sum.iter_mut().zip(step).for_each(|(sum, step)| *sum += step);
+    }
+    assert_close("irregular-quad:3000", &sum, &whole, 1e-11);
+}
+
+/// New residuals cost no iterations: with a restart at each, three or four more were needed.
+#[test]
+fn mixed_precision_takes_the_iterations_of_one_run_of_the_recurrence() {
+    for (name, scheme) in [
+        ("irregular-quad:3000", Scheme::CatmullClark),
+        ("irregular-tri:3000", Scheme::Loop),
+        ("irregular-tri:3000", Scheme::Sqrt3),
+        ("irregular-poly:3000", Scheme::Nasri),
+        ("quad-sphere:5", Scheme::CatmullClark),
+        ("icosphere:5", Scheme::Loop),
+    ] {
+        let case = both(name, surface(name), scheme);
+        let points = case.surface.positions();
+        let first = Rows::new(points.len()).errors(&case.operator, points, points).max;
+        // Three residuals between the first and the last.
+        let stop = Stop { tolerance: 1e-13 * first, max_iterations: 1000 };
+        let (_, report) = mixed::solve(&case.operator, points, &stop);
+        assert_eq!(report.outcome, Outcome::Converged, "{name}, {scheme}");
+        let least = case.operator.usual_lambda_min().max(case.operator.bounds().lambda_min);
+        let promised = promised_iterations((least, 1.0), 1e-13) as usize;
+        let made = report.iterations;
+        assert!(report.history.len() >= 4 && made <= promised + 1, "{name}, {scheme}: {made} for {promised}");
     }
 }
 

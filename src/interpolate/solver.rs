@@ -6,7 +6,7 @@
 //! 1. [Chebyshev in single precision with double-precision corrections](crate::solvers::mixed) on the [matrix-free
 //!    operator](Operator). It needs no inner products, its iterations share passes over memory, and it moves half the
 //!    bytes. The interval starts at what λ_min usually is, or at the proven bound where that is higher; a correction that
-//!    gains less than promised stretches it, down to the proven bound at the most.
+//!    gains less than promised stretches it, down to the proven bound at the most. Others let the recurrence go on.
 //! 2. Where that makes no progress (λ_min below 10⁻⁴, a singular matrix), conjugate gradients on the same operator from
 //!    V = P: their count grows with √κ only, and they need no interval.
 //! 3. Where these make none either, and the points have no part that no control mesh reaches, LDLᵀ: a factorization tells
@@ -565,8 +565,10 @@ impl Interpolator {
         };
         let points: &[DVec3] = match &self.numbering {
             Some(numbering) => {
-                self.points.resize(n, DVec3::ZERO);
-                numbering.there_into(points, &mut self.points);
+                match self.points.len() == n {
+                    true => numbering.there_into(points, &mut self.points),
+                    false => self.points = numbering.there(points),
+                }
                 &self.points
             }
             None => points,

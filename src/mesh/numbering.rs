@@ -2,7 +2,7 @@
 
 use super::incidence::split_rows;
 use super::topology::{NONE, Scatter};
-use crate::pages::filled;
+use crate::pages::{filled, large};
 use crate::parallel;
 use crate::prefetch::prefetch;
 
@@ -59,7 +59,7 @@ impl Numbering {
     pub fn there_into<T: Copy + Send + Sync>(&self, values: &[T], out: &mut [T]) {
         let n = self.order.len();
         assert!(values.len() == n && out.len() == n, "one value a vertex");
-        parallel::fill(out, |k| values[self.order[k] as usize]);
+        parallel::fill(out, |k| fetched(values, &self.order, k));
     }
 
     /// Values in this order, by vertex again. In parallel.
@@ -77,7 +77,7 @@ impl Numbering {
     pub fn back_into<T: Copy + Send + Sync>(&self, values: &[T], out: &mut [T]) {
         let n = self.place.len();
         assert!(values.len() == n && out.len() == n, "one value a vertex");
-        parallel::fill(out, |v| values[self.place[v] as usize]);
+        parallel::fill(out, |v| fetched(values, &self.place, v));
     }
 }
 
@@ -125,5 +125,17 @@ pub(crate) fn add_up(lengths: &mut [u32]) {
 /// The k-th is `values[order[k]]`.
 fn gather<T: Copy + Send + Sync>(values: &[T], order: &[u32]) -> Vec<T> {
     assert_eq!(values.len(), order.len(), "one value a vertex");
-    parallel::collect(order.len(), |k| values[order[k] as usize])
+    let mut gathered = large(Vec::with_capacity(order.len()));
+    parallel::extend(&mut gathered, order.len(), |_| |k| fetched(values, order, k));
+    gathered
+}
+
+/// `values[order[k]]`; a later one is fetched, as a processor cannot foresee where it is.
+#[inline(always)]
+fn fetched<T: Copy>(values: &[T], order: &[u32], k: usize) -> T {
+    const AHEAD: usize = 16;
+    if let Some(&v) = order.get(k + AHEAD) {
+        prefetch(values, v as usize);
+    }
+    values[order[k] as usize]
 }

@@ -2,8 +2,10 @@
 //! the bytes of an iteration.
 //!
 //! The residual e = P − A V is taken in double precision, `A d = e` is solved roughly in single precision by a
-//! [`Wavefront`], and V + d is taken in double precision again (iterative refinement: Wilkinson 1963; Langou et al.
-//! 2006). A correction gains up to five digits; two or three are usual.
+//! [`Wavefront`], V + d is taken in double precision, and so on (iterative refinement: Wilkinson 1963; Langou et al.
+//! 2006). A correction gains up to five digits; two or three are usual. The recurrence does not begin anew with each: its
+//! momentum γ (V_k − V_{k−1}) goes on to the next residual, as if all iterations were made in one precision (residual
+//! replacement: van der Vorst & Ye 2000). So the corrections cost no iterations.
 
 use std::ops::ControlFlow;
 
@@ -14,14 +16,16 @@ use super::iteration::{self, Outcome, Recorded, Report, Step, Stop};
 use super::system::Rows;
 use super::wavefront::{Scratch, Wavefront};
 use crate::assemble::Operator;
-use crate::pages::filled;
+use crate::pages::{filled, large};
 use crate::parallel;
 use crate::prefetch::{POINTS_AHEAD, prefetch};
 
 /// A correction in single precision is not asked for more than this: half a digit above its rounding.
 const GAIN: f64 = 2e-6;
-/// Iterations of the last correction beyond those promised, since the promise is in another norm than the test.
-const SPARE: usize = 1;
+/// The last iterations aim at this part of the tolerance, since what they promise is in another norm than the test.
+const AIM: f64 = 0.9;
+/// A correction is asked for at least this, so that one that does nothing can be told from it.
+const LEAST_GAIN: f64 = 0.25;
 /// A correction that reduces the error less than this has reached rounding, or met a singular matrix.
 const PROGRESS: f64 = 0.5;
 /// A reduction so many times weaker than promised betrays an interval that is too short.
@@ -59,7 +63,7 @@ impl Workspace {
 
 /// Solves `A V = P` from V = P, for eigenvalues up to 1. The interval of the iterations starts at the [usual
 /// λ_min](Operator::usual_lambda_min), and is stretched by what each correction was seen to gain, to the proven bound at
-/// the most. (Eigenvalues below the
+/// the most; then the recurrence begins anew. (Eigenvalues below the
 /// interval are no danger: there |T_k| grows towards its value at 0, so their modes shrink, only slower.)
 ///
 /// Errors are known after every correction only: the report's history has an entry for each, and its count of
@@ -123,18 +127,16 @@ fn in_pool(
     // Residuals in units of the tolerance are far from the ends of single precision's range.
     let unit = if stop.tolerance > 0.0 { stop.tolerance } else { 1.0 };
     let least = operator.bounds().lambda_min.clamp(LOWEST, 1.0);
-    let mut interval = (operator.usual_lambda_min().max(least), 1.0);
     let largest = points.iter().map(|p| p.length_squared()).fold(0.0, f64::max);
     let floor = FLOOR * f64::EPSILON * largest.sqrt();
     let size = size.max(iteration::largest(points));
     let goal = stop.tolerance.max(iteration::floor(size));
     let mut history: Vec<Recorded> = Vec::new();
     let mut iterations = 0;
-    // The last correction: its number of iterations.
-    let mut count = 0;
+    let mut run = Run::new((operator.usual_lambda_min().max(least), 1.0));
     let outcome = loop {
-        let recurrence = Recurrence::new(interval);
-        let first = recurrence.coefficients().1 as f32;
+        let first = run.recurrence.coefficients().1 as f32;
+        let goes_on = run.made > 0;
         let current: &[DVec3] = if control.is_empty() { points } else { &*control };
         let errors = rows
             .product(operator, current, residual, correction, |i, ax, r, d, tally| {
@@ -144,7 +146,8 @@ fn in_pool(
                 let e = points[i] - ax;
                 tally.error(e);
                 *r = (e / unit).as_vec3a();
-                *d = first * *r;
+                let step = first * *r;
+                *d = if goes_on { *d + step } else { step };
             })
             .errors;
         let before = history.last().map(|e| e.errors.max);
@@ -155,26 +158,31 @@ fn in_pool(
         }
         if let Some(before) = before {
             let gain = errors.max / before;
-            let doubtful = interval.0 > least && gain > DOUBT * reduction(interval, count) && errors.max > floor;
-            if doubtful {
-                let a = (STRETCH * lowest_mode(interval, count, gain)).max(STEP * interval.0).max(least);
-                // The correction prepared above begins with the old interval's step.
-                let rescale = {
-                    interval = (a.min(interval.0), 1.0);
-                    Recurrence::new(interval).coefficients().1 as f32 / first
-                };
-                parallel::change(correction, |_, d| *d *= rescale);
+            if run.interval.0 > least && gain > DOUBT * run.promise() && errors.max > floor {
+                let a = (STRETCH * run.lowest_mode(gain)).max(STEP * run.interval.0).max(least);
+                run = Run::new((a.min(run.interval.0), 1.0));
+                let first = run.recurrence.coefficients().1 as f32;
+                parallel::change(correction, |i, d| *d = first * residual[i]);
             } else if gain > PROGRESS {
                 break Outcome::Stagnated;
             }
         }
-        count = iterations_for(interval, goal / errors.max).min(stop.max_iterations - iterations);
-        wavefront.iterate(Recurrence::new(interval), count, residual, correction, scratch);
+        let count = run.iterations_for(AIM * goal / errors.max).min(stop.max_iterations - iterations);
+        let next = wavefront.iterate(run.recurrence, count, residual, correction, scratch);
+        run = Run { recurrence: next, made: run.made + count, last: count, ..run };
         iterations += count;
+        // The momentum of the step to come, to which the next residual will be added.
+        let (gamma, last_but_one) = (next.coefficients().0 as f32, scratch.before());
+        let momentum = |i: usize, x: Vec3A| gamma * (x - last_but_one[i]);
         if control.is_empty() {
-            *control = parallel::collect(points.len(), |i| points[i] + unit * correction[i].as_dvec3());
+            *control = large(Vec::with_capacity(points.len()));
+            parallel::extend(control, points.len(), |_| |i| points[i] + unit * correction[i].as_dvec3());
+            parallel::change(correction, |i, d| *d = momentum(i, *d));
         } else {
-            parallel::change(control, |i, v| *v += unit * correction[i].as_dvec3());
+            rows.pass(control, correction, |i, v, d, _| {
+                *v += unit * d.as_dvec3();
+                *d = momentum(i, *d);
+            });
         }
     };
     if control.is_empty() {
@@ -183,24 +191,53 @@ fn in_pool(
     Report { outcome, iterations, history, detail: None }
 }
 
-/// Iterations of the coming correction, of those that reduce the error to its `factor`: all, or an even share of
-/// them if single precision does not reach so far.
-fn iterations_for(interval: (f64, f64), factor: f64) -> usize {
-    let parts = (factor.ln() / GAIN.ln()).ceil().max(1.0);
-    let spare = if parts > 1.0 { 0 } else { SPARE };
-    (promised_iterations(interval, factor.powf(1.0 / parts)) as usize).max(1) + spare
+/// A run of the recurrence for one interval, which goes on from one residual to the next.
+#[derive(Clone, Copy)]
+struct Run {
+    interval: (f64, f64),
+    recurrence: Recurrence,
+    /// Iterations so far, and of them those since the residual before.
+    made: usize,
+    last: usize,
 }
 
-/// What `count` iterations promise to reduce the error to: 1/T_count(σ).
-fn reduction((a, b): (f64, f64), count: usize) -> f64 {
-    let sigma = (b + a) / (b - a);
-    1.0 / (count as f64 * sigma.acosh()).cosh()
-}
+impl Run {
+    fn new(interval: (f64, f64)) -> Self {
+        Run { interval, recurrence: Recurrence::new(interval), made: 0, last: 0 }
+    }
 
-/// The eigenvalue whose modes shrink by `gain` in `count` iterations for the interval; below it.
-fn lowest_mode((a, b): (f64, f64), count: usize, gain: f64) -> f64 {
-    let sigma = (b + a) / (b - a);
-    let t = (gain / reduction((a, b), count)).max(1.0);
-    let mu = (t.acosh() / count.max(1) as f64).cosh();
-    0.5 * (b + a) - 0.5 * (b - a) * mu.min(sigma)
+    /// The argument of the Chebyshev polynomials at 0.
+    fn sigma(&self) -> f64 {
+        let (a, b) = self.interval;
+        (b + a) / (b - a)
+    }
+
+    /// Iterations up to the coming residual, of those that reduce the error to its `factor`: all, or an even share of
+    /// them if single precision does not reach so far.
+    fn iterations_for(&self, factor: f64) -> usize {
+        let parts = (factor.ln() / GAIN.ln()).ceil().max(1.0);
+        let factor = factor.powf(1.0 / parts).min(LEAST_GAIN);
+        let count = match self.made {
+            0 => promised_iterations(self.interval, factor),
+            // T_{k+m}(σ)/T_k(σ) where both have grown exponentially.
+            _ => ((1.0 / factor).ln() / self.sigma().acosh()).ceil(),
+        };
+        (count as usize).max(1)
+    }
+
+    /// What the last iterations promised to reduce the error to: T_{k−m}(σ)/T_k(σ).
+    fn promise(&self) -> f64 {
+        let rate = self.sigma().acosh();
+        let log_cosh = |x: f64| x + (-2.0 * x).exp().ln_1p();
+        (log_cosh((self.made - self.last) as f64 * rate) - log_cosh(self.made as f64 * rate)).exp()
+    }
+
+    /// The eigenvalue whose modes shrink by `gain` in the last iterations; below the interval.
+    fn lowest_mode(&self, gain: f64) -> f64 {
+        let (a, b) = self.interval;
+        let t = (gain / self.promise()).max(1.0);
+        let growth = if self.made == self.last { t.acosh() } else { t.ln() };
+        let mu = (growth / self.last.max(1) as f64).cosh();
+        0.5 * (b + a) - 0.5 * (b - a) * mu.min(self.sigma())
+    }
 }

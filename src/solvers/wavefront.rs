@@ -51,6 +51,13 @@ pub struct Scratch<P> {
     sums: Vec<P>,
 }
 
+impl<P> Scratch<P> {
+    /// The iterate before the one that [`iterate`](Wavefront::iterate) has returned.
+    pub fn before(&self) -> &[P] {
+        &self.other
+    }
+}
+
 /// A part of an iteration on one band.
 enum Task<'b, P> {
     Rows(Update<'b, P>),
@@ -103,8 +110,9 @@ impl<'a> Wavefront<'a> {
     }
 
     /// `count` ≥ 1 iterations for eigenvalues within the interval of `recurrence`, from x = 0. The first of them is
-    /// a multiple of `r` and must be in `x` already: `x = τ₀ r` with the recurrence's first coefficient. The last
-    /// iterate is returned in `x`.
+    /// a multiple of `r`, to which an iterate [before](Scratch::before) x = 0 may add, and must be in `x` already:
+    /// `x = τ r − γ x₋₁` with the coefficients of the recurrence. The last iterate is returned in `x`, with the recurrence at
+    /// the step that comes after it.
     ///
     /// Reads, for each group of up to 16 iterations, the operator, `r` and both iterates once from memory.
     ///
@@ -117,7 +125,7 @@ impl<'a> Wavefront<'a> {
         r: &[P],
         x: &mut Vec<P>,
         scratch: &mut Scratch<P>,
-    ) {
+    ) -> Recurrence {
         let n = self.operator.len();
         let Scratch { other, sums } = scratch;
         assert!(r.len() == n && x.len() == n && other.len() == n, "one point a vertex");
@@ -139,6 +147,8 @@ impl<'a> Wavefront<'a> {
                 std::mem::swap(x, other);
             }
         }
+        recurrence.step();
+        recurrence
     }
 
     /// `count` sweeps of Gauss-Seidel or SOR in the order of the rows, `x_i ← x_i + ω (p_i − (A x)_i)/a_ii`.

@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 
 use limitlab::analysis::dense;
-use limitlab::mesh::Mesh;
+use limitlab::analysis::spectrum::spectrum;
+use limitlab::assemble::Operator;
+use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::Scheme;
 use rayon::prelude::*;
 
@@ -70,6 +72,25 @@ fn the_usual_lambda_min_is_usual() {
             let least = dense::eigenvalues(&system(&built_in(name), scheme)).unwrap().a[0];
             assert!((0.7 * least..least + 1e-12).contains(&usual), "{scheme} on {name}: {usual} for {least}");
         }
+    }
+}
+
+/// A few vertices of another valence, each by itself, hardly move λ_min from where a regular mesh has it.
+#[test]
+fn the_usual_lambda_min_of_nearly_regular_meshes_is_that_of_regular_ones() {
+    let usual_of = |name, scheme| {
+        let surface = Surface::new(built_in(name)).unwrap();
+        Operator::new(&surface, scheme).unwrap().usual_lambda_min()
+    };
+    for (name, scheme) in [("quad-sphere:5", Scheme::CatmullClark), ("icosphere:4", Scheme::Loop)] {
+        let usual = usual_of(name, scheme);
+        let least = spectrum(&system(&built_in(name), scheme)).unwrap().a.min;
+        assert!((0.98 * least..least).contains(&usual), "{scheme} on {name}: {usual} for {least}");
+    }
+    // A fiftieth of the vertices, 0.1076 already, and faces of another size.
+    for (name, scheme) in [("quad-sphere:3", Scheme::CatmullClark), ("icosphere:4", Scheme::CatmullClark)] {
+        let usual = usual_of(name, scheme);
+        assert_eq!(usual, scheme.usual_lambda_min(), "{scheme} on {name}");
     }
 }
 
