@@ -118,8 +118,6 @@ fn sweep(c: &mut Criterion) {
     group.bench_function("matrix-free, front order", |b| {
         b.iter(|| product(&mut rows, &front, &moved, &mut y));
     });
-    let plain = baseline::Plain::new(surface.mesh(), SCHEME).expect("quads only");
-    group.bench_function("plain index-only", |b| b.iter(|| plain.product(x, &mut y)));
 
     let entries = triplets(&system.a);
     let columns = |i: usize, axis: usize| x[i][axis];

@@ -136,7 +136,7 @@ fn measure(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         arguments.tol
     ));
     table.note(
-        "plain-chebyshev is the yardstick: index-only, double precision, one pass over the arrays an operation, no \
+        "plain-chebyshev is the yardstick: index-only, double precision, all of an iteration in one pass over the arrays, no \
          renumbering. \"File to file\" is auto with all that `interpolate` does beside: reading, validation, writing, of \
          binary PLY.",
     );
