@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use glam::{DVec3, Vec3A};
 use limitlab::assemble::{LimitSystem, Operator};
-use limitlab::interpolate::interpolate;
+use limitlab::interpolate::{Options, interpolate, interpolate_watched};
 use limitlab::mesh::breadth_first::in_fronts;
 use limitlab::mesh::colours::in_colours;
 use limitlab::mesh::generate::{dual, permute_vertices, shuffle_faces, union};
@@ -22,7 +22,7 @@ use limitlab::solvers::iteration::Iterate;
 use limitlab::solvers::local_update::{Editor, decay};
 use limitlab::solvers::system::{Rows, System};
 use limitlab::solvers::wavefront::Wavefront;
-use limitlab::solvers::{Method, Outcome, Recorded, Stop, mixed, run, solve};
+use limitlab::solvers::{Method, Outcome, Recorded, Step, Stop, mixed, run, solve};
 
 fn mesh(name: &str) -> Mesh {
     let mut mesh = builtin(name).expect("a built-in mesh");
@@ -642,6 +642,27 @@ fn the_work_of_an_edit_does_not_grow_with_the_mesh() {
     let (small, _) = work("icosphere:5");
     let (large, n) = work("icosphere:7");
     assert!(large <= 2 * small && 50 * large < n, "{small} and {large} of {n}");
+}
+
+/// What `auto` works on shows in the first iterate that its watch sees.
+#[test]
+fn a_file_in_narrow_order_is_left_in_it() {
+    let (rows, columns) = (450, 450);
+    let torus = mesh("torus:450x450");
+    // Rows from both ends, so that the last is not far from the first.
+    let folded: Vec<u32> = (0..rows)
+        .flat_map(|k| (0..columns).map(move |j| if k % 2 == 0 { k / 2 } else { rows - 1 - k / 2 } * columns + j))
+        .collect();
+    for (mesh, is_narrow) in [(permute_vertices(&torus, &folded), true), (torus, false)] {
+        let surface = Surface::new(mesh).expect("a closed mesh");
+        let mut same = None;
+        let watch = &mut |_: &'static str, step: &Step| {
+            same.get_or_insert(step.points == surface.positions());
+            ControlFlow::Break(())
+        };
+        interpolate_watched(&surface, Scheme::CatmullClark, &Options::default(), watch).expect("a system");
+        assert_eq!(same, Some(is_narrow));
+    }
 }
 
 #[test]

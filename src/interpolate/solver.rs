@@ -16,7 +16,8 @@
 //! renumbered along a space-filling curve by [`Surface`]. From [`ORDERED`] vertices on, the rows of the operator are [breadth
 //! first](in_fronts), which gives it the narrow band that groups of iterations need. Below, all arrays stay in cache in
 //! any order, and rows are [grouped by kind](in_kinds) only; so they are for mixed faces under Nasri and Zheng-Cai, where
-//! iterations are too few to pay for the search. Results come back in the order of the surface.
+//! iterations are too few to pay for the search, and in files whose own order keeps to a band as narrow. Results come back in
+//! the order of the surface.
 //!
 //! *Boundaries, creases, some vertices only.* What is known before is computed first, as in [`Stages`]: curves exactly, and
 //! V_j = P_j at corners and at vertices that are not interpolated. From these, and P at all others, the unknown is a
@@ -49,7 +50,7 @@ use crate::memory::require;
 use crate::mesh::breadth_first::{in_fronts, in_kinds};
 use crate::mesh::features::Features;
 use crate::mesh::order::Numbering;
-use crate::mesh::{Mesh, Surface, diagonal};
+use crate::mesh::{Faces, Mesh, Surface, diagonal};
 use crate::parallel;
 use crate::schemes::Scheme;
 use crate::solvers::conjugate_gradient::{ConjugateGradient, Preconditioner};
@@ -315,6 +316,17 @@ pub fn require_memory(mesh: &Mesh) -> Result<()> {
     require(bytes, || format!("the work on {} vertices and {corners} corners", mesh.len()), "use a smaller mesh")
 }
 
+/// Whether the vertices of each face lie as near to each other as breadth first, whose fronts are some 4 √N wide: files
+/// written slice by slice, or front by front. Ends at the first face where they do not.
+fn is_narrow(faces: &Faces, n: usize) -> bool {
+    const WIDTH: f64 = 8.0;
+    let width = (WIDTH * (n as f64).sqrt()) as u32;
+    parallel::all(faces.len(), |f| {
+        let ends = faces.face(f).iter().fold((u32::MAX, 0), |(low, high), &v| (low.min(v), high.max(v)));
+        ends.1.saturating_sub(ends.0) <= width
+    })
+}
+
 /// Interpolation for points that move: the operator, the order of its rows and all arrays are kept from one set of points
 /// to the next. Where points move smoothly, the nearest start is the last control mesh moved as they were,
 /// V + P − P_before: the error is then (A − I)(P − P_before), by which A hardly changes smooth points.
@@ -375,7 +387,7 @@ impl Interpolator {
         };
         // Among mixed faces the search costs twice as much.
         let few = scheme.usual_lambda_min() >= FEW && faces.uniform_size().is_none();
-        let rows = if surface.len() >= ORDERED && !few {
+        let rows = if surface.len() >= ORDERED && !few && !is_narrow(faces, surface.len()) {
             Some(in_fronts(faces, incidence))
         } else {
             in_kinds(faces, incidence)
