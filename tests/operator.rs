@@ -405,15 +405,20 @@ fn sweeps_by_colours_are_the_sweeps_one_after_the_other() {
             explicit.advance().expect("a sweep");
         }
         let coloured = Coloured::new(&operator);
+        // Sums over faces that follow the iterate differ by rounding from those that each row makes.
+        let length = case.surface.diagonal();
+        let same = |x: &[DVec3], expected: &[DVec3]| match operator.sums_follow() {
+            true => assert_close(&case.name, x, expected, 10.0 * ROUNDING * length),
+            false => assert!(x == expected, "{}", case.name),
+        };
         let colours = colouring(faces, incidence);
         let colours = colours.into_iter().max().expect("vertices") as usize + 1;
         assert!(coloured.colours() <= colours, "{}", case.name);
         for threads in [1, 2, 3] {
             let mut x = points.clone();
             in_threads(threads, || coloured.relax(1.1, 3, &points, &mut x));
-            assert!(sor.points() == x, "{}, {threads} threads", case.name);
+            same(&x, sor.points());
         }
-        let length = case.surface.diagonal();
         let back = numbering.back(sor.points());
         assert_close(&case.name, &back, explicit.points(), 10.0 * ROUNDING * length);
         // In any other order runs are short, and right.
@@ -422,7 +427,7 @@ fn sweeps_by_colours_are_the_sweeps_one_after_the_other() {
             sor.advance().expect("a sweep");
             let mut x = points.clone();
             Coloured::new(&case.operator).relax(0.9, 1, &points, &mut x);
-            assert!(sor.points() == x, "{}, file order", case.name);
+            same(&x, sor.points());
         }
     }
 }

@@ -60,18 +60,17 @@ pub struct Polygons {
 }
 
 /// Faces that are summed, at rows that read no sums: what changes where such a row does.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Others {
-    /// By row: where its faces start, and the end; nothing if no face is summed.
+    /// By row: where its faces start, and the end.
     starts: Vec<u32>,
-    /// Each with the turn of the row in it.
-    faces: Vec<(u32, u32)>,
+    faces: Vec<u32>,
 }
 
 impl Others {
     #[inline]
-    fn at(&self, i: usize) -> Option<Range<usize>> {
-        Some(*self.starts.get(i)? as usize..*self.starts.get(i + 1)? as usize)
+    fn at(&self, i: usize) -> Range<usize> {
+        self.starts[i] as usize..self.starts[i + 1] as usize
     }
 }
 
@@ -428,70 +427,46 @@ impl Polygons {
         }
     }
 
-    /// What the faces at row `i` add up to, where `sum(k)` is the k-th of all sums: O(faces).
-    #[inline]
-    pub(super) fn total(&self, i: usize, sum: impl Fn(usize) -> DVec3) -> DVec3 {
-        let mut total = DVec3::ZERO;
-        for e in self.at(i) {
-            let f = self.faces[e] as usize;
-            if self.parts == 1 {
-                total += sum(f);
-            } else {
-                let [cos, sin] = self.double[self.places[e] as usize];
-                total += sum(3 * f) + cos * sum(3 * f + 1) + sin * sum(3 * f + 2);
-            }
-        }
-        total
+    /// Whether sums are kept up with an iterate that changes row by row: where there is one a face. With three, and as many
+    /// turns to be read, a row that makes them anew is as fast.
+    pub(super) fn follow_rows(&self) -> bool {
+        self.parts == 1
     }
 
-    /// Calls `add(k, part)` for what is to be added to the k-th of all sums where the point of row `i` changes by `change`:
-    /// the sums of each face at the row are told once. `others` are those of rows that read no sums. O(faces).
+    /// What the faces at row `i` add up to, where `sum(f)` is that of a face: O(faces).
+    #[inline]
+    pub(super) fn total(&self, i: usize, sum: impl Fn(usize) -> DVec3) -> DVec3 {
+        let faces = self.faces[self.at(i)].iter();
+        faces.fold(DVec3::ZERO, |total, &f| total + sum(f as usize))
+    }
+
+    /// Calls `add(f, part)` for what is to be added to the sum of each face at row `i` where its point changes by `change`.
+    /// `others` are those of rows that read no sums. O(faces).
     #[inline]
     pub(super) fn follow(&self, others: &Others, i: usize, change: DVec3, mut add: impl FnMut(usize, DVec3)) {
-        if self.blocks.is_empty() {
-            return;
-        }
-        let mut at = |f: usize, turn: usize| {
-            let [constant, cosine] = self.weights[self.size(f)];
-            if self.parts == 1 {
-                add(f, constant * change);
-            } else {
-                let [cos, sin] = self.double[turn];
-                add(3 * f, constant * change);
-                add(3 * f + 1, cosine * cos * change);
-                add(3 * f + 2, cosine * sin * change);
-            }
-        };
-        for e in self.at(i) {
-            at(self.faces[e] as usize, self.places.get(e).map_or(0, |&turn| turn as usize));
-        }
-        if let Some(range) = others.at(i) {
-            others.faces[range].iter().for_each(|&(f, turn)| at(f as usize, turn as usize));
+        for &f in self.faces[self.at(i)].iter().chain(&others.faces[others.at(i)]) {
+            let [constant, _] = self.weights[self.size(f as usize)];
+            add(f as usize, constant * change);
         }
     }
 
     /// The faces that are summed at rows that read no sums, as they are not of the kind [`RowKind::Polygons`]. O(corners).
     pub(super) fn others(&self, kinds: &[RowKind]) -> Others {
-        let mut others = Others::default();
-        if self.blocks.is_empty() {
-            return others;
-        }
-        others.starts = large(vec![0; kinds.len() + 1]);
         let reads = |v: u32| kinds[v as usize] == RowKind::Polygons;
+        let mut starts = large(vec![0; kinds.len() + 1]);
         for &v in self.corners.iter().filter(|&&v| !reads(v)) {
-            others.starts[v as usize + 1] += 1;
+            starts[v as usize + 1] += 1;
         }
-        add_up(&mut others.starts);
-        let mut next = others.starts.clone();
-        others.faces = vec![(0, 0); next[kinds.len()] as usize];
+        add_up(&mut starts);
+        let mut next = starts.clone();
+        let mut faces = vec![0; next[kinds.len()] as usize];
         for f in 0..self.offsets.len() - 1 {
-            let first = self.first_turn[self.size(f)];
-            for (turn, &v) in (first..).zip(self.corners_of(f)).filter(|&(_, &v)| !reads(v)) {
-                others.faces[next[v as usize] as usize] = (f as u32, turn);
+            for &v in self.corners_of(f).iter().filter(|&&v| !reads(v)) {
+                faces[next[v as usize] as usize] = f as u32;
                 next[v as usize] += 1;
             }
         }
-        others
+        Others { starts, faces }
     }
 
     /// What the faces at row `i` add up to, for this row alone: O(corners of these faces).

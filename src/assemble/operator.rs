@@ -198,7 +198,13 @@ impl Operator {
         self.stencil.row(i, points)
     }
 
-    /// As [`row_within`](Self::row_within), where `sum(k)` is the k-th of the [sums over faces](Self::all_sums) of x. O(neighbours).
+    /// Whether sweeps in place keep the [sums over faces](Self::all_sums) up with the iterate, by [`row_by_sums`](Self::row_by_sums)
+    /// and [`follow`](Self::follow): where there is one sum a face.
+    pub fn sums_follow(&self) -> bool {
+        self.stencil.polygons.follow_rows()
+    }
+
+    /// As [`row_within`](Self::row_within), where `sum(f)` is that of the points of a face: O(neighbours).
     ///
     /// # Panics
     /// If the row reaches beyond the points.
@@ -207,8 +213,10 @@ impl Operator {
         self.stencil.row_by(i, points, |i| self.stencil.polygons.total(i, &sum))
     }
 
-    /// Calls `add(k, part)` for what is to be added to the k-th of the [sums over faces](Self::all_sums) where x_i changes by
-    /// `change`; each is told once. O(faces at i).
+    /// Calls `add(f, part)` for what is to be added to the sum of each face at `i` where x_i changes by `change`. O(faces).
+    ///
+    /// # Panics
+    /// Unless sums [follow](Self::sums_follow).
     #[inline]
     pub fn follow(&self, i: usize, change: DVec3, add: impl FnMut(usize, DVec3)) {
         let polygons = &self.stencil.polygons;

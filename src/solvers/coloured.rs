@@ -7,10 +7,10 @@
 //! The price against [waves](super::wavefront): a colour reads its neighbours from all over memory, so that a sweep
 //! passes over the iterate about as often as there are colours (7 on irregular quads and triangles), while waves share
 //! one pass among several sweeps. On a million vertices a sweep takes 24 ns a vertex on one thread and 12 on two, in
-//! waves 12 and 7. But waves have no more tasks at a time than sweeps in a group; colours have as many as threads want.
+//! waves 12 and 7. Rows make the sums of faces anew, also where other sweeps [keep them up](Operator::sums_follow) with the
+//! iterate: out of order that reads and writes as much, and the numbers are then equal to rounding. But waves have no more tasks at a time than sweeps in a group; colours have as many as threads want.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::DVec3;
 
@@ -19,7 +19,7 @@ use crate::parallel;
 
 /// Rows of one task.
 const PIECE: usize = 2048;
-/// Rows whose changes wait together until all of them are made: they stay in the second-level cache.
+/// Rows whose new values wait together until all of them are made: they stay in the second-level cache.
 const BLOCK: usize = 16 * PIECE;
 
 /// An operator with its rows cut into runs that do not couple.
@@ -69,89 +69,39 @@ impl<'a> Coloured<'a> {
     pub fn relax(&self, omega: f64, count: usize, p: &[DVec3], x: &mut [DVec3]) {
         let n = self.operator.len();
         assert!(p.len() == n && x.len() == n, "one point a vertex");
-        let mut changes = vec![DVec3::ZERO; n.min(BLOCK)];
-        let mut sums = Sums::default();
+        let mut fresh = vec![DVec3::ZERO; n.min(BLOCK)];
         // Within the thread pool, so that the many short parallel loops need not be handed over to it.
         rayon::scope(|_| {
             for _ in 0..count {
-                sums.make(self.operator, x);
                 for run in self.starts.windows(2) {
                     for first in (run[0]..run[1]).step_by(BLOCK) {
                         let rows = first..run[1].min(first + BLOCK);
-                        self.block(omega, rows, p, x, (&mut changes, &sums));
+                        self.block(omega, rows, p, x, &mut fresh);
                     }
                 }
             }
         });
     }
 
-    /// The changes of rows that do not couple are all made first, since all threads read `x`.
-    fn block(
-        &self,
-        omega: f64,
-        rows: Range<usize>,
-        p: &[DVec3],
-        x: &mut [DVec3],
-        (changes, sums): (&mut [DVec3], &Sums),
-    ) {
-        let changes = &mut changes[..rows.len()];
+    /// The new values of rows that do not couple go to `fresh` first, since all threads read `x`.
+    fn block(&self, omega: f64, rows: Range<usize>, p: &[DVec3], x: &mut [DVec3], fresh: &mut [DVec3]) {
+        let fresh = &mut fresh[..rows.len()];
         if rows.len() <= PIECE {
-            self.piece(omega, rows.start, p, x, (changes, sums));
-            self.add(rows.start, changes, &mut x[rows], sums);
+            self.piece(omega, rows.start, p, x, fresh);
+            x[rows].copy_from_slice(fresh);
             return;
         }
         let old = &*x;
-        parallel::chunks(changes, PIECE, |first, changes| {
-            self.piece(omega, rows.start + first, p, old, (changes, sums));
-        });
-        parallel::chunks(&mut x[rows.clone()], PIECE, |first, x| {
-            self.add(rows.start + first, &changes[first..first + x.len()], x, sums);
-        });
+        parallel::chunks(fresh, PIECE, |first, fresh| self.piece(omega, rows.start + first, p, old, fresh));
+        parallel::chunks(&mut x[rows], PIECE, |first, x| x.copy_from_slice(&fresh[first..first + x.len()]));
     }
 
-    fn piece(&self, omega: f64, first: usize, p: &[DVec3], x: &[DVec3], (changes, sums): (&mut [DVec3], &Sums)) {
+    fn piece(&self, omega: f64, first: usize, p: &[DVec3], x: &[DVec3], fresh: &mut [DVec3]) {
         let diagonal = self.operator.diagonal();
         // Row by row: among the rows of a colour few of the same kind follow each other.
-        for (i, change) in (first..).zip(changes) {
-            let e = p[i] - self.operator.row_by_sums(i, (x, 0), |k| sums.get(k));
-            *change = (omega / diagonal[i]) * e;
-        }
-    }
-
-    fn add(&self, first: usize, changes: &[DVec3], x: &mut [DVec3], sums: &Sums) {
-        for (i, (x, &change)) in (first..).zip(x.iter_mut().zip(changes)) {
-            *x += change;
-            self.operator.follow(i, change, |k, part| sums.set(k, sums.get(k) + part));
-        }
-    }
-}
-
-/// The sums over faces, which follow the iterate. Rows of a run share no face, so each is changed by one thread at a time; what
-/// one run writes the next one reads, after its tasks have ended.
-#[derive(Default)]
-struct Sums(Vec<[AtomicU64; 3]>);
-
-impl Sums {
-    fn make(&mut self, operator: &Operator, x: &[DVec3]) {
-        let mut made = Vec::new();
-        operator.all_sums(x, &mut made);
-        let bits = |k: usize| made[k].to_array().map(|x| AtomicU64::new(x.to_bits()));
-        if self.0.len() == made.len() {
-            parallel::fill(&mut self.0, bits);
-        } else {
-            self.0 = parallel::collect(made.len(), bits);
-        }
-    }
-
-    #[inline]
-    fn get(&self, k: usize) -> DVec3 {
-        DVec3::from_array(self.0[k].each_ref().map(|x| f64::from_bits(x.load(Ordering::Relaxed))))
-    }
-
-    #[inline]
-    fn set(&self, k: usize, sum: DVec3) {
-        for (x, value) in self.0[k].iter().zip(sum.to_array()) {
-            x.store(value.to_bits(), Ordering::Relaxed);
+        for (i, fresh) in (first..).zip(fresh) {
+            let e = p[i] - self.operator.row(i, x);
+            *fresh = x[i] + (omega / diagonal[i]) * e;
         }
     }
 }

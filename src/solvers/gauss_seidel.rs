@@ -2,9 +2,8 @@
 //!
 //! M is symmetric positive definite where A is non-singular, so every order converges for 0 < ω < 2 (ω = 1 is
 //! Gauss-Seidel); the order changes the rate (Zheng-Cai §5). A sweep reads A once; testing the error of the
-//! result reads it again. One array of N points. On a matrix-free operator whose rows read [sums over
-//! faces](Operator::all_sums), these are made once a sweep and follow each row that changes, in every way to sweep: O(faces) a
-//! row instead of O(corners of faces).
+//! result reads it again. One array of N points. On a matrix-free operator with [one sum a face](Operator::sums_follow)
+//! these are made once a sweep and follow each row that changes: O(faces) a row instead of O(corners of faces).
 
 use std::ops::ControlFlow;
 

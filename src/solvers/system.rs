@@ -59,6 +59,11 @@ pub trait System: Sync {
         shared.clear();
     }
 
+    /// Whether sweeps in place keep these sums up with the iterate.
+    fn sums_follow(&self) -> bool {
+        false
+    }
+
     /// As [`row`](Self::row), by these sums.
     fn row_by_sums(&self, i: usize, x: &[DVec3], _shared: &[DVec3]) -> DVec3 {
         self.row(i, x)
@@ -153,6 +158,10 @@ impl System for Operator {
 
     fn prepare<P: Point>(&self, x: &[P], shared: &mut Vec<P>) {
         self.all_sums(x, shared);
+    }
+
+    fn sums_follow(&self) -> bool {
+        Operator::sums_follow(self)
     }
 
     #[inline]
@@ -270,14 +279,14 @@ pub(super) fn sweep_with<S: System>(
     shared: &mut Vec<DVec3>,
 ) {
     let diagonal = system.diagonal();
-    system.prepare(x, shared);
-    if shared.is_empty() {
+    if !system.sums_follow() {
         for i in order {
             let e = points[i] - system.row(i, x);
             x[i] += (omega / diagonal[i]) * e;
         }
         return;
     }
+    system.prepare(x, shared);
     for i in order {
         let change = (omega / diagonal[i]) * (points[i] - system.row_by_sums(i, x, shared));
         x[i] += change;

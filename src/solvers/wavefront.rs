@@ -174,7 +174,8 @@ impl<'a> Wavefront<'a> {
         let at = |j: usize| (j * band).min(n);
         let length = self.group_length::<DVec3>(3 * band);
         let operator = self.operator;
-        let mut sums = filled(operator.sums_of(0..n).len(), DVec3::ZERO);
+        let sums_of = |rows: Range<usize>| if operator.sums_follow() { operator.sums_of(rows) } else { 0..0 };
+        let mut sums = filled(sums_of(0..n).len(), DVec3::ZERO);
         for first in (0..count).step_by(length) {
             let sweeps = length.min(count - first);
             for wave in 0..bands + 3 * (sweeps - 1) {
@@ -185,21 +186,28 @@ impl<'a> Wavefront<'a> {
                     .filter_map(|k| wave.checked_sub(3 * k).filter(|&j| j < bands))
                     .map(|j| {
                         let seen = at(j.saturating_sub(1))..at(j + 2);
-                        let known = operator.sums_of(at(j.saturating_sub(1))..at(j + 1));
+                        let known = sums_of(at(j.saturating_sub(1))..at(j + 1));
                         let (start, first) = (seen.start, known.start);
                         let sums = (cut(&mut rest_of_sums, known), first);
                         (at(j)..at(j + 1), (cut(&mut rest, seen), start), sums)
                     })
                     .collect();
                 tasks.into_par_iter().with_max_len(1).for_each(|(rows, (window, start), (sums, first))| {
+                    if sums.is_empty() {
+                        for i in rows {
+                            let e = p[i] - operator.row_within(i, (window, start));
+                            window[i - start] += (omega / diagonal[i]) * e;
+                        }
+                        return;
+                    }
                     // No row of a face whose first one is here has been passed by this sweep, all by the one before it.
                     let made = operator.sums_of(rows.clone());
                     operator.sums(made.start, (window, start), &mut sums[made.start - first..made.end - first]);
                     for i in rows {
-                        let e = p[i] - operator.row_by_sums(i, (window, start), |k| sums[k - first]);
+                        let e = p[i] - operator.row_by_sums(i, (window, start), |f| sums[f - first]);
                         let change = (omega / diagonal[i]) * e;
                         window[i - start] += change;
-                        operator.follow(i, change, |k, part| sums[k - first] += part);
+                        operator.follow(i, change, |f, part| sums[f - first] += part);
                     }
                 });
             }
