@@ -258,6 +258,20 @@ mod tests {
     }
 
     #[test]
+    fn parts_are_appended_in_order() {
+        let lengths = [0, 3, 0, 0, 5000, 4096, 0, 1];
+        let parts: Vec<Vec<u32>> = lengths.iter().map(|&n| (0..n).collect()).collect();
+        let parts: Vec<&[u32]> = parts.iter().map(|part| &part[..]).collect();
+        let mut all = vec![7];
+        append_parts(&mut all, &parts, |k, x| x + 10_000 * k as u32);
+        append_parts(&mut all, &[], |_, x| x);
+        append_parts(&mut all, &[&[][..]], |_, x| x);
+        let expected = (0..8).flat_map(|k| (0..lengths[k]).map(move |x| x + 10_000 * k as u32));
+        assert!(all.into_iter().eq([7].into_iter().chain(expected)));
+        assert_eq!(starts([2, 0, 3].into_iter()), [0, 2, 2, 5]);
+    }
+
+    #[test]
     fn a_panic_appends_nothing() {
         let mut words = vec![String::new()];
         let made = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {

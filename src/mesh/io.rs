@@ -501,21 +501,21 @@ impl Builder {
         [0, 1, 2].map(|k| self.before[k] + here[k])
     }
 
-    /// Adds the parts that follow, whose lines are counted from one after `lines[k]`. If they are more than 32-bit
-    /// indices can name, nothing is added, and the answer is no.
-    pub fn append(&mut self, parts: &[&Builder], lines: &[usize]) -> bool {
+    /// Adds the parts that follow, whose lines are counted from one after `lines[k]`, and makes room for `times` as much. If
+    /// they are more than 32-bit indices can name, nothing is added, and the answer is no.
+    pub fn append(&mut self, parts: &[&Builder], lines: &[usize], times: f64) -> bool {
         let [vertices, faces, corners]: [usize; 3] =
             [0, 1, 2].map(|k| parts.iter().map(|part| part.counts()[k] - part.before[k]).sum());
         let before = self.corners.len();
         if (self.positions.len() + vertices).max(before + corners) > u32::MAX as usize {
             return false;
         }
-        make_room(&mut self.positions, vertices);
-        make_room(&mut self.corners, corners);
-        make_room(&mut self.offsets, faces);
+        make_room(&mut self.positions, vertices, times);
+        make_room(&mut self.corners, corners, times);
+        make_room(&mut self.offsets, faces, times);
         if let Some(lines) = &mut self.lines {
-            make_room(&mut lines.vertices, vertices);
-            make_room(&mut lines.faces, faces);
+            make_room(&mut lines.vertices, vertices, times);
+            make_room(&mut lines.faces, faces, times);
         }
         fn of<'a, T>(parts: &[&'a Builder], array: impl Fn(&'a Builder) -> &'a [T]) -> Vec<&'a [T]> {
             parts.iter().map(|part| array(part)).collect()
@@ -541,19 +541,20 @@ impl Builder {
     /// absurd count asks for no memory.
     pub fn reserve_vertices(&mut self, count: u64, at_most: usize) {
         let count = capped(count, at_most);
-        make_room(&mut self.positions, count);
+        make_room(&mut self.positions, count, 1.0);
         if let Some(lines) = &mut self.lines {
-            make_room(&mut lines.vertices, count);
+            make_room(&mut lines.vertices, count, 1.0);
         }
     }
 
     /// The same for faces.
     pub fn reserve_faces(&mut self, count: u64, at_most: usize) {
         let count = capped(count, at_most);
-        make_room(&mut self.offsets, count);
-        make_room(&mut self.corners, 3 * count);
+        make_room(&mut self.offsets, count, 1.0);
+        // Quads, as triangles take no more than address space for it.
+        make_room(&mut self.corners, 4 * count, 1.0);
         if let Some(lines) = &mut self.lines {
-            make_room(&mut lines.faces, count);
+            make_room(&mut lines.faces, count, 1.0);
         }
     }
 
@@ -646,10 +647,11 @@ pub(super) fn joined(loaded: Loaded, what: &str, why: &str) -> Loaded {
     Loaded { mesh, lines, remarks, ..loaded }
 }
 
-/// Makes room for more items, of what has to grow for twice as many.
-fn make_room<T>(vector: &mut Vec<T>, more: usize) {
+/// Makes room for `more` items, and at once for `times` as many where there is none: to move a large array takes longer than to
+/// make it.
+fn make_room<T>(vector: &mut Vec<T>, more: usize, times: f64) {
     if vector.capacity() - vector.len() < more {
-        vector.reserve(more.max(vector.len()));
+        vector.reserve(more.max((more as f64 * times) as usize));
         *vector = pages::large(std::mem::take(vector));
     }
 }
@@ -703,6 +705,31 @@ mod tests {
         for name in ["a.usd", "a.usdc", "a.USDZ"] {
             let text = check_name(Path::new(name)).unwrap_err().to_string();
             assert!(text.ends_with("let the name end in .usda"), "{text}");
+        }
+    }
+
+    /// More than a thread reads and writes at once.
+    #[test]
+    fn large_files_are_read_and_written_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut mesh = crate::mesh::builtin::builtin("irregular-quad:40000").unwrap();
+        crate::mesh::noise::add_noise(&mut mesh, 0.1, 1);
+        for (ending, size) in [("obj", 3 << 20), ("off", 3 << 20), ("ply", 1 << 20)] {
+            let path = folder.path().join(format!("a.{ending}"));
+            write(&path, &mesh, None).unwrap();
+            let loaded = read(&path).unwrap();
+            assert!(loaded.mesh == mesh && loaded.remarks.is_empty(), "{ending}");
+            let bytes = std::fs::read(&path).unwrap();
+            assert!(bytes.len() > size);
+            assert_eq!(loaded.checksum, Some(crc32fast::hash(&bytes)));
+            let streamed = read_from(&bytes[..], ending.parse().unwrap(), &path).unwrap();
+            assert!(streamed.mesh == mesh && streamed.lines == loaded.lines && streamed.checksum == loaded.checksum);
+            if let Some(lines) = loaded.lines {
+                let head = if ending == "off" { 2 } else { 0 };
+                let first = head + mesh.len() as u32 + 1;
+                assert!(lines.vertices.into_iter().eq(head + 1..first));
+                assert!(lines.faces.into_iter().eq(first..first + mesh.faces.len() as u32));
+            }
         }
     }
 

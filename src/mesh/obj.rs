@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::Mesh;
-use super::attributes::{Attributes, STATEMENTS};
+use super::attributes::{Attributes, CornerLines, STATEMENTS};
 use super::features::Tags;
 use super::file_tags::{CornerTag, CreaseTag, FileTags, check_sharpness};
 use super::io::{Builder, Lines, Loaded, WriteOptions, check_normals, write_rows};
@@ -122,11 +122,12 @@ pub(super) fn read_in_parts(bytes: &[u8], path: &Path, size: usize) -> Result<Lo
         for task in &mut tasks {
             std::mem::replace(&mut task.result, Ok(()))?;
         }
-        file.append(&mut tasks);
+        let left = s.rest().len();
         if let Some(Task { s: end, part, start, .. }) = tasks.last() {
             let line = start.line + end.line() - part.start.line;
             s.follow(&end.clone().at_line(line));
         }
+        file.append(&mut tasks, left as f64 / (left - s.rest().len()) as f64);
         spare.extend(tasks.into_iter().map(|task| task.part));
     }
     file.finish(&s, path)
@@ -211,6 +212,8 @@ impl Part {
             let is_plain = match s.rest() {
                 [b'v', b' ', ..] => self.plain_vertex(s),
                 [b'f', b' ', ..] => self.plain_face(s),
+                [b'v', b't', b' ', ..] => plain_line(s, &mut self.attributes.texture),
+                [b'v', b'n', b' ', ..] => plain_line(s, &mut self.attributes.normals),
                 _ => false,
             };
             if is_plain {
@@ -350,8 +353,8 @@ impl Part {
         }
     }
 
-    /// Adds the parts that follow.
-    fn append(&mut self, tasks: &mut [Task]) {
+    /// Adds the parts that follow, and makes room for `times` as much.
+    fn append(&mut self, tasks: &mut [Task], times: f64) {
         let mut corners = self.builder.corners();
         for Task { part, start, .. } in &mut *tasks {
             let lines = (start.line - part.start.line) as u32;
@@ -363,7 +366,7 @@ impl Part {
         }
         let builders: Vec<&Builder> = tasks.iter().map(|task| &task.part.builder).collect();
         let lines: Vec<usize> = tasks.iter().map(|task| task.start.line - task.part.start.line).collect();
-        assert!(self.builder.append(&builders, &lines), "the parts are within the limits");
+        assert!(self.builder.append(&builders, &lines, times), "the parts are within the limits");
     }
 
     /// The mesh of the file, at whose end `s` is.
@@ -381,6 +384,16 @@ impl Part {
         let loaded = self.builder.finish(path, None, self.oddities.remarks());
         Ok(Loaded { tags: self.tags.found, attributes: self.attributes, ..loaded })
     }
+}
+
+/// Keeps the line here if no backslash is in it; otherwise the place stays.
+fn plain_line(s: &mut Scanner, lines: &mut CornerLines) -> bool {
+    let rest = s.rest();
+    let end = memchr::memchr3(b'\n', b'\r', b'\\', rest);
+    let Some(length) = end.filter(|&end| rest[end] != b'\\') else { return false };
+    lines.push(rest[..length].trim_ascii_end());
+    s.advance(length);
+    true
 }
 
 /// The whole number from 1 on here, of no more than nine digits, which is passed over.
@@ -908,6 +921,21 @@ mod tests {
         let with_normals = written(&loaded, Some(&[DVec3::Z; 3]));
         assert!(with_normals.contains("f 1/1/1 2/2/2 3/3/3\ns off\nf 1/3/1 3/1/3 2/2/2\nf 1//1 3//3 2//2\n"));
         assert_eq!(with_normals.matches("vn ").count(), 3);
+    }
+
+    /// Of more faces than a thread writes at once, and all threads.
+    #[test]
+    fn statements_stay_before_their_faces_in_large_files() {
+        let mut text = TRIANGLE.repeat(20_000);
+        for f in 0..40_000 {
+            if f % 2048 < 2 || f % 683 == 0 {
+                text += &format!("g {f}\nusemtl m\n");
+            }
+            text += &format!("f {} 2 3\n", f + 1);
+        }
+        text += "g after\n";
+        let loaded = parse(&text).unwrap();
+        assert!(written(&loaded, None) == text);
     }
 
     #[test]

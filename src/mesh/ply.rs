@@ -166,7 +166,7 @@ impl Output for Read {
 
     fn append(&mut self, parts: &[&Self]) -> bool {
         let builders: Vec<&Builder> = parts.iter().map(|part| &part.builder).collect();
-        let fits = self.builder.append(&builders, &vec![0; parts.len()]);
+        let fits = self.builder.append(&builders, &vec![0; parts.len()], 1.0);
         if fits {
             let normals: Vec<&[DVec3]> = parts.iter().map(|part| &part.normals[..]).collect();
             parallel::append_parts(&mut self.normals, &normals, |_, n| n);

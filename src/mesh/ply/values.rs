@@ -226,9 +226,17 @@ impl Values for Binary<'_> {
 
     fn unsigned<T: TryFrom<u64>>(&mut self, scalar: Scalar) -> Option<T> {
         let start = self.at;
-        // All whole numbers of the format are exact as doubles; none of them reaches 2³².
-        let value = self.number(scalar)?;
-        let fitting = (value >= 0.0).then(|| T::try_from(value as u64).ok()).flatten();
+        let value = match scalar {
+            Scalar::I8 => i64::from(i8::from_le_bytes(self.take()?)),
+            Scalar::U8 => u8::from_le_bytes(self.take()?).into(),
+            Scalar::I16 => i16::from_le_bytes(self.take()?).into(),
+            Scalar::U16 => u16::from_le_bytes(self.take()?).into(),
+            Scalar::I32 => i32::from_le_bytes(self.take()?).into(),
+            Scalar::U32 => u32::from_le_bytes(self.take()?).into(),
+            // The header refuses them where whole numbers are needed.
+            Scalar::F32 | Scalar::F64 => return None,
+        };
+        let fitting = u64::try_from(value).ok().and_then(|value| T::try_from(value).ok());
         if fitting.is_none() {
             self.at = start;
         }
