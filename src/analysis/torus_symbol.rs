@@ -9,8 +9,8 @@
 //!
 //! Row by row there is no such class, but away from where the torus is cut every row has the same part of its stencil
 //! before it, P = {d : d < 0}: there a sweep acts as the [symbol of a front](front) T̂(θ) = 1 − ωÂ/(a_0 + ωL̂), L̂ = Σ_{d ∈ P} a_d e^{iθ·d},
-//! and so it does in any order that advances as a front over a region that grows with the torus. ‖T^k‖ tends to max |T̂|^k at
-//! least for each k, whatever ρ(T) is: the sum of the a_d before is (1 − a_0)/2 < a_0 under all schemes, so that what a
+//! and so it does in any order that advances as a front over a region that grows with the torus. For each k the limit of ‖T^k‖ is
+//! no less than max |T̂|^k, whatever ρ(T) is: the sum of the a_d before is (1 − a_0)/2 < a_0 under all schemes, so that what a
 //! sweep carries along decays geometrically, and a wave in the midst of the region does not feel its edge.
 
 use std::f64::consts::TAU;

@@ -13,7 +13,7 @@ use crate::programs::reproduce::context::Subject;
 
 /// The torus of the table `orders`, where a wave does not cross so many sweeps.
 const SIDE: usize = 24;
-const POWER: usize = 8;
+const POWER: usize = 12;
 
 /// Breadth first and colour by colour on a regular torus under Catmull-Clark, at ω = 1.1: radius, symbol, rate of powers.
 ///
@@ -40,8 +40,8 @@ pub fn evidence() -> Result<Vec<Evidence>> {
     Ok(vec![
         Evidence::below("radius of a front on the regular torus, SOR(1.1)", rho, rho_colours),
         Evidence::shown("symbol of a front there, max |T̂|", symbol),
-        Evidence::at_least("rate of a front there, ‖T^8‖^(1/8), over the symbol", rate / symbol, 0.97),
-        Evidence::shown("hump of a front there, ‖T^8‖/ρ^8", hump),
+        Evidence::at_least("rate of a front there, ‖T^12‖^(1/12), over the symbol", rate / symbol, 0.97),
+        Evidence::shown("hump of a front there, ‖T^12‖/ρ^12", hump),
         Evidence::shown("radius by colours there", rho_colours),
         Evidence::at_most(
             "deviation of the radius by colours from that of the blocks",
