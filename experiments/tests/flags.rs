@@ -54,7 +54,7 @@ const PROGRAMS: &[Program] = &[
                 (
                     "--method",
                     "auto|lu|cholesky|ldlt|jacobi|thall|gauss-seidel|sor|ssor|pia|w-pia|chebyshev|cg|\
-                     pcg-jacobi|pcg-ssor|pcg-ic0|two-phase|halstead|butterfly|labsik-greiner|no-such",
+                     pcg-jacobi|pcg-ssor|pcg-ic0|two-phase|halstead|fair-refinement|butterfly|labsik-greiner|no-such",
                 ),
                 ("--order", ORDERS),
             ],
@@ -67,7 +67,7 @@ const PROGRAMS: &[Program] = &[
                 ("--normal-threshold", "0|10|181|nan"),
                 ("--normal-tolerance", "5|-1"),
                 ("--normal-levels", "1|3|9"),
-                ("--shape-handle", "0.5|2|numbers.txt|0|-1|nan|no-such.txt"),
+                ("--shape-handle", "0.5|2|fair|numbers.txt|0|-1|nan|no-such.txt"),
                 ("--alpha", "0|1|2|0.5|numbers.txt|3|nan"),
                 ("--ite-max", "0|1|30"),
                 ("--eps", "1e-9|1|0"),

@@ -175,6 +175,37 @@ fn two_phases_give_exact_centroids_with_handles_and_subsets() {
     assert!(distance(&limits, &given.positions) < ROUNDING);
 }
 
+/// Points are met, and more freedom takes less energy; what is written is the control mesh one refinement down, or its surface.
+#[test]
+fn fair_handles_and_refinements_meet_the_points_with_less_energy() {
+    let bench = Bench::new();
+    let given = with_noise("irregular-poly:40");
+    let first = given.faces.len() + surface(&given).topology().edges();
+    let base = "irregular-poly:40 --noise 0.1 --scheme zheng-cai --tol 1e-13";
+    let run = |flags: &str| {
+        let (json, loaded) = bench.run(&format!("{base} {flags}"));
+        for (v, point) in given.positions.iter().enumerate() {
+            assert!(centroid(&loaded.mesh, first + v).distance(*point) < ROUNDING, "{flags} {v}");
+        }
+        (json, loaded.mesh)
+    };
+    let energy = |json: &Value| {
+        ["thin_plate", "membrane"].map(|name| json["fairness"][name].as_f64().unwrap()).iter().sum::<f64>()
+    };
+    let [(handles, _), (free, surface)] =
+        ["--shape-handle fair", "--method fair-refinement"].map(|flags| run(&format!("{flags} --subdivide 3")));
+    assert!(energy(&free) < energy(&handles), "{} {}", energy(&free), energy(&handles));
+    let [least, largest] = ["least", "largest"].map(|name| handles["shape_handles"][name].as_f64().unwrap());
+    assert!(0.0 < least && least < largest, "{least} {largest}");
+    let history = free["history"].as_array().unwrap();
+    assert!(history.len() > 5 && history[0]["max_step"].as_f64() > free["tolerance"].as_f64());
+    let (_, control) = run("--method fair-refinement");
+    assert_eq!(control.len(), given.faces.corners().len());
+    assert_eq!(run("--method fair-refinement --subdivide 1").1.positions, control.positions);
+    let expected = Refinement::DooSabin.refine_n(&Surface::new(control).unwrap(), 2).unwrap();
+    assert!(distance(&surface.positions, &expected.positions) < ROUNDING);
+}
+
 #[test]
 fn a_subset_moves_no_other_vertex() {
     let bench = Bench::new();
@@ -217,6 +248,7 @@ fn failures_say_what_is_wrong_and_write_nothing() {
     let twice = bench.write("twice.txt", "4 1 0 0\n4 0 1 0\n");
     let zero = bench.write("zero.txt", "4 0 0 0\n");
     let handles = bench.write("handles.txt", "4 -1\n");
+    let square = bench.write("square.off", "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n");
     for (arguments, what) in [
         ("icosahedron --alpha -0.5 --subdivide 1".to_owned(), "α = -0.5 at vertex 0"),
         ("icosahedron --method halstead --thin-plate -1".to_owned(), "fairness weights -1"),
@@ -237,6 +269,10 @@ fn failures_say_what_is_wrong_and_write_nothing() {
         ),
         (format!("icosahedron --shape-handle {handles} --scheme nasri --subdivide 2"), "vertex 4: the shape handle -1"),
         ("icosahedron --shape-handle 2 --scheme loop".into(), "use --scheme zheng-cai"),
+        ("icosahedron --shape-handle fair --scheme loop --subdivide 2".into(), "use --scheme zheng-cai"),
+        ("icosahedron --shape-handle fair --scheme nasri".into(), "use --subdivide 1 or more"),
+        (format!("{square} --shape-handle fair --scheme nasri --subdivide 2"), "needs a mesh without creases"),
+        ("icosahedron --method fair-refinement --max-iter 1".into(), "fair-refinement ended as max-iterations"),
         ("icosahedron --method pia --max-iter 1".into(), "ran out"),
         (
             "icosahedron --method halstead --max-iter 1".into(),
@@ -260,6 +296,8 @@ fn failures_say_what_is_wrong_and_write_nothing() {
         "icosahedron --method butterfly --vertices 1 --subdivide 2",
         "icosahedron --method halstead --subdivide 1",
         "icosahedron --method halstead --shape-handle 2",
+        "icosahedron --method fair-refinement --shape-handle 2",
+        "icosahedron --method fair-refinement --scheme nasri",
         "icosahedron --normal-levels 2",
         "icosahedron --subdivide 13",
     ] {

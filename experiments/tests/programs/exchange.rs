@@ -250,8 +250,12 @@ fn flags_without_their_method_are_remarked() {
     for (flags, expected) in [
         ("--ite-max 3 --eps 0.1", "--ite-max, --eps without --method two-phase: not used"),
         ("--method two-phase --ite-max 30 --eps 0.1", ""),
-        ("--scheme catmull-clark --membrane 2", "--membrane without --method halstead: not used"),
+        (
+            "--scheme catmull-clark --membrane 2",
+            "--membrane without --method halstead or fair-refinement, or --shape-handle fair: not used",
+        ),
         ("--method halstead --membrane 2 --thin-plate 0.5", ""),
+        ("--method fair-refinement --membrane 2 --thin-plate 0.5", ""),
         (
             "--format off",
             "--format without a mesh on standard input or output (-), for names tell their formats: not used",

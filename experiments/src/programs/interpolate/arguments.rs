@@ -6,6 +6,7 @@ use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, ValueHint};
 
 use crate::cli::{self, CommonFlags, MeshFlags, MonitorFlags, ReplaceFlags, STANDARD_STREAM, StopFlags, WHICH_METHOD};
+use limitlab::interpolate::halstead::Weights;
 use limitlab::mesh::order::Order;
 use limitlab::schemes::Refinement;
 use limitlab::solvers::Method;
@@ -44,7 +45,8 @@ pub struct Arguments {
     pub picture: Option<PathBuf>,
     /// auto, lu, cholesky, ldlt, jacobi, thall, gauss-seidel, sor, ssor, pia, w-pia, chebyshev, cg, pcg-jacobi,
     /// pcg-ssor, pcg-ic0, anderson, heavy-ball; two-phase (Zheng & Cai's own sweeps, with --scheme zheng-cai); halstead (the fairest
-    /// surface, with --scheme catmull-clark: a control mesh two refinements down); butterfly and labsik-greiner (with
+    /// surface, with --scheme catmull-clark: a control mesh two refinements down); fair-refinement (the fairest first refined
+    /// mesh, with --scheme zheng-cai: the Doo-Sabin control mesh one refinement down); butterfly and labsik-greiner (with
     /// --subdivide: schemes that pass through the vertices of triangle meshes with no system solved). auto is
     /// chebyshev in mixed precision without a stored matrix, cg where that makes no progress, and ldlt where neither
     /// does
@@ -97,7 +99,7 @@ pub struct ShapeFlags {
     #[arg(long)]
     pub write_normals: bool,
     /// Interpolate these vertices only: numbers and ranges A..B, separated by commas, or a file of them; the other
-    /// control points stay where they are, or with --method halstead go where the surface is fairest
+    /// control points stay where they are, or with --method halstead and fair-refinement go where the surface is fairest
     #[arg(long, value_name = "LIST|FILE")]
     pub vertices: Option<String>,
     /// Normals of the surface at given points: a file with lines `vertex nx ny nz`, or a mesh file with normals
@@ -114,8 +116,8 @@ pub struct ShapeFlags {
     #[arg(long, value_name = "L", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8), requires = "normals")]
     pub normal_levels: u8,
     /// Scale the faces of interpolated vertices about their points after the first refinement: a positive number,
-    /// or a file with lines `vertex number` (schemes zheng-cai and nasri)
-    #[arg(long, value_name = "S|FILE", allow_negative_numbers = true)]
+    /// a file with lines `vertex number`, or fair, the numbers of the fairest surface (schemes zheng-cai and nasri)
+    #[arg(long, value_name = "S|FILE|fair", allow_negative_numbers = true)]
     pub shape_handle: Option<String>,
     /// Lin & Luo's unified √3 scheme, no system solved: α from 0 (approximating) over 1 (interpolating) to 2, a number
     /// or a file with lines `vertex number` (others 0); with --vertices, those have α = 1
@@ -127,12 +129,25 @@ pub struct ShapeFlags {
     /// --method two-phase stops at a largest update of this part of the bounding box's diagonal, 0.003 unless told
     #[arg(long, value_name = "T", value_parser = cli::positive)]
     pub eps: Option<f64>,
-    /// Weight of the thin-plate energy in --method halstead, 0 or more and 1 unless told
+    /// Weight of the thin-plate energy in --method halstead and fair-refinement and in --shape-handle fair, 0 or more and 1
+    /// unless told
     #[arg(long, value_name = "W", allow_negative_numbers = true)]
     pub thin_plate: Option<f64>,
-    /// Weight of the membrane energy in --method halstead, positive and 1 unless told
+    /// Weight of the membrane energy there, positive and 1 unless told
     #[arg(long, value_name = "W", value_parser = cli::positive)]
     pub membrane: Option<f64>,
+}
+
+impl ShapeFlags {
+    /// Whether the shape handles are those of the fairest surface.
+    pub fn has_fair_handles(&self) -> bool {
+        self.shape_handle.as_deref().is_some_and(|text| names::same(text, "fair"))
+    }
+
+    /// Of the energies.
+    pub fn weights(&self) -> Weights {
+        Weights { thin_plate: self.thin_plate.unwrap_or(1.0), membrane: self.membrane.unwrap_or(1.0) }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -141,6 +156,7 @@ pub enum Choice {
     Solver(Method<'static>),
     TwoPhase,
     Halstead,
+    FairRefinement,
     /// A scheme that keeps its vertices.
     Keeping(Refinement),
 }
@@ -150,6 +166,7 @@ fn choice(text: &str) -> Result<Choice> {
         ("auto", Choice::Auto),
         ("two-phase", Choice::TwoPhase),
         ("halstead", Choice::Halstead),
+        ("fair-refinement", Choice::FairRefinement),
         ("butterfly", Choice::Keeping(Refinement::Butterfly)),
         ("labsik-greiner", Choice::Keeping(Refinement::LabsikGreiner)),
     ];

@@ -115,7 +115,7 @@ fn solved(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -> R
             order = arguments.order.order(input.surface.mesh(), input.surface.incidence());
             Some(method.in_order(Some(&order)))
         }
-        Choice::Auto | Choice::TwoPhase | Choice::Halstead | Choice::Keeping(_) => None,
+        Choice::Auto | Choice::TwoPhase | Choice::Halstead | Choice::FairRefinement | Choice::Keeping(_) => None,
     };
     let Stop { tolerance, max_iterations } = stop;
     let interpolated = per_vertex.interpolated.as_deref();

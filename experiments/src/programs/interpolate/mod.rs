@@ -17,6 +17,7 @@ use crate::studies::pictures;
 
 use limitlab::Result;
 use limitlab::error::Error;
+use limitlab::interpolate::fair_refinement::FirstFairness;
 use limitlab::interpolate::surface::check;
 use limitlab::mesh::Mesh;
 use limitlab::mesh::features::Tags;
@@ -29,7 +30,7 @@ pub use arguments::Arguments;
 use arguments::{Choice, conflict};
 use control::control_mesh;
 use summary::print_summary;
-use surfaces::{fairest, keeping, leave, refine, request, require_finite, unified};
+use surfaces::{fair_refinement, fairest, keeping, leave, refine, request, require_finite, shaped, unified};
 use vertex_options::VertexOptions;
 
 /// Runs the program.
@@ -58,6 +59,16 @@ pub fn main(mut arguments: Arguments, provenance: Provenance) -> ExitCode {
             conflict("--method halstead gives a mesh two refinements down: use --subdivide 2 or more, or leave it out");
         }
     }
+    if arguments.method == Choice::FairRefinement {
+        if *arguments.mesh.scheme.get_or_insert(Scheme::ZhengCai) != Scheme::ZhengCai {
+            conflict("--method fair-refinement belongs to --scheme zheng-cai");
+        }
+        if arguments.shape.shape_handle.is_some() {
+            conflict(
+                "--method fair-refinement chooses the whole of the faces that shape handles scale: leave --shape-handle out",
+            );
+        }
+    }
     if let Choice::Keeping(scheme) = arguments.method {
         let shape = &arguments.shape;
         if arguments.mesh.scheme.is_some() {
@@ -74,9 +85,12 @@ pub fn main(mut arguments: Arguments, provenance: Provenance) -> ExitCode {
         // Its topology is that of the scheme which is named where none is.
         arguments.mesh.scheme = Some(Scheme::Loop);
     }
-    if arguments.picture.is_some() && matches!(arguments.method, Choice::Halstead | Choice::Keeping(_)) {
+    if arguments.picture.is_some()
+        && matches!(arguments.method, Choice::Halstead | Choice::FairRefinement | Choice::Keeping(_))
+    {
         conflict(
-            "--picture shows the control mesh of a system: leave it out with halstead, butterfly and labsik-greiner",
+            "--picture shows the control mesh of a system: leave it out with halstead, fair-refinement, butterfly and \
+             labsik-greiner",
         );
     }
     if arguments.output.as_os_str() == STANDARD_STREAM {
@@ -112,9 +126,9 @@ fn remark_on_idle(arguments: &Arguments) {
         let flags = [("--ite-max", shape.ite_max.is_some()), ("--eps", shape.eps.is_some())];
         idle(&flags, "--method two-phase");
     }
-    if *method != Choice::Halstead {
+    if !matches!(*method, Choice::Halstead | Choice::FairRefinement) && !shape.has_fair_handles() {
         let flags = [("--thin-plate", shape.thin_plate.is_some()), ("--membrane", shape.membrane.is_some())];
-        idle(&flags, "--method halstead");
+        idle(&flags, "--method halstead or fair-refinement, or --shape-handle fair");
     }
     if arguments.input != STANDARD_STREAM && arguments.output.as_os_str() != STANDARD_STREAM {
         idle(
@@ -207,7 +221,7 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
         _ => input.scheme.refinement(),
     };
     refinement.check_size(&input.surface, arguments.shape.subdivide.into()).map_err(|e| input.named(e))?;
-    let per_vertex = VertexOptions::read(&arguments.shape, &input)?;
+    let mut per_vertex = VertexOptions::read(&arguments.shape, &input)?;
     let named = |e: Error| match e {
         Error::Io { .. } | Error::Parse { .. } | Error::Memory { .. } => e,
         other => input.named(other),
@@ -216,18 +230,27 @@ fn run(arguments: &Arguments, provenance: &Provenance) -> Result<()> {
     let mut result = match (&per_vertex.alpha, arguments.method) {
         (Some(alpha), _) => unified(arguments, &input, alpha).map_err(named)?,
         (None, Choice::Halstead) => fairest(arguments, &input, &per_vertex).map_err(named)?,
+        (None, Choice::FairRefinement) => fair_refinement(arguments, &input, &per_vertex).map_err(named)?,
         (None, Choice::Keeping(scheme)) => keeping(arguments, &input, scheme).map_err(named)?,
         (None, _) => {
-            let request = request(arguments, &per_vertex);
-            check(&input.surface, input.scheme, &request).map_err(named)?;
+            check(&input.surface, input.scheme, &request(arguments, &per_vertex)).map_err(named)?;
+            let fairness = match arguments.shape.has_fair_handles() {
+                true => Some(FirstFairness::new(&input.surface).map_err(named)?),
+                false => None,
+            };
             let control = control_mesh(arguments, &input, &per_vertex)?;
+            let shaped = match &fairness {
+                Some(fairness) => Some(shaped(arguments, &input, fairness, &mut per_vertex, &control).map_err(named)?),
+                None => None,
+            };
+            let request = request(arguments, &per_vertex);
             if let Some(path) = &arguments.picture {
                 let (given, cage) = (&input.surface, input.surface.with_positions(control.points.clone()));
                 let title = input.subject().caption();
                 let figure = pictures::interpolation(title, given, cage, input.scheme, &request).map_err(named)?;
                 picture = Some((path, figure));
             }
-            refine(&input, &request, control).map_err(named)?
+            refine(&input, &request, control, shaped).map_err(named)?
         }
     };
     leave(&input.frame, &mut result);

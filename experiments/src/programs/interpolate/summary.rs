@@ -6,6 +6,7 @@ use crate::studies::histories;
 use glam::DVec3;
 use limitlab::Result;
 use limitlab::error::counted;
+use limitlab::schemes::Scheme;
 use limitlab::solvers::Recorded;
 use serde_json::{Value, json};
 
@@ -51,8 +52,22 @@ pub fn print_summary(
         errors.max,
         errors.mean
     ));
+    if let Some(shaped) = &result.shaped {
+        common.remark(format_args!(
+            "{}: shape handles of the fairest surface from {:.4} to {:.4}, by {}",
+            arguments.output_name(),
+            shaped.least,
+            shaped.largest,
+            counted(shaped.iterations, "iteration")
+        ));
+    }
     if is_control(arguments) {
-        common.remark(format_args!("its surface: {}", advice::of_tools(input.scheme)));
+        let shown_by = match arguments.method {
+            // A mesh that is refined by Doo-Sabin alone, as Nasri's.
+            Choice::FairRefinement => Scheme::Nasri,
+            _ => input.scheme,
+        };
+        common.remark(format_args!("its surface: {}", advice::of_tools(shown_by)));
         // Of the vertices that are written, those of faces.
         let placed = input.origin.as_ref().map_or(0, |origin| origin.places().flatten().count());
         if placed > input.surface.len() {
@@ -96,6 +111,11 @@ pub fn print_summary(
             "thin_plate": number(e.thin_plate),
             "membrane": number(e.membrane),
         })),
+        "shape_handles": result.shaped.as_ref().map_or(Value::Null, |shaped| json!({
+            "least": number(shaped.least),
+            "largest": number(shaped.largest),
+            "iterations": shaped.iterations,
+        })),
         "seconds": {
             "read": number(input.read_seconds),
             "assemble": number(seconds.assemble),
@@ -112,7 +132,7 @@ pub fn print_summary(
 
 /// The errors of the iterates, or what another method measures them by.
 fn history(arguments: &Arguments, result: &Finished) -> Value {
-    if arguments.method != Choice::Halstead {
+    if !matches!(arguments.method, Choice::Halstead | Choice::FairRefinement) {
         return histories::json(&result.history);
     }
     let entry = |at: &Recorded| {

@@ -4,14 +4,17 @@ use std::time::Instant;
 
 use crate::cli::{Input, advice};
 use limitlab::Result;
-use limitlab::error::{Error, counted};
-use limitlab::interpolate::halstead::{self, Energies, Fairness, Solver, Weights, fit_watched};
+use limitlab::error::{Error, counted, short};
+use limitlab::interpolate::fair_refinement::{self, FirstFairness, fair_handles};
+use limitlab::interpolate::halstead::{self, Energies, Fairness, Solver, fit_watched};
 use limitlab::interpolate::lin_luo;
 use limitlab::interpolate::normals::Rotation;
 use limitlab::interpolate::surface::{SurfaceMesh, SurfaceOptions, surface};
+use limitlab::interpolate::zheng_cai::{self, Constraints, FirstRefinement, PhaseOne};
 use limitlab::mesh::frame::Frame;
-use limitlab::schemes::Refinement;
-use limitlab::solvers::{Errors, Outcome, Recorded, Step};
+use limitlab::schemes::doo_sabin::CornerRule;
+use limitlab::schemes::{Refinement, Scheme};
+use limitlab::solvers::{Errors, Outcome, Recorded, Report, Step, Stop};
 
 use super::arguments::Arguments;
 use super::control::{Control, Seconds, Shown};
@@ -23,11 +26,21 @@ pub struct Finished {
     pub iterations: usize,
     pub status: &'static str,
     pub errors: Errors,
-    /// Of the solution: empty where nothing iterates. By halstead steps in the place of errors.
+    /// Of the solution: empty where nothing iterates. By halstead and fair-refinement steps in the place of errors.
     pub history: Vec<Recorded>,
     pub tolerance: f64,
     pub fairness: Option<Energies>,
+    /// Those of the fairest surface.
+    pub shaped: Option<Shaped>,
     pub seconds: Seconds,
+}
+
+/// Shape handles of the fairest surface.
+pub struct Shaped {
+    pub least: f64,
+    pub largest: f64,
+    pub iterations: usize,
+    energies: Energies,
 }
 
 /// What is asked of the surface of a control mesh.
@@ -46,7 +59,7 @@ pub fn request<'a>(arguments: &Arguments, per_vertex: &'a VertexOptions) -> Surf
     }
 }
 
-pub fn refine(input: &Input, request: &SurfaceOptions, control: Control) -> Result<Finished> {
+pub fn refine(input: &Input, request: &SurfaceOptions, control: Control, shaped: Option<Shaped>) -> Result<Finished> {
     let start = Instant::now();
     let points = input.surface.positions();
     let control_surface = input.surface.with_positions(control.points);
@@ -61,9 +74,58 @@ pub fn refine(input: &Input, request: &SurfaceOptions, control: Control) -> Resu
         errors: control.errors,
         history: control.history,
         tolerance: control.tolerance,
-        fairness: None,
+        fairness: shaped.as_ref().map(|shaped| shaped.energies),
+        shaped,
         seconds,
     })
+}
+
+/// Sets the handles of interpolated vertices to those of the fairest surface.
+pub fn shaped(
+    arguments: &Arguments,
+    input: &Input,
+    fairness: &FirstFairness,
+    per_vertex: &mut VertexOptions,
+    control: &Control,
+) -> Result<Shaped> {
+    let stop = input.stop(&arguments.stop)?;
+    let rule = input.scheme.first_rule().unwrap_or(CornerRule::DooSabin);
+    let wishes = Constraints { handles: None, ..per_vertex.constraints() };
+    let points = input.surface.positions();
+    let control = input.surface.with_positions(control.points.clone());
+    let first = FirstRefinement::new(&control, rule, points, &wishes)?.surface;
+    let mut shown = Shown::of("step", arguments, input, stop.tolerance);
+    let watch = &mut |step: &Step| shown.see("fair handles", step);
+    let found = fair_handles(fairness, first.positions(), points, &wishes, arguments.shape.weights(), &stop, watch)?;
+    drop(shown);
+    require_fair("fair handles", input, &found.refined.report, &stop)?;
+    if let Some((v, &s)) = found.handles.iter().enumerate().find(|(_, s)| **s <= 0.0) {
+        return Err(Error::Computation(format!(
+            "vertex {v}: the shape handle of the fairest surface is {}, which turns its face over: use --method \
+             fair-refinement, or name handles",
+            short(s)
+        )));
+    }
+    let bounds = |(least, largest): (f64, f64), &s: &f64| (least.min(s), largest.max(s));
+    let (least, largest) = found.handles.iter().fold((f64::INFINITY, f64::NEG_INFINITY), bounds);
+    per_vertex.handles = Some(found.handles);
+    Ok(Shaped { least, largest, iterations: found.refined.report.iterations, energies: found.refined.energies })
+}
+
+/// A least energy that was not found gives no surface.
+fn require_fair(method: &str, input: &Input, report: &Report, stop: &Stop) -> Result<()> {
+    if report.outcome == Outcome::Converged {
+        return Ok(());
+    }
+    let unit = input.frame.scale();
+    Err(Error::Computation(format!(
+        "{method} ended as {} after {}, the largest step left {:.3e} against {:.3e}; {}",
+        report.outcome,
+        counted(report.iterations, "iteration"),
+        unit * report.last().max,
+        unit * stop.tolerance,
+        advice::of_unfair(report.outcome)
+    )))
 }
 
 /// The fairest control mesh, and its surface.
@@ -73,7 +135,7 @@ pub fn fairest(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions)
     let assemble = input.check_seconds + start.elapsed().as_secs_f64();
     let start = Instant::now();
     let flags = &arguments.shape;
-    let weights = Weights { thin_plate: flags.thin_plate.unwrap_or(1.0), membrane: flags.membrane.unwrap_or(1.0) };
+    let weights = flags.weights();
     let points = input.surface.positions();
     let stop = input.stop(&arguments.stop)?;
     let mut shown = Shown::of("step", arguments, input, stop.tolerance);
@@ -81,17 +143,7 @@ pub fn fairest(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions)
     let found = fit_watched(&fairness, points, &per_vertex.constraints(), weights, Solver::Iterations, &stop, watch)?;
     drop(shown);
     let report = found.report;
-    if report.outcome != Outcome::Converged {
-        let unit = input.frame.scale();
-        return Err(Error::Computation(format!(
-            "halstead ended as {} after {}, the largest step left {:.3e} against {:.3e}; {}",
-            report.outcome,
-            counted(report.iterations, "iteration"),
-            unit * report.last().max,
-            unit * stop.tolerance,
-            advice::of_unfair(report.outcome)
-        )));
-    }
+    require_fair("halstead", input, &report, &stop)?;
     let solve = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let request = SurfaceOptions {
@@ -110,6 +162,47 @@ pub fn fairest(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions)
         history: report.history,
         tolerance: stop.tolerance,
         fairness: Some(found.energies),
+        shaped: None,
+        seconds: Seconds { assemble, solve, subdivide: start.elapsed().as_secs_f64(), ..Seconds::default() },
+    })
+}
+
+/// The fairest first refined mesh, and its surface.
+pub fn fair_refinement(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions) -> Result<Finished> {
+    let start = Instant::now();
+    let (given, wishes) = (&input.surface, per_vertex.constraints());
+    let fairness = FirstFairness::new(given)?;
+    let assemble = input.check_seconds + start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let stop = input.stop(&arguments.stop)?;
+    let first = zheng_cai::interpolate(given, &wishes, &PhaseOne::default())?.first.surface;
+    let mut shown = Shown::of("step", arguments, input, stop.tolerance);
+    let watch = &mut |step: &Step| shown.see("fair-refinement", step);
+    let (begin, points, flags) = (first.positions(), given.positions(), &arguments.shape);
+    let found = fair_refinement::fairest(&fairness, begin, points, &wishes, flags.weights(), &stop, watch)?;
+    drop(shown);
+    let report = found.report;
+    require_fair("fair-refinement", input, &report, &stop)?;
+    let solve = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let request = SurfaceOptions {
+        levels: usize::from(flags.subdivide).saturating_sub(1),
+        limit: flags.limit,
+        normals: flags.write_normals,
+        ..SurfaceOptions::default()
+    };
+    // From the first refinement on the steps are Doo-Sabin's, as Nasri's are from the start.
+    let made = surface(first.with_positions(found.points), Scheme::Nasri, &[], &request)?;
+    Ok(Finished {
+        method: "fair-refinement",
+        made,
+        iterations: report.iterations,
+        status: report.outcome.name(),
+        errors: found.errors,
+        history: report.history,
+        tolerance: stop.tolerance,
+        fairness: Some(found.energies),
+        shaped: None,
         seconds: Seconds { assemble, solve, subdivide: start.elapsed().as_secs_f64(), ..Seconds::default() },
     })
 }
@@ -158,6 +251,7 @@ fn unsolved(method: &'static str, input: &Input, made: SurfaceMesh, start: Insta
         history: Vec::new(),
         tolerance: 0.0,
         fairness: None,
+        shaped: None,
         seconds: Seconds {
             assemble: input.check_seconds,
             subdivide: start.elapsed().as_secs_f64(),

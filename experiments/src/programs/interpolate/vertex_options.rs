@@ -38,7 +38,8 @@ impl VertexOptions {
                 *normal = normal.filter(|_| is_shaped(v));
             }
         }
-        let text = flags.shape_handle.as_deref();
+        // Those of the fairest surface are found from a surface with all at 1.
+        let text = if flags.has_fair_handles() { Some("1") } else { flags.shape_handle.as_deref() };
         let handles = text.map(|t| vertex_data::numbers(t, n, 1.0)).transpose()?;
         let mut handles = handles.map(|handles| input.joined(handles, 1.0));
         if text.is_some_and(|t| t.parse::<f64>().is_ok()) {
