@@ -55,7 +55,9 @@ class Solution:
     iterations: int
     """Updates of all vertices made."""
     history: Floats
-    """(k, 3): iteration, maximum and mean error of the limit points in the units of the points, first those of the start."""
+    """(k, 3): iteration, maximum and mean error of the limit points in the units of the points, first those of the start.
+    By `halstead`, which meets the points all the way, the steps that would take the energy to its least value along one
+    control point at a time."""
     tolerance: float
     """The maximum error that was allowed, in the same units."""
     setup_seconds: float = 0.0
@@ -72,6 +74,8 @@ class Solution:
     """The surface, if it was asked for."""
     energies: tuple[float, float] | None = None
     """Thin-plate and membrane energy of the fairest surface."""
+    errors: tuple[float, float] | None = None
+    """Maximum and mean error of the limit points, where the history holds steps."""
     normals_set: int | None = None
     """Given normals that had to be set: rings turned, faces tilted."""
     not_flattened: list[int] = field(default_factory=list)
@@ -90,12 +94,17 @@ class Solution:
     @property
     def max_error(self) -> float:
         """max_i ‖p_i − (A v)_i‖₂ at the end; 0 where nothing is solved."""
-        return float(self.history[-1, 1]) if len(self.history) else 0.0
+        return self._last(1)
 
     @property
     def mean_error(self) -> float:
         """The mean of the same."""
-        return float(self.history[-1, 2]) if len(self.history) else 0.0
+        return self._last(2)
+
+    def _last(self, column: int) -> float:
+        if self.errors is not None:
+            return self.errors[column - 1]
+        return float(self.history[-1, column]) if len(self.history) else 0.0
 
     def raise_for_status(self) -> None:
         """Raise `ConvergenceError` where there is no solution, and no callback stopped it."""

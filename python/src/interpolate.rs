@@ -6,13 +6,13 @@ use std::time::Instant;
 use glam::DVec3;
 use limitlab::analysis::failed::Failed;
 use limitlab::error::Result;
-use limitlab::interpolate::halstead::{self, Energies, Fairness, Weights, fit};
+use limitlab::interpolate::halstead::{self, Energies, Fairness, Solver, Weights, fit_watched};
 use limitlab::interpolate::lin_luo;
 use limitlab::interpolate::normals::Rotation;
 use limitlab::interpolate::surface::{SurfaceMesh, SurfaceOptions, check, surface};
 use limitlab::interpolate::zheng_cai::{self, Constraints, PhaseOne, Sweep};
 use limitlab::interpolate::{Options, interpolate_watched, limit_points};
-use limitlab::mesh::Surface;
+use limitlab::mesh::{Surface, diagonal};
 use limitlab::schemes::{Refinement, Scheme};
 use limitlab::solvers::{Errors, Method, Outcome, Recorded, Report, Solution, Step, Stop};
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
@@ -108,6 +108,8 @@ struct Found {
     /// A control mesh that has other faces than the given mesh.
     fine: Option<Surface>,
     fairness: Option<Energies>,
+    /// Of the limit points, where the history holds steps.
+    errors: Option<Errors>,
     made: Option<SurfaceMesh>,
 }
 
@@ -120,6 +122,7 @@ impl Found {
             tolerance: 0.0,
             fine: None,
             fairness: None,
+            errors: None,
             made: Some(made),
         }
     }
@@ -264,7 +267,7 @@ impl Run<'_> {
             Way::Auto => self.solved(None, watch),
             Way::Solver(method) => self.solved(Some(method.in_order(Some(&self.order))), watch),
             Way::TwoPhase => self.two_phase(watch),
-            Way::Halstead => self.fairest(),
+            Way::Halstead => self.fairest(watch),
             Way::Keeping(refinement) => self.keeping(refinement),
         }
     }
@@ -287,7 +290,7 @@ impl Run<'_> {
         } else {
             None
         };
-        Ok(Found { solution, tolerance, fine: None, fairness: None, made })
+        Ok(Found { solution, tolerance, fine: None, fairness: None, errors: None, made })
     }
 
     fn two_phase(&self, watch: &mut Watch) -> Result<Found> {
@@ -313,15 +316,23 @@ impl Run<'_> {
         self.refined(Solution { solve_seconds, ..solution }, eps * self.surface.diagonal())
     }
 
-    fn fairest(&self) -> Result<Found> {
+    fn fairest(&self, watch: &mut Watch) -> Result<Found> {
         let begin = Instant::now();
         let fairness = Fairness::new(self.surface)?;
         let setup_seconds = begin.elapsed().as_secs_f64();
         let begin = Instant::now();
-        let found = fit(&fairness, self.points(), &self.request.constraints, self.weights)?;
+        let size = diagonal(self.points());
+        let stop = Stop { tolerance: halstead::fit::TOLERANCE * size, max_iterations: halstead::fit::MAX_ITERATIONS };
+        let see = &mut |step: &Step| watch.see("halstead", step);
+        let (wishes, way) = (&self.request.constraints, Solver::Iterations);
+        let found = fit_watched(&fairness, self.points(), wishes, self.weights, way, &stop, see)?.found()?;
         let solve_seconds = begin.elapsed().as_secs_f64();
-        let history = vec![Recorded { iteration: 1, errors: found.errors }];
-        let report = Report { outcome: Outcome::Converged, iterations: 1, history, detail: None };
+        // Where no smaller step can be told the surface is as fair as doubles have it.
+        let outcome = match found.report.outcome {
+            Outcome::Rounding => Outcome::Converged,
+            outcome => outcome,
+        };
+        let report = Report { outcome, ..found.report };
         let made = if self.wants_surface() {
             let levels = self.request.levels.saturating_sub(halstead::LEVELS);
             let (limit, normals) = (self.request.limit, self.request.normals);
@@ -332,7 +343,14 @@ impl Run<'_> {
         };
         let solution = solution(found.surface.positions().to_vec(), "halstead", report);
         let solution = Solution { setup_seconds, solve_seconds, ..solution };
-        Ok(Found { solution, tolerance: 0.0, fine: Some(found.surface), fairness: Some(found.energies), made })
+        Ok(Found {
+            solution,
+            tolerance: stop.tolerance,
+            fine: Some(found.surface),
+            fairness: Some(found.energies),
+            errors: Some(found.errors),
+            made,
+        })
     }
 
     /// Lin and Luo's unified √3 surface.
@@ -367,7 +385,7 @@ impl Run<'_> {
 
     /// What was found as a dictionary of arrays, in the units of the points as they were given.
     fn told<'py>(&self, py: Python<'py>, mesh: &PySurface, found: Found) -> PyResult<Bound<'py, PyDict>> {
-        let Found { solution, tolerance, fine, fairness, made } = found;
+        let Found { solution, tolerance, fine, fairness, errors, made } = found;
         let unit = mesh.frame.scale();
         let failed = match (self.way, solution.report.outcome) {
             (_, Outcome::Converged | Outcome::Stopped) | (Way::TwoPhase, _) => None,
@@ -383,6 +401,7 @@ impl Run<'_> {
         told.set_item("scheme", self.scheme.name())?;
         let energies = fairness.map(|e| (unit * unit * e.thin_plate, unit * unit * e.membrane));
         told.set_item("energies", energies)?;
+        told.set_item("errors", errors.map(|errors| (unit * errors.max, unit * errors.mean)))?;
         told.set_item("control", fine.map(|fine| mesh.described(py, fine)).transpose()?)?;
         let described = made.map(|made| -> PyResult<_> {
             told.set_item("normals_set", made.normals_set)?;

@@ -206,6 +206,14 @@ def test_the_fairest_surface(sphere: ll.Mesh) -> None:
     V, F = sphere
     found = ll.interpolate(V, F, method="halstead")
     assert found.energies and len(found.vertices) == len(ll.subdivide(V, F, levels=2).vertices)
+    # Every iterate with its steps, the errors of the limit points beside them.
+    seen = []
+    again = ll.interpolate(V, F, method="halstead", callback=lambda step: seen.append(step[:3]))
+    np.testing.assert_array_equal(found.history, again.history)
+    np.testing.assert_array_equal(np.array(seen)[:, 0], np.arange(found.iterations + 1))
+    np.testing.assert_array_equal(np.array(seen)[:-1], found.history[:-1])
+    assert found.iterations > 5 and found.history[-1, 1] <= found.tolerance < found.history[0, 1]
+    assert found.max_error < 1e-12
     np.testing.assert_allclose(ll.limit(found.vertices, found.faces)[: len(V)], V, atol=1e-9)
     heavy = ll.interpolate(V, F, method="halstead", membrane=100.0)
     assert heavy.energies[1] < found.energies[1] and heavy.energies[0] > found.energies[0]
