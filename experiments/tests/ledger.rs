@@ -92,7 +92,7 @@ fn a_quick_run_ends_with_one_screen_and_is_held_against_a_committed_one() {
         let words: Vec<&str> = line.split_whitespace().collect();
         assert!(words[0] == item && words[1].parse::<f64>().is_ok() && words[2] == "s", "{line}");
     }
-    assert_eq!(lines.len(), 21, "{lines:#?}");
+    assert_eq!(lines.len(), 22, "{lines:#?}");
     assert!(lines[0].ends_with("1 table of 5 rows"), "{}", lines[0]);
     // Verdicts with the claims that are not as printed, and where the rest is.
     let screen = text(&output.stdout);

@@ -95,6 +95,9 @@ pub const POPPING: List<()> = List {
     built_in: &[("icosahedron", ()), ("icosphere:1", ()), ("irregular-tri:300", ())],
 };
 
+/// Of the freedom of first refined meshes: the first in quick runs too.
+pub const FREEDOM: [Model; 5] = [LETTER, HORSE, BOB, HAT, SPOT];
+
 /// With the number of Catmull-Clark refinements.
 pub const LINES: List<usize> = List {
     models: &[

@@ -6,6 +6,7 @@ mod corpus;
 mod creases;
 mod darts;
 mod figures;
+mod freedom;
 mod line_preconditioner;
 mod methods;
 mod omega;
@@ -91,7 +92,7 @@ pub struct Arguments {
 }
 
 /// All items, in the order in which they run.
-const ITEMS: [Item; 21] = [
+const ITEMS: [Item; 22] = [
     pia::TABLE1,
     thall::ITERATIONS,
     zheng_cai::SECTION_3_5,
@@ -106,6 +107,7 @@ const ITEMS: [Item; 21] = [
     popping::POPPING,
     ripples::RIPPLES,
     rivals::RIVALS,
+    freedom::FREEDOM,
     open_meshes::OPEN_MESHES,
     open_decay::DECAY,
     darts::DARTS,

@@ -31,6 +31,7 @@ mod thall_surfaces;
 mod zheng_cai;
 mod zheng_cai_exact;
 mod zheng_cai_faces;
+mod zheng_cai_freedom;
 mod zheng_cai_fronts;
 mod zheng_cai_orders;
 mod zheng_cai_speed;
@@ -101,7 +102,13 @@ const PAPERS: [(char, &str); 5] = [
 /// All claims in the order of the ledger.
 pub fn all() -> impl Iterator<Item = &'static Claim> {
     let thall = [thall::CLAIMS, thall_masks::CLAIMS, thall_normals::CLAIMS];
-    let zheng_cai = [zheng_cai::CLAIMS, open::ZHENG_CAI, zheng_cai_exact::CLAIMS, zheng_cai_orders::CLAIMS];
+    let zheng_cai = [
+        zheng_cai::CLAIMS,
+        open::ZHENG_CAI,
+        zheng_cai_exact::CLAIMS,
+        zheng_cai_orders::CLAIMS,
+        zheng_cai_freedom::CLAIMS,
+    ];
     let pia = [pia::CLAIMS, open::PIA, pia_lemma::CLAIMS];
     let lin_luo = [lin_luo::CLAIMS, lin_luo_others::CLAIMS, lin_luo_varying::CLAIMS];
     let beyond = [smallest::CLAIMS, decay::CLAIMS, everywhere::CLAIMS];

@@ -1,7 +1,7 @@
 use super::*;
 
 /// The list of the papers' statements, and those found beside it.
-const IDS: [(char, usize); 5] = [('T', 36), ('Z', 31), ('P', 20), ('L', 17), ('B', 4)];
+const IDS: [(char, usize); 5] = [('T', 36), ('Z', 32), ('P', 20), ('L', 17), ('B', 4)];
 
 #[test]
 fn every_statement_is_in_the_ledger_once_and_in_order() {

@@ -17,7 +17,7 @@ use crate::programs::reproduce::context::Subject;
 use crate::programs::reproduce::corpus;
 
 /// Doo-Sabin until facets are no longer seen.
-fn surface(first: &Surface) -> Result<ShadedMesh> {
+pub fn surface(first: &Surface) -> Result<ShadedMesh> {
     let mut levels = 1;
     while levels < 5 && (first.faces().corners().len() << (2 * levels)) < FACES {
         levels += 1;

@@ -23,6 +23,7 @@ use limitlab::solvers::{Method, Stop, run as solve};
 
 use crate::programs::reproduce::context::{Context, Item, Question, Subject};
 use crate::programs::reproduce::corpus::Model;
+pub use doo_sabin::surface as doo_sabin_surface;
 use stand_ins::StandIn;
 
 pub const ALL: Item = Item {
@@ -181,7 +182,7 @@ fn control(subject: &Subject, system: &LimitSystem, method: Method, iterations: 
 
 /// The scheme's limit surface of a control mesh: as many refinements as [`FACES`] allows, then limit points and
 /// limit normals.
-fn limit_surface(scheme: Refinement, control: &Surface) -> Result<ShadedMesh> {
+pub fn limit_surface(scheme: Refinement, control: &Surface) -> Result<ShadedMesh> {
     let mut levels = 1;
     while levels < 5 && (control.faces().corners().len() << (2 * levels)) < FACES {
         levels += 1;
