@@ -88,7 +88,7 @@ fn gamma(m: f64) -> f64 {
 /// of their sums and of S are counted, as those of the factorization are (see the module). Of a system of other origin it is
 /// one about H and M as stored. `None` if five shifts fail: then the estimate was no end of the spectrum.
 ///
-/// One sparse factorization, or up to five, and four solutions. What rounding may hide is about 3·10⁻⁹ with N = 10⁶
+/// One sparse factorization, or up to five, and four solutions. What rounding may hide is some 10⁻⁹ with N = 10⁶
 /// vertices.
 ///
 /// # Errors
