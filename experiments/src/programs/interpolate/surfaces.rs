@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::cli::{Input, advice};
 use limitlab::Result;
 use limitlab::error::{Error, counted, short};
-use limitlab::interpolate::fair_refinement::{self, FirstFairness, fair_handles};
+use limitlab::interpolate::fair_refinement::{self, FairRefinement, FirstFairness, fair_handles};
 use limitlab::interpolate::halstead::{self, Energies, Fairness, Solver, fit_watched};
 use limitlab::interpolate::lin_luo;
 use limitlab::interpolate::normals::Rotation;
@@ -41,6 +41,7 @@ pub struct Shaped {
     pub largest: f64,
     pub iterations: usize,
     energies: Energies,
+    seconds: f64,
 }
 
 /// What is asked of the surface of a control mesh.
@@ -65,6 +66,7 @@ pub fn refine(input: &Input, request: &SurfaceOptions, control: Control, shaped:
     let control_surface = input.surface.with_positions(control.points);
     let made = surface(control_surface, input.scheme, points, request)?;
     let mut seconds = control.seconds;
+    seconds.solve += shaped.as_ref().map_or(0.0, |shaped| shaped.seconds);
     seconds.subdivide = start.elapsed().as_secs_f64();
     Ok(Finished {
         method: control.method,
@@ -88,6 +90,7 @@ pub fn shaped(
     per_vertex: &mut VertexOptions,
     control: &Control,
 ) -> Result<Shaped> {
+    let start = Instant::now();
     let stop = input.stop(&arguments.stop)?;
     let rule = input.scheme.first_rule().unwrap_or(CornerRule::DooSabin);
     let wishes = Constraints { handles: None, ..per_vertex.constraints() };
@@ -109,7 +112,8 @@ pub fn shaped(
     let bounds = |(least, largest): (f64, f64), &s: &f64| (least.min(s), largest.max(s));
     let (least, largest) = found.handles.iter().fold((f64::INFINITY, f64::NEG_INFINITY), bounds);
     per_vertex.handles = Some(found.handles);
-    Ok(Shaped { least, largest, iterations: found.refined.report.iterations, energies: found.refined.energies })
+    let FairRefinement { energies, report, .. } = found.refined;
+    Ok(Shaped { least, largest, iterations: report.iterations, energies, seconds: start.elapsed().as_secs_f64() })
 }
 
 /// A least energy that was not found gives no surface.
