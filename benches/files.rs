@@ -1,4 +1,18 @@
 //! Reading and writing meshes, with tobj on the same OBJ file: `cargo bench --bench files`.
+//!
+//! By hand, at 10⁶ vertices and as many quads, 17 digits a coordinate (OBJ 91 MB, OFF 89 MB), least of three in turn, on two
+//! cores that had other work too: milliseconds of the processor for all threads, before reading and writing was done in parts
+//! and on one thread, and since.
+//!
+//! | | before | in parts |
+//! |---|---|---|
+//! | OBJ, read / written | 390 / 333 | 207 / 190 |
+//! | OFF, read / written | 373 / 327 | 235 / 180 |
+//! | text PLY, read / written | 360 / 340 | 297 / 213 |
+//! | the OBJ by fast_obj (d620667, one thread), rapidobj (fe4c779, two), both in single precision, read | 159, 250 | |
+//! | the OBJ by trimesh 5.2, meshio 5.3, read | 3761, 7722 | |
+//!
+//! Of our 207 about 100 are the system's, which copies the file and clears memory.
 
 #![allow(missing_docs, reason = "the functions that criterion's macro writes")]
 
