@@ -91,17 +91,12 @@ fn iteration_matrices_have_their_eigenvalues_norms_and_pictures() {
     }
     assert!(out.path().join("spectrum-iteration-eigenvalues-torus-6x4-catmull-clark.csv").is_file());
 
-    let large = run(&["torus:30x30", "--iteration-matrix", "gauss-seidel"]);
-    let json: serde_json::Value = serde_json::from_slice(&large.stdout).expect("one JSON object");
-    assert_eq!(json["iteration_matrices"][0]["complete"], false);
-    assert!(json["iteration_matrices"][0]["residuals"][0].as_f64().is_some_and(|r| r < 1e-6));
-
     for (arguments, status) in [
         (&["cube", "--iteration-matrix", "cg"][..], 2),
         (&["cube", "--iteration-matrix", "sor:0"], 2),
         (&["cube", "--order", "bfs"], 2),
         (&["torus:50x50", "--iteration-matrix", "pia", "--full"], 1),
-        (&["torus:24x24", "--iteration-matrix", "pia", "--pseudospectra"], 1),
+        (&["torus:21x21", "--iteration-matrix", "pia", "--pseudospectra"], 1),
     ] {
         let refused = run(arguments);
         assert_eq!(refused.status.code(), Some(status), "{arguments:?}");

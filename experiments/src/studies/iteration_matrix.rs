@@ -104,6 +104,10 @@ impl Found {
         let rounding = system.len() as f64 * f64::EPSILON;
         found.eigenvalues = t.eigenvalues()?.into_iter().map(|value| RitzValue { value, residual: rounding }).collect();
         found.complete = true;
+        // First, as it is refused on the smallest meshes.
+        if wish.pseudospectra {
+            found.pseudospectrum = Some(Pseudospectrum::new(&t, found.radius())?);
+        }
         if small {
             found.powers = t.powers(POWERS, REDUCTION)?;
             found.norms = found.powers.first().copied().unwrap_or_default();
@@ -112,9 +116,6 @@ impl Found {
             for (slot, norm) in found.norms.iter_mut().zip(Norm::ALL) {
                 *slot = t.norm(norm)?;
             }
-        }
-        if wish.pseudospectra {
-            found.pseudospectrum = Some(Pseudospectrum::new(&t, found.radius())?);
         }
         Ok(found)
     }
