@@ -1,5 +1,9 @@
 //! Kernel of the matrix-free [`Operator`](super::Operator), for double and for single precision: rows of A from
 //! connectivity alone, with weights that follow from valence and face size.
+//!
+//! It is compiled for any x86-64 and not chosen by processor at run time: with all that a processor has (AVX-512, FMA) 29
+//! iterations on a million vertices took 0.142 s instead of 0.135. A row of single precision sums points that are a register
+//! each, from places that no instruction brings together.
 
 use std::ops::Range;
 
