@@ -33,3 +33,10 @@ pub fn filled<T: Copy + Send + Sync>(count: usize, value: T) -> Vec<T> {
     parallel::extend(&mut vector, count, |_| |_| value);
     vector
 }
+
+/// A copy in a [large] array, written by all threads.
+pub fn copied<T: Copy + Send + Sync>(values: &[T]) -> Vec<T> {
+    let mut vector = large(Vec::with_capacity(values.len()));
+    parallel::append(&mut vector, values);
+    vector
+}

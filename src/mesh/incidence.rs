@@ -247,7 +247,8 @@ pub(super) fn sorted_by(keys: &[u32], end: usize) -> (Vec<u32>, Vec<u32>) {
     let mut sorted = large(vec![0u32; keys.len()]);
     parallel::parts(split_rows(&offsets, share, &mut sorted), |rows, sorted| {
         let base = offsets[rows.start];
-        let mut next: Vec<u32> = offsets[rows.clone()].iter().map(|&o| o - base).collect();
+        let mut next = large(Vec::with_capacity(rows.len()));
+        next.extend(offsets[rows.clone()].iter().map(|&o| o - base));
         let first = rows.start as u32;
         for (&key, k) in keys.iter().zip(0..) {
             if let Some(slot) = next.get_mut(key.wrapping_sub(first) as usize) {

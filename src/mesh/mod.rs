@@ -40,7 +40,7 @@ pub mod weld;
 
 use std::sync::OnceLock;
 
-use crate::pages::filled;
+use crate::pages::{copied, filled};
 use crate::parallel;
 use glam::DVec3;
 use incidence::split_rows;
@@ -217,6 +217,17 @@ impl Faces {
     /// The vertex of every corner, to renumber vertices in place; the sizes of faces stay.
     pub fn corners_mut(&mut self) -> &mut [u32] {
         &mut self.corners
+    }
+
+    /// A copy, made by all threads.
+    pub(crate) fn copied(&self) -> Faces {
+        Faces {
+            count: self.count,
+            size: self.size,
+            offsets: copied(&self.offsets),
+            uniform_offsets: OnceLock::new(),
+            corners: copied(&self.corners),
+        }
     }
 
     /// The faces in another order, the k-th of them face `order[k]`, with the vertices that `corners` has in place of this

@@ -10,7 +10,7 @@ use super::incidence::split_rows;
 use super::numbering::{Numbering, add_up, inverse, rows_back};
 use super::topology::NONE;
 use super::{Faces, Incidence, Mesh, Surface, Topology};
-use crate::pages::large;
+use crate::pages::{copied, large};
 use crate::parallel;
 
 /// Vertices of one task.
@@ -49,7 +49,7 @@ impl Renumbered {
     fn shared_topology(&self) -> &Arc<Topology> {
         self.topology.get_or_init(|| {
             let (faces, incidence) = (&self.faces, &self.incidence);
-            let mut corners = incidence.corners().to_vec();
+            let mut corners = copied(incidence.corners());
             parallel::parts(split_rows(incidence.offsets(), CHUNK, &mut corners), |rows, mut part| {
                 for v in rows {
                     let (row, rest) = part.split_at_mut(incidence.face_count(v));
@@ -57,7 +57,7 @@ impl Renumbered {
                     part = rest;
                 }
             });
-            let incidence = Incidence::from_parts(incidence.offsets().to_vec(), corners, faces);
+            let incidence = Incidence::from_parts(copied(incidence.offsets()), corners, faces);
             Arc::new(Topology::of(Arc::new(incidence), faces))
         })
     }
@@ -118,7 +118,7 @@ impl Renumbered {
     /// The surface in this order, with points that are given in the order of the file. Its corners at a vertex come as in
     /// the file. All vertices count as smooth.
     pub(crate) fn surface(&self, points: &[DVec3]) -> Surface {
-        let mesh = Mesh::new(self.numbering.there(points), self.faces.clone());
+        let mesh = Mesh::new(self.numbering.there(points), self.faces.copied());
         Surface::near(mesh, Arc::clone(self.shared_topology()))
     }
 
