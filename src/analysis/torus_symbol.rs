@@ -202,7 +202,7 @@ pub fn front(scheme: Scheme, omega: f64, theta: [f64; 2]) -> Complex<f64> {
     1.0 - symbol(&stencil, theta) * omega / (before * omega + stencil[0].1)
 }
 
-/// max |T̂| of a [front](front) over the frequencies of an n × m torus.
+/// max |T̂| of a [front] over the frequencies of an n × m torus.
 pub fn front_radius(scheme: Scheme, omega: f64, [n, m]: [usize; 2]) -> f64 {
     let angle = |k: usize, n: usize| TAU * k as f64 / n as f64;
     let all = (0..n).flat_map(|k| (0..m).map(move |l| [angle(k, n), angle(l, m)]));

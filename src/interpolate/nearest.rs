@@ -1,4 +1,4 @@
-//! Interpolation by nearest points (Maekawa, Matsumoto & Namiki 2007, the [1] of PIA): every control point is moved by the difference
+//! Interpolation by nearest points (Maekawa, Matsumoto & Namiki 2007, reference 1 of PIA): every control point is moved by the difference
 //! between its given point and the point of the limit surface nearest to that, where PIA takes the vertex's own limit point. As PIA §1
 //! and §2 and the abstract of the paper tell it; the paper itself, and with it its local adjusting, which PIA says to be needless, was
 //! not at hand.

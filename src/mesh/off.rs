@@ -37,7 +37,7 @@ struct Header {
 /// have a line of their own.
 ///
 /// # Errors
-/// [`Error::Parse`] with the line: `4OFF`, `nOFF` and binary files, with the way out; what is no number; a face of
+/// [`Error::Parse`](crate::Error::Parse) with the line: `4OFF`, `nOFF` and binary files, with the way out; what is no number; a face of
 /// fewer than three corners; a file that ends early; data after the last face, for then the counts are wrong.
 ///
 /// ```

@@ -123,6 +123,9 @@ pub(crate) trait Output: Send + Sync + Sized {
     fn append(&mut self, parts: &[&Self]) -> bool;
 }
 
+/// Finds where the parts of as many rows as are wanted start, and how many rows each has.
+pub(crate) type Places<'a, S> = dyn Fn(&S, u64) -> Vec<(S, u64)> + 'a;
+
 /// Reads `count` rows, each by `read(source, row, out)`: the first alone; then as many as there are parts of by all
 /// threads, where `parts(source, wanted)` gives places with the number of rows from there on, and `follow` goes to a
 /// place; and the rest again one by one. What `read` refuses, it refuses as if it had read all rows one by one.
@@ -130,7 +133,7 @@ pub(crate) fn read_rows<S: Clone + Send + Sync, O: Output>(
     source: &mut S,
     count: u64,
     out: &mut O,
-    parts: &dyn Fn(&S, u64) -> Vec<(S, u64)>,
+    parts: &Places<S>,
     follow: &dyn Fn(&mut S, &S),
     read: &(dyn Fn(&mut S, u64, &mut O) -> Result<()> + Sync),
 ) -> Result<()> {

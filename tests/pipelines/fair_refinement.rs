@@ -44,7 +44,7 @@ fn some(surface: &Surface) -> (Vec<bool>, Vec<Option<DVec3>>) {
     let marks: Vec<bool> = (0..surface.len()).map(|v| v % 3 != 1).collect();
     let outward = limitlab::schemes::doo_sabin::limit_normals(CornerRule::ZhengCai, surface).unwrap();
     let lean = |v: usize| DVec3::new((v as f64).sin(), (3.0 * v as f64).cos(), (v as f64).cos());
-    let normal = |v: usize| (marks[v] && v % 2 == 0).then(|| 2.0 * outward[v] + 0.4 * lean(v));
+    let normal = |v: usize| (marks[v] && v.is_multiple_of(2)).then(|| 2.0 * outward[v] + 0.4 * lean(v));
     let normals = (0..surface.len()).map(normal).collect();
     (marks, normals)
 }

@@ -58,12 +58,12 @@ fn matrices_are_those_of_the_textbook_on_both_back_ends() {
             (Method::Thall, &identity - 0.5 * &scaled),
             (Method::Jacobi { omega: Some(0.7) }, &identity - 0.7 * &scaled),
         ];
-        for order in &orders {
-            let reverse: Vec<u32> = order.iter().rev().copied().collect();
-            let order = Some(&order[..]);
-            cases.push((Method::GaussSeidel { order }, sweep(&system, 1.0, order.unwrap())));
-            cases.push((Method::Sor { omega: 1.4, order }, sweep(&system, 1.4, order.unwrap())));
-            let both = sweep(&system, 0.8, &reverse) * sweep(&system, 0.8, order.unwrap());
+        for sweeps in &orders {
+            let reverse: Vec<u32> = sweeps.iter().rev().copied().collect();
+            let order = Some(&sweeps[..]);
+            cases.push((Method::GaussSeidel { order }, sweep(&system, 1.0, sweeps)));
+            cases.push((Method::Sor { omega: 1.4, order }, sweep(&system, 1.4, sweeps)));
+            let both = sweep(&system, 0.8, &reverse) * sweep(&system, 0.8, sweeps);
             cases.push((Method::Ssor { omega: 0.8, order }, both));
         }
         cases.push((Method::GaussSeidel { order: None }, sweep(&system, 1.0, &orders[0])));

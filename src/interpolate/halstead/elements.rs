@@ -271,6 +271,9 @@ impl Kind {
     }
 }
 
+/// What is made of a block that is done: of its number, x, and the block of y.
+pub(in crate::interpolate) type OfBlock<'a, R> = dyn Fn(usize, &[DVec3], &mut [DVec3]) -> R + Sync + 'a;
+
 impl Elements {
     /// `owner`: for each vertex of `fine` one of the given mesh.
     ///
@@ -443,7 +446,7 @@ impl Elements {
         forms: &[Vec<f64>],
         x: &[DVec3],
         y: &mut [DVec3],
-        then: &(dyn Fn(usize, &[DVec3], &mut [DVec3]) -> R + Sync),
+        then: &OfBlock<R>,
     ) -> Vec<R> {
         parallel::parts(self.parts(y), |k, part| {
             let block = &self.blocks[k.start];

@@ -86,7 +86,7 @@ fn methods(subject: &Subject, system: &LimitSystem, scheme: Scheme, orders: &[Or
     let stop = Stop { tolerance: TOLERANCE * subject.surface.diagonal(), max_iterations: 10_000 };
     let mut rows = Vec::new();
     let mut one = |method: Method, order: &str| -> Result<()> {
-        let method = with_spectrum(system, method, &|| Ok(spectra.clone()))?;
+        let method = with_spectrum(system, method, &|| Ok(spectra))?;
         // They take the longest: of SOR alone.
         let pseudospectra = !quick && system.len() <= SMALL && matches!(method, Method::Sor { .. });
         let wish = Wish { full: false, pseudospectra };

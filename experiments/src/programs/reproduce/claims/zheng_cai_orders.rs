@@ -210,10 +210,9 @@ fn orders(lab: &Lab) -> Result<Finding> {
     ];
     for scheme in [Scheme::CatmullClark, Scheme::Nasri, Scheme::ZhengCai, Scheme::Loop] {
         let name = scheme.name();
-        let (torus, size, colours, colour): (_, usize, usize, fn([i64; 2]) -> usize) = match scheme.needs_triangles() {
-            true => ("tri-torus:9x9", 9, 3, of_triangles),
-            false => ("torus:8x8", 8, 4, of_quads),
-        };
+        let triangles = scheme.needs_triangles();
+        let (torus, size, colours) = if triangles { ("tri-torus:9x9", 9, 3) } else { ("torus:8x8", 8, 4) };
+        let colour = if triangles { of_triangles } else { of_quads };
         let subject = exact(torus)?;
         let system = subject.system(scheme)?;
         let row = Row::new(&system, size);
