@@ -12,7 +12,7 @@
 //! | the OBJ by fast_obj (d620667, one thread), rapidobj (fe4c779, two), both in single precision, read | 159, 250 | |
 //! | the OBJ by trimesh 5.2, meshio 5.3, read | 3761, 7722 | |
 //!
-//! Of our 207 about 100 are the system's, which copies the file and clears memory.
+//! The system takes some 45 % of a read, to copy the file and to clear memory.
 
 #![allow(missing_docs, reason = "the functions that criterion's macro writes")]
 

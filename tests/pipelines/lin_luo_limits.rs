@@ -3,10 +3,11 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
-use limitlab::analysis::splitting::{LocalScheme, SplittingMatrix, condition_over_alpha};
+use limitlab::analysis::splitting::{Layout, LocalScheme, SplittingMatrix, condition_over_alpha};
 use limitlab::interpolate::lin_luo::limit::limits;
 use limitlab::interpolate::lin_luo::surface::refine_n;
-use limitlab::mesh::Surface;
+use limitlab::mesh::random::random_points;
+use limitlab::mesh::{Mesh, Surface};
 use limitlab::schemes::sqrt3;
 
 use crate::common::pipelines::{ROUNDING, distance, noisy_surface};
@@ -151,4 +152,21 @@ fn degenerate_stars_have_limits_and_no_normals() {
     assert!(found.normals.iter().all(|n| *n == DVec3::ZERO));
     let error = limits(&surface, &vec![2.5; surface.len()]).unwrap_err();
     assert!(error.to_string().contains("at vertex 0"));
+}
+
+/// At valence 3 the surface comes to a point for α > 0.7992, whatever is beside it: its star turns as it shrinks, so that at
+/// some round it may lie in a plane.
+#[test]
+fn a_vertex_of_valence_3_has_a_normal_only_below_its_limit_of_alpha() {
+    for (own, expected) in [(0.7, true), (1.0, false), (1.4, false)] {
+        for seed in 0..40 {
+            let mut points = random_points(20, 2 * seed);
+            points.truncate(Layout::Triangles.len(3, 3) + 1);
+            let mut alpha: Vec<f64> = random_points(20, 2 * seed + 1).iter().map(|p| 0.25 + 0.25 * p.x).collect();
+            alpha[0] = own;
+            let star = Surface::new(Mesh::new(points, Layout::Triangles.closed(3, 3))).unwrap();
+            let found = limits(&star, &alpha).unwrap();
+            assert_eq!(found.normals[0] != DVec3::ZERO, expected, "α = {own}, {seed}");
+        }
+    }
 }

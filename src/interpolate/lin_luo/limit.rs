@@ -21,6 +21,9 @@ const RINGS: usize = 3;
 /// Rounds. The star's radius falls by about 3 in each, so that what is left after these is below rounding, and what
 /// is left of the differences between the α of a star by at least (4/9)^ROUNDS < 1e-14.
 const ROUNDS: usize = 40;
+/// The height of a star is looked at over so many rounds, since modes with complex eigenvalues turn, and may lie in the
+/// plane for a moment.
+const WINDOW: usize = 8;
 /// The vertex has a tangent plane if the second half of the rounds makes its star flatter by this factor at least, ...
 const FLATTER: f64 = 0.5;
 /// ... or it is as flat as this, in parts of its radius.
@@ -161,7 +164,7 @@ impl Round {
         let mut moved = DVec3::ZERO;
         let mut scale = 1.0;
         let mut normals = [DVec3::ZERO; 2];
-        let mut flatness = f64::INFINITY;
+        let (mut halfway, mut last) = (0.0f64, 0.0f64);
         for round in 1..=ROUNDS {
             // The apex that closes the star is out of reach of what is looked at.
             work.points.push(DVec3::ZERO);
@@ -179,17 +182,20 @@ impl Round {
             work.points.extend(work.star.iter().map(|(p, _)| 3.0 * (*p - step)));
             work.alpha.clear();
             work.alpha.extend(work.star.iter().map(|(_, a)| a));
-            if round == ROUNDS / 2 || round >= ROUNDS - 1 {
+            let half = (ROUNDS / 2 - WINDOW..ROUNDS / 2).contains(&(round - 1));
+            if half || round > ROUNDS - WINDOW {
                 normals = [normals[1], Tangents::of_ring(&work.points[1..=n]).normal()];
-            }
-            if round == ROUNDS / 2 {
-                flatness = height(&work.points, normals[1]);
+                let height = height(&work.points, normals[1]);
+                if half {
+                    halfway = halfway.max(height);
+                } else {
+                    last = last.max(height);
+                }
             }
         }
         let [before, normal] = normals;
-        let last = height(&work.points, normal);
         let plane =
-            normal != DVec3::ZERO && angle(before, normal) < STEADY && (last < FLAT || last < FLATTER * flatness);
+            normal != DVec3::ZERO && angle(before, normal) < STEADY && (last < FLAT || last < FLATTER * halfway);
         (moved, if plane { normal } else { DVec3::ZERO })
     }
 }
