@@ -64,8 +64,8 @@ pub struct FairRefinement {
 /// let first = interpolate(&surface, &all, &PhaseOne::default())?.first.surface;
 /// let fairness = FirstFairness::new(&surface)?;
 /// let stop = Stop { tolerance: 1e-10, max_iterations: 1000 };
-/// let mut watch = |_: &_| ControlFlow::Continue(());
-/// let fair = fairest(&fairness, first.positions(), surface.positions(), &all, weights, &stop, &mut watch)?;
+/// let (start, points) = (first.positions(), surface.positions());
+/// let fair = fairest(&fairness, start, points, &all, weights, &stop, &mut |_| ControlFlow::Continue(()))?;
 /// assert!(fair.errors.max < 1e-12);
 /// assert!(fair.energies.weighted(weights) < fairness.energies(first.positions()).weighted(weights));
 /// # Ok::<(), limitlab::Error>(())
