@@ -1,17 +1,53 @@
 //! Parallel loops over arrays, cut into chunks of a fixed length, so that what is summed up by chunks does
 //! not depend on the number of threads.
 //!
-//! What divides, steals and joins work is compiled once for a type of element, and the work of a chunk called through a
+//! What divides, steals and joins work is compiled once, over the numbers of chunks, and the work of a chunk called through a
 //! pointer. As chains of parallel iterators, each of which is compiled for itself, loops took two fifths of the
-//! library's machine code, and of its build.
+//! library's machine code, and of its build; compiled once for a type of element, still an eighth.
 
+use std::marker::PhantomData;
 use std::mem::MaybeUninit;
 use std::ops::Range;
+use std::slice;
 
 use rayon::prelude::*;
 
 /// Elements of a chunk where nothing is summed up.
 const CHUNK: usize = 4096;
+
+/// Calls `body(k)` for every k below `count`, once each.
+fn share(count: usize, body: &(dyn Fn(usize) + Sync)) {
+    (0..count).into_par_iter().for_each(body);
+}
+
+/// An array whose parts threads take, each once.
+struct Shared<'a, T> {
+    first: *mut T,
+    length: usize,
+    array: PhantomData<&'a mut [T]>,
+}
+
+// SAFETY: all that it gives another thread are exclusive references to different elements, which may be sent.
+unsafe impl<T: Send> Sync for Shared<'_, T> {}
+
+impl<'a, T> Shared<'a, T> {
+    fn new(array: &'a mut [T]) -> Self {
+        Shared { first: array.as_mut_ptr(), length: array.len(), array: PhantomData }
+    }
+
+    /// The k-th part of `size` elements, the last of fewer.
+    ///
+    /// # Safety
+    /// No part may be taken twice, nor parts of different sizes of one array.
+    #[allow(clippy::mut_from_ref)]
+    unsafe fn part(&self, k: usize, size: usize) -> &mut [T] {
+        let (start, end) = (k * size, self.length.min((k + 1) * size));
+        assert!(start <= end, "a part of the array");
+        // SAFETY: start ≤ end ≤ length, so that the elements are in the array, which is borrowed exclusively for 'a; by the
+        // contract nothing else refers to them.
+        unsafe { slice::from_raw_parts_mut(self.first.add(start), end - start) }
+    }
+}
 
 /// Calls `body(first, part)` for the chunks of `a` of `size` elements, `first` the index of the first of them.
 ///
@@ -25,7 +61,10 @@ pub fn chunks<A: Send>(a: &mut [A], size: usize, body: impl Fn(usize, &mut [A]) 
             }
             return;
         }
-        a.par_chunks_mut(size).enumerate().for_each(|(k, a)| body(k * size, a));
+        let count = a.len().div_ceil(size);
+        let a = Shared::new(a);
+        // SAFETY: every k comes once, and all parts have this size.
+        share(count, &|k| body(k * size, unsafe { a.part(k, size) }));
     }
     shared(a, size, &body);
 }
@@ -59,8 +98,13 @@ pub fn chunks_of_two<A: Send, B: Send, S: Send>(
             [] => {}
             [sum] => body(0, a, b, sum),
             _ => {
-                let parts = a.par_chunks_mut(size).zip(b.par_chunks_mut(size)).zip(sums);
-                parts.enumerate().for_each(|(k, ((a, b), sum))| body(k * size, a, b, sum));
+                let count = sums.len();
+                let (a, b, sums) = (Shared::new(a), Shared::new(b), Shared::new(sums));
+                share(count, &|k| {
+                    // SAFETY: every k comes once, and all parts of an array have one size.
+                    let (a, b, sum) = unsafe { (a.part(k, size), b.part(k, size), sums.part(k, 1)) };
+                    body(k * size, a, b, &mut sum[0]);
+                });
             }
         }
     }
@@ -69,19 +113,37 @@ pub fn chunks_of_two<A: Send, B: Send, S: Send>(
     shared(a, b, size, sums, &body);
 }
 
+/// The vector of `item(k)` for all k below `count`, each called for through a pointer. What is made is not dropped if one panics.
+fn collect_shared<R: Send>(count: usize, item: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
+    if count <= 1 {
+        return (0..count).map(item).collect();
+    }
+    let mut vector = Vec::with_capacity(count);
+    let places = Shared::new(&mut vector.spare_capacity_mut()[..count]);
+    share(count, &|k| {
+        // SAFETY: every k comes once.
+        let place = unsafe { places.part(k, 1) };
+        place[0].write(item(k));
+    });
+    // SAFETY: the memory was reserved, and each of the `count` places written: `share` comes to every k or panics.
+    unsafe { vector.set_len(count) };
+    vector
+}
+
 /// What `body` makes of the ranges of `size` indices below `count`, in their order.
 ///
 /// # Panics
 /// If `size` is 0.
 pub fn map<R: Send>(count: usize, size: usize, body: impl Fn(Range<usize>) -> R + Sync) -> Vec<R> {
-    fn shared<R: Send>(count: usize, size: usize, body: &(dyn Fn(Range<usize>) -> R + Sync)) -> Vec<R> {
-        let range = |k: usize| k * size..count.min((k + 1) * size);
-        if count <= size {
-            return (0..count.div_ceil(size)).map(|k| body(range(k))).collect();
-        }
-        (0..count.div_ceil(size)).into_par_iter().map(|k| body(range(k))).collect()
-    }
-    shared(count, size, &body)
+    collect_shared(count.div_ceil(size), &|k| body(k * size..count.min((k + 1) * size)))
+}
+
+/// What `item` makes of every element, in their order, or the first error among these.
+///
+/// # Errors
+/// Those of `item`.
+pub fn try_map<T: Sync, R: Send, E: Send>(items: &[T], item: impl Fn(&T) -> Result<R, E> + Sync) -> Result<Vec<R>, E> {
+    collect_shared(items.len(), &|k| item(&items[k])).into_iter().collect()
 }
 
 /// What `body(range, part)` makes of parts of an array, each with the rows that it belongs to, in their order.
@@ -89,11 +151,14 @@ pub fn parts<A: Send, R: Send>(
     parts: Vec<(Range<usize>, &mut [A])>,
     body: impl Fn(Range<usize>, &mut [A]) -> R + Sync,
 ) -> Vec<R> {
-    type Body<'a, A, R> = &'a (dyn Fn(Range<usize>, &mut [A]) -> R + Sync);
-    fn shared<A: Send, R: Send>(parts: Vec<(Range<usize>, &mut [A])>, body: Body<A, R>) -> Vec<R> {
-        parts.into_par_iter().map(|(range, part)| body(range, part)).collect()
-    }
-    shared(parts, &body)
+    let mut parts = parts;
+    let count = parts.len();
+    let parts = Shared::new(&mut parts);
+    collect_shared(count, &|k| {
+        // SAFETY: every k comes once.
+        let (range, part) = &mut unsafe { parts.part(k, 1) }[0];
+        body(range.clone(), part)
+    })
 }
 
 /// Calls `visit(i)` for all i below `count`.

@@ -26,7 +26,6 @@ use std::sync::Arc;
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rayon::prelude::*;
 
 use super::inertia::{LARGEST_BACKWARD_ERROR, inertia};
 use super::lanczos;
@@ -38,6 +37,7 @@ use crate::assemble::system::valences;
 use crate::error::Result;
 use crate::mesh::topology::NONE;
 use crate::mesh::{Faces, Surface, Topology};
+use crate::parallel;
 use crate::schemes::{Masks, Scheme};
 
 /// Larger faces have no patch: their elements are dense.
@@ -70,7 +70,6 @@ const STEPS: usize = 4000;
 const ALLOWANCE: f64 = 2.0 * LARGEST_BACKWARD_ERROR;
 /// Potentials closer than this are one: they differ by rounding.
 const ROUNDING: f64 = 1e-12;
-const CHUNK: usize = 4096;
 
 /// An end of the spectrum between two proven bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,24 +132,21 @@ impl<'a> Form<'a> {
         }
         let valences = valences(surface);
         let incidence = &topology.incidence;
-        let (potential, metric) = valences
-            .par_iter()
-            .enumerate()
-            .with_min_len(CHUNK)
-            .map(|(v, &n)| {
-                let (mut diagonal, mut shift) = (scheme.vertex_weight(n as usize), 0.0);
-                for &c in incidence.corners_at(v) {
-                    let size = faces.range(incidence.face_of(c)).len();
-                    diagonal += scheme.face_weight(size, 0);
-                    shift += shifts[size];
-                }
-                let g = match which {
-                    SymmetricForm::A => 1.0 / scheme.h(n as usize),
-                    SymmetricForm::Jacobi => diagonal,
-                };
-                ((sign * diagonal - shift) / g, g)
-            })
-            .unzip();
+        let pairs = parallel::collect(valences.len(), |v| {
+            let n = valences[v];
+            let (mut diagonal, mut shift) = (scheme.vertex_weight(n as usize), 0.0);
+            for &c in incidence.corners_at(v) {
+                let size = faces.range(incidence.face_of(c)).len();
+                diagonal += scheme.face_weight(size, 0);
+                shift += shifts[size];
+            }
+            let g = match which {
+                SymmetricForm::A => 1.0 / scheme.h(n as usize),
+                SymmetricForm::Jacobi => diagonal,
+            };
+            ((sign * diagonal - shift) / g, g)
+        });
+        let (potential, metric) = pairs.into_iter().unzip();
         Some(Form { faces, topology, couplings, shifts, potential, metric })
     }
 

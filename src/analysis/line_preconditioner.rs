@@ -25,12 +25,12 @@
 
 use glam::DVec3;
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 use super::tridiagonal::Tridiagonal;
 use crate::assemble::{Csr, LimitSystem};
 use crate::error::{Error, Result};
 use crate::mesh::Surface;
+use crate::parallel;
 use crate::solvers::Stop;
 
 /// What of a mesh is regular.
@@ -165,15 +165,14 @@ impl<'a> LinePreconditioner<'a> {
     /// ½ Eᵀ C⁻¹ σ C⁻¹ E r, and r over the diagonal at irregular vertices.
     fn lines(&self, r: &[DVec3]) -> Vec<DVec3> {
         let solve = |value: &(dyn Fn(u32, (u32, u32)) -> DVec3 + Sync)| -> Vec<Vec<DVec3>> {
-            let chains = self.regularity.chains.par_iter().enumerate();
-            chains
-                .map(|(k, (line, closed))| {
-                    let places = (0..).map(|i| (k as u32, i));
-                    let mut x: Vec<DVec3> = line.iter().zip(places).map(|(&v, p)| value(v, p)).collect();
-                    solve_line(&mut x, *closed);
-                    x
-                })
-                .collect()
+            let chains = &self.regularity.chains;
+            parallel::map(chains.len(), 1, |range| {
+                let (line, closed) = &chains[range.start];
+                let places = (0..).map(|i| (range.start as u32, i));
+                let mut x: Vec<DVec3> = line.iter().zip(places).map(|(&v, p)| value(v, p)).collect();
+                solve_line(&mut x, *closed);
+                x
+            })
         };
         let first = solve(&|v, _| r[v as usize]);
         let second = solve(&|v, place| {
@@ -279,10 +278,7 @@ pub fn count(
     stop: &Stop,
     precondition: impl Fn(&[DVec3]) -> Vec<DVec3>,
 ) -> Result<Count> {
-    let product = |x: &[DVec3]| -> Vec<DVec3> {
-        let rows = (0..x.len()).into_par_iter().with_min_len(4096);
-        rows.map(|i| system.m.row_times(i, x)).collect()
-    };
+    let product = |x: &[DVec3]| -> Vec<DVec3> { parallel::collect(x.len(), |i| system.m.row_times(i, x)) };
     let dot = |a: &[DVec3], b: &[DVec3]| -> f64 { a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum() };
     let mut r = system.symmetric_right_hand_side(points);
     for (r, mx) in r.iter_mut().zip(product(points)) {

@@ -25,13 +25,13 @@ use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::spectral_radius::sweep_radius;
 use crate::assemble::LimitSystem;
 use crate::error::Result;
 use crate::mesh::Surface;
 use crate::mesh::order::Order;
+use crate::parallel;
 use crate::solvers::gauss_seidel::Sor;
 use crate::solvers::system::sweep;
 use crate::solvers::{Outcome, Stop, System, solve};
@@ -75,26 +75,23 @@ pub fn order_study(
     let jobs: Vec<(f64, Order)> =
         omegas.iter().flat_map(|&omega| orders.iter().map(move |&order| (omega, order))).collect();
     let points = &mesh.positions;
-    let rows: Result<Vec<OrderRow>> = jobs
-        .into_par_iter()
-        .map(|(omega, order)| {
-            let vertices = order.order(mesh, surface.incidence());
-            let zero = vec![DVec3::ZERO; system.len()];
-            let rho = sweep_radius(system, |x| {
-                sweep(system, &zero, omega, vertices.iter().map(|&i| i as usize), x);
-            })?;
-            let mut method = Sor::new(system, points, omega, Some(&vertices));
-            let report = solve(&mut method, stop, &mut |_| ControlFlow::Continue(()));
-            Ok(OrderRow {
-                order: order.to_string(),
-                omega,
-                rho: Some(rho),
-                outcome: report.outcome,
-                iterations: report.iterations as f64,
-                max_error: report.last().max,
-            })
+    let rows: Result<Vec<OrderRow>> = parallel::try_map(&jobs, |&(omega, order)| {
+        let vertices = order.order(mesh, surface.incidence());
+        let zero = vec![DVec3::ZERO; system.len()];
+        let rho = sweep_radius(system, |x| {
+            sweep(system, &zero, omega, vertices.iter().map(|&i| i as usize), x);
+        })?;
+        let mut method = Sor::new(system, points, omega, Some(&vertices));
+        let report = solve(&mut method, stop, &mut |_| ControlFlow::Continue(()));
+        Ok(OrderRow {
+            order: order.to_string(),
+            omega,
+            rho: Some(rho),
+            outcome: report.outcome,
+            iterations: report.iterations as f64,
+            max_error: report.last().max,
         })
-        .collect();
+    });
     let mut rows = rows?;
     let greedy = gauss_southwell(system, points, stop);
     rows.push(OrderRow {

@@ -2,12 +2,12 @@
 //! n > 3 also λ_3 = λ_4, claimed there for all α in \[0, 2\].
 
 use nalgebra::{Complex, DMatrix};
-use rayon::prelude::*;
 
 use super::matrix::SplittingMatrix;
 use super::scheme::LocalScheme;
 use super::spectrum::{LEAD, Mode, all_eigenvalues, eigenvalues};
 use crate::error::Result;
+use crate::parallel;
 
 /// The leading eigenvalues of S̃ = R·S·S on three rings at one α.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,13 +111,10 @@ impl Blend {
 /// # Errors
 /// [`Error::Unknown`](crate::Error::Unknown) for a valence outside [`VALENCES`](super::VALENCES).
 pub fn condition_over_alpha(valences: &[usize], alphas: &[f64]) -> Result<Vec<Condition>> {
-    let all: Result<Vec<Vec<Condition>>> = valences
-        .par_iter()
-        .map(|&n| {
-            let blend = Blend::new(n)?;
-            alphas.iter().map(|&alpha| blend.condition(alpha)).collect()
-        })
-        .collect();
+    let all = parallel::try_map(valences, |&n| -> Result<Vec<_>> {
+        let blend = Blend::new(n)?;
+        alphas.iter().map(|&alpha| blend.condition(alpha)).collect()
+    });
     Ok(all?.concat())
 }
 

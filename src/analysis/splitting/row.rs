@@ -1,7 +1,6 @@
 //! Rows of the tables of splitting matrices: one valence of one scheme as plain numbers.
 
 use nalgebra::{Complex, DVector};
-use rayon::prelude::*;
 
 use super::characteristic::{Check, characteristic_map};
 use super::largest_difference;
@@ -9,6 +8,7 @@ use super::matrix::SplittingMatrix;
 use super::scheme::LocalScheme;
 use super::spectrum::distance_to_space;
 use crate::error::Result;
+use crate::parallel;
 
 /// What the local matrix of one valence is like, computed, and its deviations from the closed forms.
 #[derive(Clone, Debug)]
@@ -53,7 +53,7 @@ pub const MAP_ROUNDS: usize = 3;
 /// # Errors
 /// [`Error::Unknown`](crate::Error::Unknown) for a valence outside [`VALENCES`](super::VALENCES).
 pub fn rows(scheme: LocalScheme, valences: &[usize]) -> Result<Vec<StarRow>> {
-    valences.par_iter().map(|&n| row(scheme, n)).collect()
+    parallel::try_map(valences, |&n| row(scheme, n))
 }
 
 fn row(scheme: LocalScheme, valence: usize) -> Result<StarRow> {

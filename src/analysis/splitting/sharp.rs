@@ -19,7 +19,6 @@ use std::ops::RangeInclusive;
 use faer::Mat;
 use glam::DVec3;
 use nalgebra::{Complex, DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::scheme::LocalScheme;
 use super::spectrum::LEAD;
@@ -29,6 +28,7 @@ use crate::mesh::features::{SHARP, Tags};
 use crate::mesh::incidence::{next_in, prev_in};
 use crate::mesh::validate::Boundary;
 use crate::mesh::{Faces, Mesh, Surface};
+use crate::parallel;
 use crate::schemes::local_limit::{Star, StarRule};
 
 /// Where in a mesh a local matrix is that of a vertex which is not smooth.
@@ -159,7 +159,7 @@ pub struct SharpRow {
 /// # Ok::<(), limitlab::Error>(())
 /// ```
 pub fn sharp_rows(scheme: LocalScheme, vertex: SharpVertex, valences: &[usize]) -> Result<Vec<SharpRow>> {
-    valences.par_iter().map(|&n| LocalStar::new(scheme, vertex, n)?.row()).collect()
+    parallel::try_map(valences, |&n| LocalStar::new(scheme, vertex, n)?.row())
 }
 
 /// A star with its local matrix, in the order v, e_0, …, f_0, ….

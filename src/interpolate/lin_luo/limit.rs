@@ -6,7 +6,6 @@
 //! which a regular star shrinks.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::surface::refine_n;
 use crate::analysis::splitting::Layout;
@@ -14,7 +13,10 @@ use crate::interpolate::thall::angle;
 use crate::mesh::{Faces, Mesh, Surface};
 use crate::schemes::thirds::curve_limits;
 use crate::schemes::{Refinement, Tangents, sqrt3};
-use crate::{Error, Result};
+use crate::{Error, Result, parallel};
+
+/// Vertices that share what is worked on.
+const TOGETHER: usize = 64;
 
 /// Rings about a vertex that determine the surface there.
 const RINGS: usize = 3;
@@ -105,9 +107,12 @@ pub fn limits(surface: &Surface, alpha: &[f64]) -> Result<Limits> {
         let (moved, normal) = round.follow(n, work);
         Ok((origin + moved, normal))
     };
-    let found: Vec<(DVec3, DVec3)> =
-        (0..count).into_par_iter().map_init(Work::default, |work, v| at(v, work)).collect::<Result<_>>()?;
-    let (mut positions, normals): (Vec<DVec3>, _) = found.into_iter().unzip();
+    let parts = parallel::map(count, TOGETHER, |range| -> Result<Vec<_>> {
+        let mut work = Work::default();
+        range.map(|v| at(v, &mut work)).collect()
+    });
+    let found = parts.into_iter().collect::<Result<Vec<_>>>()?;
+    let (mut positions, normals): (Vec<DVec3>, _) = found.into_iter().flatten().unzip();
     for (v, point) in on_curves {
         positions[v] = point;
     }
