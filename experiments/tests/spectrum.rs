@@ -1,19 +1,28 @@
 //! The program `spectrum`: the fields of its JSON, its files, its limits.
 
+use std::path::Path;
+use std::process::Output;
+
+const SPECTRUM: &str = env!("CARGO_BIN_EXE_spectrum");
+
+/// With its files in `out`.
+fn run(program: &str, arguments: &[&str], out: &Path) -> Output {
+    let mut command = assert_cmd::Command::new(program);
+    command.args(arguments).args(["--json", "--quiet", "--out"]).arg(out).output().expect("the program runs")
+}
+
+/// What a program says that succeeds.
+fn object(done: &Output) -> serde_json::Value {
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    serde_json::from_slice(&done.stdout).expect("one JSON object")
+}
+
 #[test]
 fn the_program_prints_the_agreed_fields() {
     let out = tempfile::tempdir().expect("a folder");
-    let spectrum = |arguments: &[&str]| {
-        assert_cmd::Command::new(env!("CARGO_BIN_EXE_spectrum"))
-            .args(arguments)
-            .args(["--json", "--quiet", "--out"])
-            .arg(out.path())
-            .output()
-            .expect("the program runs")
-    };
+    let spectrum = |arguments: &[&str]| run(SPECTRUM, arguments, out.path());
     let done = spectrum(&["torus:10x8", "--full", "--certify", "--modes", "3"]);
-    assert!(done.status.success());
-    let json: serde_json::Value = serde_json::from_slice(&done.stdout).expect("one JSON object");
+    let json = object(&done);
     let close = |field: &serde_json::Value, expected: f64| {
         let value = field.as_f64().expect("a number");
         assert!((value - expected).abs() < 1e-9, "{value} {expected}");
@@ -60,18 +69,10 @@ fn the_program_prints_the_agreed_fields() {
 #[test]
 fn iteration_matrices_have_their_eigenvalues_norms_and_pictures() {
     let out = tempfile::tempdir().expect("a folder");
-    let run = |arguments: &[&str]| {
-        assert_cmd::Command::new(env!("CARGO_BIN_EXE_spectrum"))
-            .args(arguments)
-            .args(["--json", "--quiet", "--out"])
-            .arg(out.path())
-            .output()
-            .expect("the program runs")
-    };
+    let spectrum = |arguments: &[&str]| run(SPECTRUM, arguments, out.path());
     let methods = "pia,jacobi,sor:1.2,ssor:1.2,w-pia:0.5";
-    let done = run(&["torus:6x4", "--iteration-matrix", methods, "--order", "multicolour", "--pseudospectra"]);
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    let json: serde_json::Value = serde_json::from_slice(&done.stdout).expect("one JSON object");
+    let done = spectrum(&["torus:6x4", "--iteration-matrix", methods, "--order", "multicolour", "--pseudospectra"]);
+    let json = object(&done);
     let found = |k: usize, field: &str| json["iteration_matrices"][k][field].as_f64().expect("a number");
     for (k, expected) in [(0, 8.0 / 9.0), (1, 0.8), (4, 1.0 - 0.5 / 9.0)] {
         assert!((found(k, "rho") - expected).abs() < 1e-9, "{k}: {}", found(k, "rho"));
@@ -98,7 +99,7 @@ fn iteration_matrices_have_their_eigenvalues_norms_and_pictures() {
         (&["torus:50x50", "--iteration-matrix", "pia", "--full"], 1),
         (&["torus:21x21", "--iteration-matrix", "pia", "--pseudospectra"], 1),
     ] {
-        let refused = run(arguments);
+        let refused = spectrum(arguments);
         assert_eq!(refused.status.code(), Some(status), "{arguments:?}");
     }
 }
@@ -107,14 +108,10 @@ fn iteration_matrices_have_their_eigenvalues_norms_and_pictures() {
 #[test]
 fn eigenvalues_are_followed_over_omega() {
     let out = tempfile::tempdir().expect("a folder");
-    let done = assert_cmd::Command::new(env!("CARGO_BIN_EXE_sweep-omega"))
-        .args(["torus:6x4", "--noise", "0.1", "--method", "jacobi,sor", "--omega", "0.6:1.4:0.2", "--eigenvalues"])
-        .args(["--json", "--quiet", "--out"])
-        .arg(out.path())
-        .output()
-        .expect("the program runs");
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    let json: serde_json::Value = serde_json::from_slice(&done.stdout).expect("one JSON object");
+    let arguments =
+        ["torus:6x4", "--noise", "0.1", "--method", "jacobi,sor", "--omega", "0.6:1.4:0.2", "--eigenvalues"];
+    let done = run(env!("CARGO_BIN_EXE_sweep-omega"), &arguments, out.path());
+    let json = object(&done);
     let jacobi = &json["eigenvalues"][0];
     assert_eq!(jacobi["change"]["how"], "is overtaken by a negative one");
     for field in [&jacobi["change"]["omega"], &jacobi["best_omega"]] {

@@ -242,29 +242,9 @@ impl<'a> Method<'a> {
         }
     }
 
-    /// Whether a step takes the error e to T e with one matrix T: relaxation and sweeps.
+    /// Whether a step takes the error e to T e with one matrix T: relaxation and sweeps, which have an ω.
     pub fn is_stationary(self) -> bool {
-        match self {
-            Method::Jacobi { .. }
-            | Method::Thall
-            | Method::GaussSeidel { .. }
-            | Method::Sor { .. }
-            | Method::Ssor { .. }
-            | Method::Pia
-            | Method::WPia { .. } => true,
-            Method::Lu
-            | Method::Cholesky
-            | Method::SecondCholesky
-            | Method::Ldlt
-            | Method::Chebyshev { .. }
-            | Method::Cg
-            | Method::PlainCg
-            | Method::PcgJacobi
-            | Method::PcgSsor { .. }
-            | Method::PcgIc0
-            | Method::Anderson { .. }
-            | Method::HeavyBall { .. } => false,
-        }
+        self.at_omega(1.0).is_some()
     }
 
     /// The error of a method that [needs symmetry](Self::needs_symmetry), on a matrix that has none because of this vertex.

@@ -13,10 +13,11 @@ use super::energy::FirstFairness;
 use super::fit::{FairRefinement, centroid_errors, require_no_handles};
 use crate::Result;
 use crate::interpolate::halstead::energy::Weights;
+use crate::interpolate::halstead::projected::step_to_least;
 use crate::interpolate::zheng_cai::Constraints;
 use crate::parallel;
 use crate::solvers::iteration::{largest, solve_in_scale};
-use crate::solvers::{Errors, Failure, Iterate, Outcome, Step, Stop};
+use crate::solvers::{Errors, Failure, Iterate, Step, Stop};
 
 /// The best handles, and the mesh with them.
 #[derive(Clone, Debug)]
@@ -200,15 +201,7 @@ impl Iterate for Scaling<'_> {
                 p[blocks[k].clone()].iter().zip(&*y).map(|(p, y)| p.dot(*y)).sum::<f64>()
             });
         let curvature: f64 = curvatures.into_iter().sum();
-        let step = self.squared / curvature;
-        if !(curvature > 0.0 && step.is_finite()) {
-            return Err(Failure {
-                outcome: Outcome::Breakdown,
-                detail: format!(
-                    "the energy along the direction of iteration is {curvature:.1e}, none that can be minimised"
-                ),
-            });
-        }
+        let step = step_to_least(self.squared, curvature)?;
         self.before = Some(self.squared);
         let (product, field) = (&self.product, &self.field);
         parallel::change(&mut self.rest, |g, r| *r -= step * along(&groups[g], arms, product));

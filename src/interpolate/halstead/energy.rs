@@ -13,7 +13,7 @@
 //!
 //! **What is approximated.** A face of the second refinement with an extraordinary corner is split once more, and
 //! three of its quarters are regular and counted exactly; the fourth, beside the extraordinary vertex, is left out
-//! (1/64 of a unit square's area). It cannot be counted in this parametrisation: the halves of ever smaller rings have
+//! (1/16 of a unit square's area). It cannot be counted in this parametrisation: the halves of ever smaller rings have
 //! thin-plate energies that grow like (4λ²)^k, λ > ½ the subdominant eigenvalue of valences above 4.
 
 use std::sync::Arc;

@@ -205,6 +205,16 @@ impl Minimiser<'_> {
     }
 }
 
+/// The step along a direction p that takes the energy to its least value there: rᵀr / pᵀKp.
+pub(in crate::interpolate) fn step_to_least(squared: f64, curvature: f64) -> std::result::Result<f64, Failure> {
+    let step = squared / curvature;
+    if curvature > 0.0 && step.is_finite() {
+        return Ok(step);
+    }
+    let detail = format!("the energy along the direction of iteration is {curvature:.1e}, none that can be minimised");
+    Err(Failure { outcome: Outcome::Breakdown, detail })
+}
+
 impl Iterate for Minimiser<'_> {
     fn errors(&mut self) -> Errors {
         self.errors
@@ -230,15 +240,7 @@ impl Iterate for Minimiser<'_> {
                 curvature
             });
         let curvature: f64 = curvatures.into_iter().sum();
-        let step = self.squared / curvature;
-        if !(curvature > 0.0 && step.is_finite()) {
-            return Err(Failure {
-                outcome: Outcome::Breakdown,
-                detail: format!(
-                    "the energy along the direction of iteration is {curvature:.1e}, none that can be minimised"
-                ),
-            });
-        }
+        let step = step_to_least(self.squared, curvature)?;
         self.before = Some(self.squared);
         self.walk(step);
         Ok(())

@@ -157,18 +157,8 @@ pub fn fairest(arguments: &Arguments, input: &Input, per_vertex: &VertexOptions)
         ..SurfaceOptions::default()
     };
     let made = surface(found.surface, input.scheme, &[], &request)?;
-    Ok(Finished {
-        method: "halstead",
-        made,
-        iterations: report.iterations,
-        status: report.outcome.name(),
-        errors: found.errors,
-        history: report.history,
-        tolerance: stop.tolerance,
-        fairness: Some(found.energies),
-        shaped: None,
-        seconds: Seconds { assemble, solve, subdivide: start.elapsed().as_secs_f64(), ..Seconds::default() },
-    })
+    let seconds = Seconds { assemble, solve, subdivide: start.elapsed().as_secs_f64(), ..Seconds::default() };
+    Ok(Finished { fairness: Some(found.energies), seconds, ..iterated("halstead", made, report, found.errors, &stop) })
 }
 
 /// The fairest first refined mesh, and its surface.
@@ -197,18 +187,25 @@ pub fn fair_refinement(arguments: &Arguments, input: &Input, per_vertex: &Vertex
     };
     // From the first refinement on the steps are Doo-Sabin's, as Nasri's are from the start.
     let made = surface(first.with_positions(found.points), Scheme::Nasri, &[], &request)?;
-    Ok(Finished {
-        method: "fair-refinement",
+    let seconds = Seconds { assemble, solve, subdivide: start.elapsed().as_secs_f64(), ..Seconds::default() };
+    let finished = iterated("fair-refinement", made, report, found.errors, &stop);
+    Ok(Finished { fairness: Some(found.energies), seconds, ..finished })
+}
+
+/// What iterations have led to, without its seconds.
+fn iterated(method: &'static str, made: SurfaceMesh, report: Report, errors: Errors, stop: &Stop) -> Finished {
+    Finished {
+        method,
         made,
         iterations: report.iterations,
         status: report.outcome.name(),
-        errors: found.errors,
+        errors,
         history: report.history,
         tolerance: stop.tolerance,
-        fairness: Some(found.energies),
+        fairness: None,
         shaped: None,
-        seconds: Seconds { assemble, solve, subdivide: start.elapsed().as_secs_f64(), ..Seconds::default() },
-    })
+        seconds: Seconds::default(),
+    }
 }
 
 /// The unified √3 surface. Its errors are the distances of the vertices with α = 1, which stay: 0.
