@@ -152,7 +152,7 @@ impl Found {
 
     fn name(&self) -> String {
         let order = if self.order.is_empty() { String::new() } else { format!(", {}", self.order) };
-        format!("{} (ω={}{order})", self.method, short(self.omega))
+        format!("{} (ω={}{order})", self.method, shown_omega(self.omega))
     }
 }
 
@@ -186,6 +186,11 @@ impl Pseudospectrum {
     }
 }
 
+/// ω to six decimals: one that comes of a spectrum has sixteen.
+fn shown_omega(omega: f64) -> String {
+    short((omega * 1e6).round() / 1e6)
+}
+
 /// |Im λ|, and 0 where it is rounding.
 fn imaginary(im: f64) -> f64 {
     const ROUNDING: f64 = 1e-7;
@@ -197,7 +202,7 @@ pub fn columns<'a, R: 'a>(keys: Columns<'a, R>, of: fn(&R) -> &Found) -> Columns
     let norm = move |k: usize| move |r: &R| of(r).norms[k];
     let first = move |value: fn(&RitzValue) -> f64| move |r: &R| of(r).eigenvalues.first().map(value);
     keys.col(Column::key("method"), move |r| of(r).method)
-        .col(Column::key("omega"), move |r| short(of(r).omega))
+        .col(Column::key("omega"), move |r| shown_omega(of(r).omega))
         .col(Column::key("order"), move |r| of(r).order.clone())
         .col(Column::number("rho", 1e-5, 6), move |r| of(r).radius())
         .col(Column::number("residual", 1e3, 2).floor(1e-6).detail(), first(|z| z.residual))
@@ -242,7 +247,7 @@ pub fn eigenvalue_table(subject: &Subject, all: &[Found]) -> Table {
     let rows: Vec<(&Found, usize)> = all.iter().flat_map(|f| (0..f.eigenvalues.len()).map(move |k| (f, k))).collect();
     let columns = Columns::<(&Found, usize)>::new()
         .col(Column::key("method"), |(f, _)| f.method)
-        .col(Column::key("omega"), |(f, _)| short(f.omega))
+        .col(Column::key("omega"), |(f, _)| shown_omega(f.omega))
         .col(Column::key("order"), |(f, _)| f.order.clone())
         .col(Column::key("index"), |(_, k)| k.to_string())
         .col(Column::number("real", 1e-6, 10), |(f, k)| f.eigenvalues[*k].value.re)
@@ -259,7 +264,7 @@ pub fn power_table(subject: &Subject, all: &[Found]) -> Option<Table> {
     let norm = |n: usize| move |(f, k): &(&Found, usize)| f.powers[*k][n];
     let columns = Columns::<(&Found, usize)>::new()
         .col(Column::key("method"), |(f, _)| f.method)
-        .col(Column::key("omega"), |(f, _)| short(f.omega))
+        .col(Column::key("omega"), |(f, _)| shown_omega(f.omega))
         .col(Column::key("order"), |(f, _)| f.order.clone())
         .col(Column::key("k"), |(_, k)| (k + 1).to_string())
         .col(Column::number("energy_norm", 1e-4, 5), norm(0))
