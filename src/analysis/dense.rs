@@ -1,8 +1,8 @@
 //! Dense eigenvalues, for systems small enough: the oracle of everything estimated.
 
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
+use faer::Mat;
 use glam::DVec3;
+use limitlab_factorizations::dense;
 use nalgebra::Complex;
 
 use super::symmetric::{SymmetricForm, symmetric};
@@ -69,13 +69,11 @@ pub fn complex_eigenvalues(a: &Csr) -> Result<Vec<Complex<f64>>> {
 /// # Errors
 /// If the computation does not converge.
 pub(super) fn unsymmetric_values(matrix: &Mat<f64>) -> Result<Vec<Complex<f64>>> {
-    matrix.eigenvalues().map_err(|e| Error::Computation(format!("dense eigenvalues: {e:?}")))
+    dense::eigenvalues(matrix).map_err(|e| Error::Computation(format!("dense eigenvalues: {e:?}")))
 }
 
 fn values(s: &Csr) -> Result<Vec<f64>> {
-    to_dense(s)
-        .self_adjoint_eigenvalues(Side::Lower)
-        .map_err(|e| Error::Computation(format!("dense eigenvalues: {e:?}")))
+    dense::self_adjoint_eigenvalues(&to_dense(s)).map_err(|e| Error::Computation(format!("dense eigenvalues: {e:?}")))
 }
 
 /// All eigenvalues, ascending, and the unit eigenvectors of the symmetric matrix `s`.
@@ -84,8 +82,7 @@ fn values(s: &Csr) -> Result<Vec<f64>> {
 /// If N exceeds [`LARGEST_FULL`], or the computation does not converge.
 pub fn eigenpairs(s: &Csr) -> Result<(Vec<f64>, Vec<Vec<f64>>)> {
     within_limit(s.len(), LARGEST_FULL)?;
-    let eigen = to_dense(s)
-        .self_adjoint_eigen(Side::Lower)
+    let eigen = dense::self_adjoint_eigen(&to_dense(s))
         .map_err(|e| Error::Computation(format!("dense eigenvectors: {e:?}")))?;
     let n = s.len();
     let values = (0..n).map(|j| eigen.S().column_vector()[j]).collect();
@@ -101,7 +98,7 @@ pub fn eigenpairs(s: &Csr) -> Result<(Vec<f64>, Vec<Vec<f64>>)> {
 pub fn gaussian_elimination(system: &LimitSystem, points: &[DVec3]) -> Vec<DVec3> {
     assert_eq!(points.len(), system.len(), "one point a vertex");
     let mut v = Mat::from_fn(points.len(), 3, |i, axis| points[i][axis]);
-    to_dense(&system.a).partial_piv_lu().solve_in_place(v.as_mut());
+    dense::solve(&to_dense(&system.a), v.as_mut());
     (0..points.len()).map(|i| DVec3::new(v[(i, 0)], v[(i, 1)], v[(i, 2)])).collect()
 }
 

@@ -18,14 +18,14 @@
 //! are summed.
 
 use chacha20::ChaCha8Rng;
+use faer::MatMut;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
-    factorize_symbolic_cholesky,
-};
+use faer::sparse::linalg::cholesky::{CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side};
+use limitlab_factorizations::sparse::{
+    ldlt, ldlt_scratch, llt, llt_scratch, llt_solve, solve_scratch, symbolic_cholesky,
+};
 use rand::{RngExt, SeedableRng};
 
 use super::subspace_iteration::End;
@@ -154,8 +154,7 @@ impl<'a> Prover<'a> {
     fn new(system: &'a LimitSystem, form: SymmetricForm, end: End) -> Result<Self> {
         let s = symmetric(system, form);
         let symbolic = analyse(&s, SupernodalThreshold::AUTO, MOST_ENTRIES)?;
-        let factorize = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-        let need = factorize.or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+        let need = llt_scratch(&symbolic).or(solve_scratch(&symbolic, 1));
         let scratch = MemBuffer::try_new(need).map_err(|_| out_of_memory(s.len()))?;
         let factor = vec![0.0; symbolic.len_val()];
         let weights = entries_of_rows(&symbolic).into_iter().map(|m| {
@@ -192,15 +191,8 @@ impl<'a> Prover<'a> {
         let outwards = self.outwards();
         // Positive definite if σ lies outside: S − σ below, σ − S above.
         let values = shifted(&self.s, sigma, -outwards);
-        let done = self.symbolic.factorize_numeric_llt(
-            &mut self.factor,
-            SparseColMatRef::new(pattern(&self.s), &values),
-            Side::Upper,
-            Default::default(),
-            Par::Seq,
-            MemStack::new(&mut self.scratch),
-            Default::default(),
-        );
+        let matrix = SparseColMatRef::new(pattern(&self.s), &values);
+        let done = llt(&self.symbolic, &mut self.factor, matrix, MemStack::new(&mut self.scratch));
         // A factorization that met a NaN or an infinity is none.
         if done.is_err() || !self.factor.iter().all(|x| x.is_finite()) {
             return None;
@@ -221,12 +213,8 @@ impl<'a> Prover<'a> {
         let n = self.s.len();
         let mut x: Vec<f64> = (0..n).map(|_| rng.random_range(-1.0..1.0)).collect();
         for _ in 0..SOLUTIONS {
-            LltRef::new(&self.symbolic, &self.factor).solve_in_place_with_conj(
-                Conj::No,
-                MatMut::from_column_major_slice_mut(&mut x, n, 1),
-                Par::Seq,
-                MemStack::new(&mut self.scratch),
-            );
+            let column = MatMut::from_column_major_slice_mut(&mut x, n, 1);
+            llt_solve(&self.symbolic, &self.factor, column, MemStack::new(&mut self.scratch));
             normalize(&mut x);
         }
         for (x, scale) in x.iter_mut().zip(scales(self.system, self.form)) {
@@ -352,21 +340,11 @@ pub fn eigenvalues_below(system: &LimitSystem, form: SymmetricForm, sigma: f64) 
 /// As there.
 pub fn inertia(s: &Csr, sigma: f64) -> Result<Inertia> {
     let symbolic = analyse(s, SupernodalThreshold::FORCE_SIMPLICIAL, MOST_ENTRIES_INERTIA)?;
-    let need = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
-    let mut memory = MemBuffer::try_new(need).map_err(|_| out_of_memory(s.len()))?;
+    let mut memory = MemBuffer::try_new(ldlt_scratch(&symbolic)).map_err(|_| out_of_memory(s.len()))?;
     let mut factor = vec![0.0; symbolic.len_val()];
     let values = shifted(s, sigma, 1.0);
-    symbolic
-        .factorize_numeric_ldlt(
-            &mut factor,
-            SparseColMatRef::new(pattern(s), &values),
-            Side::Upper,
-            Default::default(),
-            Par::Seq,
-            MemStack::new(&mut memory),
-            Default::default(),
-        )
-        .map_err(|_| unstable(sigma))?;
+    let matrix = SparseColMatRef::new(pattern(s), &values);
+    ldlt(&symbolic, &mut factor, matrix, MemStack::new(&mut memory)).map_err(|_| unstable(sigma))?;
     let (SymbolicCholeskyRaw::Simplicial(l), Some(permutation)) = (symbolic.raw(), symbolic.perm()) else {
         return Err(Error::Computation("the factorization is not of the kind that was asked for".into()));
     };
@@ -422,8 +400,7 @@ pub(super) fn analyse(
     most: usize,
 ) -> Result<SymbolicCholesky<u32>> {
     let params = CholeskySymbolicParams { supernodal_flop_ratio_threshold, ..Default::default() };
-    let symbolic = factorize_symbolic_cholesky(pattern(s), Side::Upper, SymmetricOrdering::Amd, params)
-        .map_err(|_| out_of_memory(s.len()))?;
+    let symbolic = symbolic_cholesky(pattern(s), params).map_err(|_| out_of_memory(s.len()))?;
     if symbolic.len_val() > most {
         return Err(Error::Computation(format!(
             "the factor for {} vertices would have {} entries, at most {most} are allowed; use a mesh about {:.0} times \

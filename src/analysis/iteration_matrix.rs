@@ -13,9 +13,9 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Mat, Par, Side};
+use faer::Mat;
 use glam::DVec3;
+use limitlab_factorizations::dense::{cholesky, product as matrix_product, solve_lower_triangular};
 use nalgebra::Complex;
 
 use super::dense::{self, unsymmetric_values};
@@ -32,13 +32,15 @@ pub const LARGEST: usize = dense::LARGEST_COMPLEX;
 
 /// An entry of M and its mirror image differ by no more than this part of the largest, where M is symmetric.
 const SYMMETRIC: f64 = 1e-12;
-/// Of singular values, and of the numerical radius for one angle.
+/// Of singular values, and of the numerical radius for one angle about the best.
 const TOLERANCE: f64 = 1e-10;
+/// Of the numerical radius for the angles that the best is looked for among.
+const ROUGHLY: f64 = 1e-5;
 /// Lanczos steps for these at most.
 const STEPS: usize = 2000;
 /// Angles between 0 and π at which the numerical range is looked at, and golden sections about the best.
 const ANGLES: usize = 24;
-const SECTIONS: usize = 24;
+const SECTIONS: usize = 16;
 
 /// A norm of errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,10 +121,9 @@ impl IterationMatrix {
             return Err(Error::Computation("an entry of the iteration matrix is not finite".into()));
         };
         let energy = factor(system)?.map(|l| {
-            let (l, par) = (l.as_ref(), Par::Seq);
             // (L⁻¹(LᵀT)ᵀ)ᵀ = LᵀT L⁻ᵀ.
-            let mut image = t.transpose() * l;
-            solve_lower_triangular_in_place(l, image.as_mut(), par);
+            let mut image = matrix_product(t.transpose(), l.as_ref());
+            solve_lower_triangular(&l, image.as_mut());
             image.transpose().to_owned()
         });
         Ok(IterationMatrix { t, energy })
@@ -186,16 +187,18 @@ impl IterationMatrix {
         if self.is_empty() {
             return Ok(0.0);
         }
-        let at = |angle: f64| largest(&Rotated { t: &self.t, angle }, 2 * self.len());
+        let to = |tolerance: f64, angle: f64| largest(&Rotated { t: &self.t, angle }, 2 * self.len(), tolerance);
+        let at = |angle: f64| to(TOLERANCE, angle);
         // T is real: −θ is as good as θ.
         let step = PI / ANGLES as f64;
         let (mut best, mut least) = (0.0, f64::NEG_INFINITY);
         for k in 0..=ANGLES {
-            let value = at(k as f64 * step)?;
+            let value = to(ROUGHLY, k as f64 * step)?;
             if value > least {
                 (best, least) = (k as f64 * step, value);
             }
         }
+        let least = at(best)?;
         let (mut from, mut to) = (best - step, best + step);
         let mut probes = [to - PART * (to - from), from + PART * (to - from)];
         let mut values = [at(probes[0])?, at(probes[1])?];
@@ -222,8 +225,8 @@ impl IterationMatrix {
         let mut norms: Vec<[Option<f64>; 3]> = Vec::new();
         for k in 1..=count {
             if k > 1 {
-                t = &t * &self.t;
-                energy = energy.zip(self.energy.as_ref()).map(|(power, one)| &power * one);
+                t = matrix_product(t.as_ref(), self.t.as_ref());
+                energy = energy.zip(self.energy.as_ref()).map(|(p, one)| matrix_product(p.as_ref(), one.as_ref()));
             }
             let [a, b, c] = Norm::ALL.map(|norm| size(&t, energy.as_ref(), norm));
             let here = [a?, b?, c?];
@@ -315,8 +318,7 @@ fn factor<S: System>(system: &S) -> Result<Option<Mat<f64>>> {
     if !(0..n).all(|j| (0..j).all(|i| same(i, j))) {
         return Ok(None);
     }
-    let Ok(llt) = m.llt(Side::Lower) else { return Ok(None) };
-    let l = llt.L().to_owned();
+    let Some(l) = cholesky(&m) else { return Ok(None) };
     // A pivot that is rounding alone.
     let definite = (0..n).all(|i| l[(i, i)] * l[(i, i)] > n as f64 * f64::EPSILON * most);
     Ok(definite.then_some(l))
@@ -324,7 +326,7 @@ fn factor<S: System>(system: &S) -> Result<Option<Mat<f64>>> {
 
 fn size(t: &Mat<f64>, energy: Option<&Mat<f64>>, norm: Norm) -> Result<Option<f64>> {
     let n = t.nrows();
-    let singular = |matrix: &Mat<f64>| Ok(Some(largest(&Gram(matrix), n)?.max(0.0).sqrt()));
+    let singular = |matrix: &Mat<f64>| Ok(Some(largest(&Gram(matrix), n, TOLERANCE)?.max(0.0).sqrt()));
     match norm {
         Norm::Energy => energy.map_or(Ok(None), singular),
         Norm::Euclidean => singular(t),
@@ -335,12 +337,12 @@ fn size(t: &Mat<f64>, energy: Option<&Mat<f64>>, norm: Norm) -> Result<Option<f6
     }
 }
 
-/// The largest eigenvalue of a symmetric matrix of order n.
-fn largest(s: &dyn Dense, n: usize) -> Result<f64> {
+/// The largest eigenvalue of a symmetric matrix of order n, to a relative tolerance.
+fn largest(s: &dyn Dense, n: usize, tolerance: f64) -> Result<f64> {
     if n == 0 {
         return Ok(0.0);
     }
-    let limits = LanczosLimits { tolerance: TOLERANCE, max_steps: STEPS, least_weight: 0.0, ends: Wanted::Highest };
+    let limits = LanczosLimits { tolerance, max_steps: STEPS, least_weight: 0.0, ends: Wanted::Highest };
     // No start by a pattern that a mesh could share.
     let start = (0..n).map(|i| 1.0 + (0.618_033_988_75 * (i + 1) as f64).fract()).collect();
     Ok(extremes(&Symmetric(s), start, limits)?.high.value)

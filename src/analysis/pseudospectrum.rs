@@ -7,7 +7,8 @@
 //! σ_min(z − T) on a grid: T is brought to Hessenberg form once, H; z − H to a triangle R by rotations, and a Lanczos process
 //! with (RᴴR)⁻¹ finds σ_min. O(N³), then O(N²) a point.
 
-use nalgebra::{Complex, DMatrix, Hessenberg};
+use limitlab_factorizations::dense::hessenberg;
+use nalgebra::{Complex, DMatrix};
 
 use super::iteration_matrix::IterationMatrix;
 use super::tridiagonal::Tridiagonal;
@@ -54,7 +55,7 @@ pub fn least_singular_values(t: &IterationMatrix, re: &[f64], im: &[f64]) -> Res
         return Ok(vec![f64::INFINITY; re.len() * im.len()]);
     }
     let t = t.in_best_coordinates();
-    let hessenberg = Hessenberg::new(DMatrix::from_fn(n, n, |i, j| t[(i, j)])).unpack_h();
+    let hessenberg = hessenberg(DMatrix::from_fn(n, n, |i, j| t[(i, j)]));
     let parts = parallel::map(re.len() * im.len(), 1, |range| -> Vec<f64> {
         range.map(|at| least(&hessenberg, Complex::new(re[at % re.len()], im[at / re.len()]))).collect()
     });

@@ -1,11 +1,12 @@
 //! ±(S − σ)⁻¹ of a sparse symmetric matrix, with σ beyond an end of its spectrum: what is clustered at that end of S is spread
 //! out by it (Ericsson and Ruhe 1980).
 
+use faer::MatMut;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky};
-use faer::{Conj, MatMut, Par, Side};
+use faer::sparse::linalg::cholesky::SymbolicCholesky;
+use limitlab_factorizations::sparse::{llt, llt_scratch, llt_solve, solve_scratch};
 
 use super::inertia::{analyse, pattern, shifted};
 use super::subspace_iteration::End;
@@ -36,7 +37,7 @@ impl<'a> ShiftInvert<'a> {
         let symbolic = analyse(s, SupernodalThreshold::AUTO, MOST_ENTRIES).ok()?;
         let bytes = 8 * (symbolic.len_val() + 2 * width * s.len()) as u64;
         require(bytes, || "a factor".into(), "use a smaller mesh").ok()?;
-        let need = symbolic.solve_in_place_scratch::<f64>(LANES, Par::Seq);
+        let need = solve_scratch(&symbolic, LANES);
         let scratch = (0..width / LANES).map(|_| MemBuffer::try_new(need).ok()).collect::<Option<_>>()?;
         let factor = vec![0.0; symbolic.len_val()];
         let mut inverse = ShiftInvert { s, end, symbolic, factor, scratch, sigma: f64::NAN };
@@ -46,8 +47,7 @@ impl<'a> ShiftInvert<'a> {
     /// The same factor at another shift. Whether there is one.
     pub fn move_to(&mut self, ritz: f64, mut distance: f64) -> bool {
         const TRIES: usize = 5;
-        let need = self.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-        let Ok(mut memory) = MemBuffer::try_new(need) else { return false };
+        let Ok(mut memory) = MemBuffer::try_new(llt_scratch(&self.symbolic)) else { return false };
         let outwards = match self.end {
             End::Lowest => -1.0,
             End::Highest => 1.0,
@@ -55,16 +55,8 @@ impl<'a> ShiftInvert<'a> {
         for _ in 0..TRIES {
             self.sigma = ritz + outwards * distance;
             let values = shifted(self.s, self.sigma, -outwards);
-            let done = self.symbolic.factorize_numeric_llt(
-                &mut self.factor,
-                SparseColMatRef::new(pattern(self.s), &values),
-                Side::Upper,
-                Default::default(),
-                Par::Seq,
-                MemStack::new(&mut memory),
-                Default::default(),
-            );
-            if done.is_ok() {
+            let matrix = SparseColMatRef::new(pattern(self.s), &values);
+            if llt(&self.symbolic, &mut self.factor, matrix, MemStack::new(&mut memory)).is_ok() {
                 return true;
             }
             distance *= 4.0;
@@ -89,12 +81,8 @@ impl<'a> ShiftInvert<'a> {
                     *z = row[j];
                 }
             }
-            LltRef::new(symbolic, factor).solve_in_place_with_conj(
-                Conj::No,
-                MatMut::from_column_major_slice_mut(z, n, LANES),
-                Par::Seq,
-                MemStack::new(memory),
-            );
+            let z = MatMut::from_column_major_slice_mut(z, n, LANES);
+            llt_solve(symbolic, factor, z, MemStack::new(memory));
         });
     }
 }

@@ -3,7 +3,8 @@
 use chacha20::ChaCha8Rng;
 use faer::Mat;
 use glam::DVec3;
-use nalgebra::{Complex, DMatrix, DVector, Schur};
+use limitlab_factorizations::dense::{small_complex_lu, small_eigenvalues};
+use nalgebra::{Complex, DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 
 use super::dense;
@@ -262,8 +263,8 @@ fn arnoldi(start: Vec<DVec3>, vectors: usize, step: &mut dyn FnMut(&mut [DVec3])
 /// components, the QR iterations of `nalgebra` may go on for ever: then by `faer`.
 fn ritz_values(square: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     const ITERATIONS: usize = 1000;
-    match Schur::try_new(square.clone(), f64::EPSILON, ITERATIONS) {
-        Some(schur) => Ok(schur.complex_eigenvalues().iter().copied().collect()),
+    match small_eigenvalues(square.clone(), f64::EPSILON, ITERATIONS) {
+        Some(values) => Ok(values),
         None => dense::unsymmetric_values(&Mat::from_fn(square.nrows(), square.ncols(), |i, j| square[(i, j)])),
     }
 }
@@ -273,10 +274,9 @@ fn eigenvector(matrix: &DMatrix<f64>, z: Complex<f64>) -> DVector<Complex<f64>> 
     let m = matrix.nrows();
     // Off the eigenvalue by rounding, so that the factors exist.
     let shift = z + Complex::new(1e-14, 1e-14) * z.norm().max(f64::MIN_POSITIVE);
-    let lu = DMatrix::from_fn(m, m, |i, j| {
+    let lu = small_complex_lu(DMatrix::from_fn(m, m, |i, j| {
         Complex::new(matrix[(i, j)], 0.0) - if i == j { shift } else { Complex::new(0.0, 0.0) }
-    })
-    .lu();
+    }));
     let mut y = DVector::from_element(m, Complex::new(1.0 / (m as f64).sqrt(), 0.0));
     for _ in 0..3 {
         if let Some(solved) = lu.solve(&y) {

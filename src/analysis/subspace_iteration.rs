@@ -16,6 +16,7 @@
 //! their order, so results do not depend on the number of threads.
 
 use chacha20::ChaCha8Rng;
+use limitlab_factorizations::dense::small_symmetric_eigen;
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::{RngExt, SeedableRng};
 
@@ -476,6 +477,6 @@ fn symmetrized(m: DMatrix<f64>) -> DMatrix<f64> {
 
 fn decompose(m: DMatrix<f64>) -> Result<SymmetricEigen<f64, nalgebra::Dyn>> {
     let size = m.nrows();
-    SymmetricEigen::try_new(m, f64::EPSILON, 1000 * size)
+    small_symmetric_eigen(m, f64::EPSILON, 1000 * size)
         .ok_or_else(|| Error::Computation("the eigenvalues of a projected matrix did not converge".into()))
 }

@@ -16,7 +16,7 @@
 use std::f64::consts::TAU;
 
 use faer::Mat;
-use faer::linalg::solvers::Solve;
+use limitlab_factorizations::dense;
 use nalgebra::Complex;
 
 use super::dense::unsymmetric_values;
@@ -261,9 +261,10 @@ impl Block {
                 () if before(i, j) => self.a[(i, j)],
                 () => 0.0,
             });
-            let step = splitting.partial_piv_lu().solve(&self.a);
+            let mut step = self.a.clone();
+            dense::solve(&splitting, step.as_mut());
             Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j)) - step[(i, j)])
         };
-        if and_back { once(true) * once(false) } else { once(false) }
+        if and_back { dense::product(once(true).as_ref(), once(false).as_ref()) } else { once(false) }
     }
 }

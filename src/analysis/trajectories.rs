@@ -100,7 +100,11 @@ impl Trajectories {
             Some(k) if k > 0 => Some(meeting(&at, rows[k - 1].clone(), rows[k].clone())?),
             Some(_) | None => None,
         };
-        let radius = |omega: f64| Ok(at(omega)?.first().map_or(0.0, |z| z.norm()));
+        let largest = |all: &[Complex<f64>]| all.first().map_or(0.0, |z| z.norm());
+        let radius = |omega: f64| match rows.iter().find(|row| row.0 == omega) {
+            Some((_, all)) => Ok(largest(all)),
+            None => Ok(largest(&at(omega)?)),
+        };
         let best = best_omega(&radius)?;
         Ok(Trajectories { rows, change, best })
     }

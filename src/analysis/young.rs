@@ -157,7 +157,7 @@ pub fn best_omega(radius: &dyn Fn(f64) -> Result<f64>) -> Result<(f64, f64)> {
     let step = 2.0 / (GRID + 1) as f64;
     let (mut centre, mut least) = (1.0, f64::INFINITY);
     for k in 1..=GRID {
-        let omega = k as f64 * step;
+        let omega = 2.0 * k as f64 / (GRID + 1) as f64;
         let rho = look(omega)?;
         if rho < least {
             (centre, least) = (omega, rho);

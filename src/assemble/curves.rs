@@ -1,6 +1,7 @@
 //! Curves of open and creased meshes: rows (w, 1 − 2w, w) along sharp edges, solved exactly by elimination.
 
 use glam::DVec3;
+use limitlab_factorizations::dense::small_symmetric_eigenvalues;
 use nalgebra::DMatrix;
 
 use super::stars::row_at;
@@ -187,7 +188,7 @@ impl Curves {
         for chain in &self.chains {
             let k = chain.unknowns();
             if chain.weights.iter().any(|&w| w != chain.weights[0]) {
-                all.extend(chain.symmetric().symmetric_eigenvalues().iter());
+                all.extend(small_symmetric_eigenvalues(chain.symmetric()).iter());
                 continue;
             }
             let angle = |j: usize| match chain.closed {

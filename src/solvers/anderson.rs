@@ -14,7 +14,8 @@
 //! One product and two passes over the stored vectors an iteration, 2m + 5 arrays of N points.
 
 use glam::DVec3;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use limitlab_factorizations::dense::small_symmetric_eigen;
+use nalgebra::{DMatrix, DVector};
 
 use super::iteration::{Errors, Failure, Iterate, WarmStart};
 use super::system::{Rows, System};
@@ -164,7 +165,7 @@ fn least_squares(gram: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     if gram.iter().chain(right).any(|x| !x.is_finite()) {
         return DVector::zeros(size);
     }
-    let eigen = SymmetricEigen::new(gram);
+    let Some(eigen) = small_symmetric_eigen(gram, f64::EPSILON, 0) else { return DVector::zeros(size) };
     let mut parts = eigen.eigenvectors.tr_mul(right);
     for (part, &value) in parts.iter_mut().zip(&eigen.eigenvalues) {
         *part = if value > CANCELLED * size as f64 { *part / value } else { 0.0 };

@@ -7,6 +7,7 @@
 //! basis R and the left one L, S^k is R Tᵏ (LᵀR)⁻¹Lᵀ, T = (LᵀR)⁻¹LᵀSR being λ or, where that is defective, a small matrix.
 
 use glam::DVec3;
+use limitlab_factorizations::dense::small_lu;
 use nalgebra::{DMatrix, DVector};
 
 use super::matrix::{SplittingMatrix, rows};
@@ -82,7 +83,7 @@ impl ExactSurface {
         let matrix = SplittingMatrix::on_rings(scheme, valence, RINGS)?;
         let parts = matrix.eigenspaces()?.into_iter().map(|space| {
             let left = space.left.transpose();
-            let gram = (&left * &space.right).lu();
+            let gram = small_lu(&left * &space.right);
             let solved = |rest: DMatrix<f64>| {
                 let defective = || {
                     Error::Computation(format!(

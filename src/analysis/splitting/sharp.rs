@@ -18,6 +18,7 @@ use std::ops::RangeInclusive;
 
 use faer::Mat;
 use glam::DVec3;
+use limitlab_factorizations::dense::{eigenvalues, svd};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::scheme::LocalScheme;
@@ -442,7 +443,7 @@ fn fan(rule: StarRule, valence: usize) -> Faces {
 /// By falling modulus.
 fn eigenvalues_of(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     let dense = Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)]);
-    let mut all = dense.eigenvalues().map_err(|e| Error::Computation(format!("eigenvalues of a star: {e:?}")))?;
+    let mut all = eigenvalues(&dense).map_err(|e| Error::Computation(format!("eigenvalues of a star: {e:?}")))?;
     sort(&mut all);
     Ok(all)
 }
@@ -456,6 +457,6 @@ fn left_eigenvector(matrix: &DMatrix<f64>, eigenvalue: f64, other: Option<&[f64]
         Some(other) if i == n => other[j],
         _ => matrix[(j, i)] - if i == j { eigenvalue } else { 0.0 },
     });
-    let svd = shifted.svd().map_err(|e| Error::Computation(format!("singular values of a star: {e:?}")))?;
+    let svd = svd(&shifted).map_err(|e| Error::Computation(format!("singular values of a star: {e:?}")))?;
     Ok(DVector::from_fn(n, |i, _| svd.V()[(i, n - 1)]))
 }

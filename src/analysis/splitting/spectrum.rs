@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use faer::Mat;
+use limitlab_factorizations::dense::{complex_eigenvalues, complex_svd, small_qr, svd};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::matrix::SplittingMatrix;
@@ -135,7 +136,7 @@ impl SplittingMatrix {
             }
         }
         let space = |parts: Vec<Part>| {
-            let basis = |columns: Vec<DVector<f64>>| DMatrix::from_columns(&columns).qr().q();
+            let basis = |columns: Vec<DVector<f64>>| small_qr(DMatrix::from_columns(&columns)).q();
             Eigenspace {
                 value: parts[0].value,
                 frequencies: parts.iter().map(|p| p.frequency).collect(),
@@ -289,8 +290,8 @@ pub(super) fn eigenvalues(block: &DMatrix<Complex<f64>>) -> Result<Vec<Complex<f
         let z = block[(i, j)];
         faer::c64::new(z.re, z.im)
     });
-    let values =
-        dense.eigenvalues().map_err(|e| Error::Computation(format!("eigenvalues of a Fourier block: {e:?}")))?;
+    let values = complex_eigenvalues(&dense)
+        .map_err(|e| Error::Computation(format!("eigenvalues of a Fourier block: {e:?}")))?;
     let mut values: Vec<_> = values.iter().map(|z| Complex::new(z.re, z.im)).collect();
     sort(&mut values);
     Ok(values)
@@ -343,7 +344,7 @@ fn invariant_subspace(block: &DMatrix<Complex<f64>>, cluster: &[Complex<f64>]) -
         let Some(&lambda) = nearest else { break };
         let order = reduced.nrows();
         let shifted = Mat::from_fn(order, order, |i, j| reduced[(i, j)] - if i == j { lambda } else { 0.0.into() });
-        let svd = shifted.svd().map_err(|e| failed(&e))?;
+        let svd = complex_svd(&shifted).map_err(|e| failed(&e))?;
         let vectors = DMatrix::from_fn(order, order, |i, j| svd.V()[(i, j)]);
         column.copy_from(&(&complement * vectors.column(order - 1)));
         complement *= vectors.columns(0, order - 1);
@@ -357,7 +358,7 @@ fn real_basis(basis: &DMatrix<Complex<f64>>) -> Result<DMatrix<Complex<f64>>> {
     let parts = Mat::from_fn(basis.nrows(), 2 * dimension, |i, j| {
         if j < dimension { basis[(i, j)].re } else { basis[(i, j - dimension)].im }
     });
-    let svd = parts.svd().map_err(|e| Error::Computation(format!("singular values of a basis: {e:?}")))?;
+    let svd = svd(&parts).map_err(|e| Error::Computation(format!("singular values of a basis: {e:?}")))?;
     Ok(DMatrix::from_fn(basis.nrows(), dimension, |i, j| svd.U()[(i, j)].into()))
 }
 

@@ -1,14 +1,15 @@
 //! Sparse Cholesky M = LLᵀ and LDLᵀ by faer, under an approximate minimum degree order.
 
+use faer::Mat;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::ldlt::factor::LdltError;
 use faer::linalg::cholesky::llt::factor::LltError;
-use faer::sparse::linalg::cholesky::{
-    LdltRef, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
-};
+use faer::sparse::linalg::cholesky::SymbolicCholesky;
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, Mat, Par, Side};
 use glam::DVec3;
+use limitlab_factorizations::sparse::{
+    ldlt, ldlt_scratch, ldlt_solve, llt, llt_scratch, llt_solve, solve_scratch, symbolic_cholesky,
+};
 
 use super::{Factorization, failed, room};
 use crate::assemble::Csr;
@@ -54,55 +55,30 @@ impl Cholesky {
         let pattern = faer_pattern(m);
         // The graph twice while it is ordered, and the columns of its elements.
         room(name, "the order of a matrix", m.values().len(), 12)?;
-        let symbolic = factorize_symbolic_cholesky(pattern, Side::Upper, SymmetricOrdering::Amd, Default::default())
-            .map_err(|e| broken(&e))?;
+        let symbolic = symbolic_cholesky(pattern, Default::default()).map_err(|e| broken(&e))?;
         let matrix = SparseColMatRef::new(pattern, m.values());
         let fill = symbolic.len_val();
         room(name, "the factor", fill, 8)?;
         let mut values = vec![0.0; fill];
         match kind {
             CholeskyForm::Llt => {
-                let need = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-                let mut memory = MemBuffer::try_new(need).map_err(|e| broken(&e))?;
-                symbolic
-                    .factorize_numeric_llt(
-                        &mut values,
-                        matrix,
-                        Side::Upper,
-                        Default::default(),
-                        Par::Seq,
-                        MemStack::new(&mut memory),
-                        Default::default(),
-                    )
-                    .map_err(|e| match e {
-                        LltError::NonPositivePivot { index } => Failure {
-                            outcome: Outcome::Singular,
-                            detail: format!("{name}: pivot {index} is not positive"),
-                        },
-                    })?;
+                let mut memory = MemBuffer::try_new(llt_scratch(&symbolic)).map_err(|e| broken(&e))?;
+                llt(&symbolic, &mut values, matrix, MemStack::new(&mut memory)).map_err(|e| match e {
+                    LltError::NonPositivePivot { index } => {
+                        Failure { outcome: Outcome::Singular, detail: format!("{name}: pivot {index} is not positive") }
+                    }
+                })?;
             }
             CholeskyForm::Ldlt => {
-                let need = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
-                let mut memory = MemBuffer::try_new(need).map_err(|e| broken(&e))?;
-                symbolic
-                    .factorize_numeric_ldlt(
-                        &mut values,
-                        matrix,
-                        Side::Upper,
-                        Default::default(),
-                        Par::Seq,
-                        MemStack::new(&mut memory),
-                        Default::default(),
-                    )
-                    .map_err(|e| match e {
-                        LdltError::ZeroPivot { index } => {
-                            Failure { outcome: Outcome::Singular, detail: format!("{name}: pivot {index} vanishes") }
-                        }
-                    })?;
+                let mut memory = MemBuffer::try_new(ldlt_scratch(&symbolic)).map_err(|e| broken(&e))?;
+                ldlt(&symbolic, &mut values, matrix, MemStack::new(&mut memory)).map_err(|e| match e {
+                    LdltError::ZeroPivot { index } => {
+                        Failure { outcome: Outcome::Singular, detail: format!("{name}: pivot {index} vanishes") }
+                    }
+                })?;
             }
         }
-        let scratch =
-            MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(3, Par::Seq)).map_err(|e| broken(&e))?;
+        let scratch = MemBuffer::try_new(solve_scratch(&symbolic, 3)).map_err(|e| broken(&e))?;
         Ok(Cholesky { kind, symbolic, values, right_hand_sides: Mat::zeros(m.len(), 3), scratch })
     }
 }
@@ -117,18 +93,8 @@ impl Factorization for Cholesky {
         }
         let stack = MemStack::new(&mut self.scratch);
         match self.kind {
-            CholeskyForm::Llt => LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-                Conj::No,
-                b.as_mut(),
-                Par::Seq,
-                stack,
-            ),
-            CholeskyForm::Ldlt => LdltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-                Conj::No,
-                b.as_mut(),
-                Par::Seq,
-                stack,
-            ),
+            CholeskyForm::Llt => llt_solve(&self.symbolic, &self.values, b.as_mut(), stack),
+            CholeskyForm::Ldlt => ldlt_solve(&self.symbolic, &self.values, b.as_mut(), stack),
         }
         for (i, v) in x.iter_mut().enumerate() {
             *v = DVec3::new(b[(i, 0)], b[(i, 1)], b[(i, 2)]);

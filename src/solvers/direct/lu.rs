@@ -1,11 +1,12 @@
 //! Sparse LU of A by faer, with partial pivoting under a COLAMD column order.
 
+use faer::Mat;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SparseColMatRef;
-use faer::sparse::linalg::lu::{LuRef, LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};
+use faer::sparse::linalg::lu::{LuSymbolicParams, NumericLu, SymbolicLu};
 use faer::sparse::linalg::{LuError, SupernodalThreshold};
-use faer::{Conj, Mat, Par};
 use glam::DVec3;
+use limitlab_factorizations::sparse::{lu, lu_scratch, lu_solve, lu_solve_scratch, symbolic_lu};
 
 use super::cholesky::faer_pattern;
 use super::{Factorization, failed, room};
@@ -55,24 +56,15 @@ impl SparseLu {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
-        let symbolic = factorize_symbolic_lu(pattern, params).map_err(|e| broken(&e))?;
-        let need = symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Default::default());
-        let mut memory = MemBuffer::try_new(need).map_err(|e| broken(&e))?;
+        let symbolic = symbolic_lu(pattern, params).map_err(|e| broken(&e))?;
+        let mut memory = MemBuffer::try_new(lu_scratch(&symbolic)).map_err(|e| broken(&e))?;
         let mut numeric = NumericLu::new();
-        symbolic
-            .factorize_numeric_lu(
-                &mut numeric,
-                SparseColMatRef::new(pattern, values),
-                Par::Seq,
-                MemStack::new(&mut memory),
-                Default::default(),
-            )
-            .map_err(|e| match e {
-                LuError::SymbolicSingular { .. } => failed("LU", Outcome::Singular, e),
-                LuError::Generic(e) => broken(&e),
-            })?;
-        let scratch =
-            MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(3, Par::Seq)).map_err(|e| broken(&e))?;
+        let matrix = SparseColMatRef::new(pattern, values);
+        lu(&symbolic, &mut numeric, matrix, MemStack::new(&mut memory)).map_err(|e| match e {
+            LuError::SymbolicSingular { .. } => failed("LU", Outcome::Singular, e),
+            LuError::Generic(e) => broken(&e),
+        })?;
+        let scratch = MemBuffer::try_new(lu_solve_scratch(&symbolic, 3)).map_err(|e| broken(&e))?;
         Ok(SparseLu { symbolic, numeric, right_hand_sides: Mat::zeros(n, 3), scratch })
     }
 }
@@ -90,12 +82,7 @@ impl Factorization for SparseLu {
                 b[(i, axis)] = v[axis];
             }
         }
-        LuRef::new_unchecked(&self.symbolic, &self.numeric).solve_in_place_with_conj(
-            Conj::No,
-            b.as_mut(),
-            Par::Seq,
-            MemStack::new(&mut self.scratch),
-        );
+        lu_solve(&self.symbolic, &self.numeric, b.as_mut(), MemStack::new(&mut self.scratch));
         for (i, v) in x.iter_mut().enumerate() {
             *v = DVec3::new(b[(i, 0)], b[(i, 1)], b[(i, 2)]);
         }

@@ -1,9 +1,8 @@
 //! A second, independent Cholesky: nalgebra-sparse's, which has no order of its own, on M permuted by the
 //! approximate minimum degree order that faer finds.
 
-use faer::Side;
-use faer::sparse::linalg::cholesky::{SymmetricOrdering, factorize_symbolic_cholesky};
 use glam::DVec3;
+use limitlab_factorizations::sparse::symbolic_cholesky;
 use nalgebra::DMatrix;
 use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::factorization::CscCholesky;
@@ -30,8 +29,7 @@ impl SecondOpinion {
         let name = "nalgebra-sparse Cholesky";
         let n = m.len();
         let symbolic =
-            factorize_symbolic_cholesky(faer_pattern(m), Side::Upper, SymmetricOrdering::Amd, Default::default())
-                .map_err(|e| failed(name, Outcome::Breakdown, e))?;
+            symbolic_cholesky(faer_pattern(m), Default::default()).map_err(|e| failed(name, Outcome::Breakdown, e))?;
         let fill = symbolic.len_val();
         // Its indices take as much as its values, and while it is found it is there twice.
         room(name, "the factor", fill, 32)?;

@@ -193,6 +193,7 @@ fn over_omega(context: &mut Context, subject: &Subject, scheme: Scheme) -> Resul
 /// A sweep on a regular torus.
 struct OnTorus {
     scheme: Scheme,
+    method: &'static str,
     omega: f64,
     order: &'static str,
     rho: f64,
@@ -215,8 +216,13 @@ fn tori() -> Result<Table> {
         let colours = colouring.order([SIDE, SIDE]);
         let front = Order::Bfs.order(subject.surface.mesh(), subject.surface.incidence());
         for omega in [1.0, SOR_OMEGA] {
-            for (name, order) in [("file", None), ("bfs", Some(&front[..])), ("colours", Some(&colours[..]))] {
-                let method = Method::Sor { omega, order };
+            let coloured = Some(&colours[..]);
+            for (name, method) in [
+                ("file", Method::Sor { omega, order: None }),
+                ("bfs", Method::Sor { omega, order: Some(&front) }),
+                ("colours", Method::Sor { omega, order: coloured }),
+                ("colours", Method::Ssor { omega, order: coloured }),
+            ] {
                 let t = IterationMatrix::new(&system, method)?;
                 let rho = t.eigenvalues()?.first().map_or(0.0, |z| z.norm());
                 let closed = match name {
@@ -225,12 +231,13 @@ fn tori() -> Result<Table> {
                 };
                 let power = t.powers(POWER, 0.0)?.last().and_then(|norms| norms[0]);
                 let rate = power.map(|norm| norm.powf(1.0 / POWER as f64));
-                rows.push(OnTorus { scheme, omega, order: name, rho, closed, rate });
+                rows.push(OnTorus { scheme, method: method.name(), omega, order: name, rho, closed, rate });
             }
         }
     }
     let mut table = Columns::<OnTorus>::new()
         .col(Column::key("scheme"), |r| r.scheme.name())
+        .col(Column::key("method"), |r| r.method)
         .col(Column::key("omega"), |r| short(r.omega))
         .col(Column::key("order"), |r| r.order)
         .col(Column::number("rho", 1e-4, 5), |r| r.rho)
@@ -238,7 +245,7 @@ fn tori() -> Result<Table> {
         .col(Column::number("rate", 1e-4, 5), |r| r.rate)
         .table(format!("{}--tori", SPLITTINGS.id), "Sweeps on a regular torus, and their symbols", &rows);
     table.note(format!(
-        "SOR on the {SIDE} × {SIDE} torus, of triangles under Loop. `symbol` by colours is the largest modulus of an eigenvalue of the blocks, which \
+        "SOR and SSOR on the {SIDE} × {SIDE} torus, of triangles under Loop. `symbol` by colours is the largest modulus of an eigenvalue of the blocks, which \
          are all eigenvalues: `rho` to rounding. Of `file` (row by row) and `bfs` it is max |T̂| of a front on the plane; `rho` \
          lies below, but `rate`, ‖T^{POWER}‖^(1/{POWER}) in the energy norm, does not. Under mid-edge A is singular there: ρ = 1, and no energy \
          norm."
