@@ -411,8 +411,8 @@ impl Dense for Rotated<'_> {
     }
 }
 
-/// Columns of a task.
-const CHUNK: usize = 64;
+/// Columns of a task: work enough for a thread to be woken for it.
+const CHUNK: usize = 256;
 
 /// C x, column by column, as they lie in memory.
 fn times(c: &Mat<f64>, x: &[f64]) -> Vec<f64> {

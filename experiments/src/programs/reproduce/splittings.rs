@@ -1,6 +1,8 @@
 //! Iteration matrices of the splittings on the papers' models: eigenvalues, norms, powers; Young's theory; regular tori in
 //! closed form.
 
+use rayon::prelude::*;
+
 use crate::report::{Column, Columns, Table};
 use crate::studies::iteration_matrix::{Found, Wish, columns, plane, powers, pseudospectra};
 use crate::studies::trajectories::{self, Followed};
@@ -58,10 +60,11 @@ fn run(context: &mut Context) -> Result<()> {
         let all = methods(subject, &system, *scheme, orders, context.quick)?;
         if !context.quick {
             pictures(context, subject, *scheme, &all)?;
-            for order in ORDERS {
+            let young = ORDERS.par_iter().map(|&order| {
                 let vertices = order.order(subject.surface.mesh(), subject.surface.incidence());
-                theory.push((subject.name.clone(), *scheme, order, Young::new(&system, Some(&vertices))?));
-            }
+                Ok((subject.name.clone(), *scheme, order, Young::new(&system, Some(&vertices))?))
+            });
+            theory.extend(young.collect::<Result<Vec<_>>>()?);
         }
         rows.extend(all);
     }
@@ -84,32 +87,31 @@ fn methods(subject: &Subject, system: &LimitSystem, scheme: Scheme, orders: &[Or
     let spectra = spectrum(system)?;
     let points = subject.surface.positions();
     let stop = Stop { tolerance: TOLERANCE * subject.surface.diagonal(), max_iterations: 10_000 };
-    let mut rows = Vec::new();
-    let mut one = |method: Method, order: &str| -> Result<()> {
-        let method = with_spectrum(system, method, &|| Ok(spectra))?;
+    let in_order = |order: Order| order.order(subject.surface.mesh(), subject.surface.incidence());
+    let vertices: Vec<Vec<u32>> = orders.iter().map(|&order| in_order(order)).collect();
+    let coloured = in_order(Order::Multicolour);
+    let mut jobs: Vec<(Method, String)> = Vec::new();
+    if !quick {
+        jobs.extend([(Method::Pia, String::new()), (Method::Jacobi { omega: None }, String::new())]);
+    }
+    for (name, order) in orders.iter().zip(&vertices) {
+        let order = Some(&order[..]);
+        jobs.push((Method::GaussSeidel { order }, name.to_string()));
+        jobs.push((Method::Sor { omega: SOR_OMEGA, order }, name.to_string()));
+    }
+    if !quick {
+        jobs.push((Method::Ssor { omega: 1.0, order: Some(&coloured) }, Order::Multicolour.to_string()));
+    }
+    let one = |(method, order): &(Method, String)| -> Result<Row> {
+        let method = with_spectrum(system, *method, &|| Ok(spectra))?;
         // They take the longest: of SOR alone.
         let pseudospectra = !quick && system.len() <= SMALL && matches!(method, Method::Sor { .. });
         let wish = Wish { full: false, pseudospectra };
         let found = Found::new(system, method, order, wish)?;
         let iterations = solve(system, points, method, &stop).report.iterations;
-        rows.push(Row { mesh: subject.name.clone(), scheme, found, iterations });
-        Ok(())
+        Ok(Row { mesh: subject.name.clone(), scheme, found, iterations })
     };
-    if !quick {
-        one(Method::Pia, "")?;
-        one(Method::Jacobi { omega: None }, "")?;
-    }
-    for order in orders {
-        let vertices = order.order(subject.surface.mesh(), subject.surface.incidence());
-        let (name, order) = (order.to_string(), Some(&vertices[..]));
-        one(Method::GaussSeidel { order }, &name)?;
-        one(Method::Sor { omega: SOR_OMEGA, order }, &name)?;
-    }
-    if !quick {
-        let vertices = Order::Multicolour.order(subject.surface.mesh(), subject.surface.incidence());
-        one(Method::Ssor { omega: 1.0, order: Some(&vertices) }, &Order::Multicolour.to_string())?;
-    }
-    Ok(rows)
+    jobs.par_iter().map(one).collect()
 }
 
 fn main_table(rows: &[Row]) -> Table {
