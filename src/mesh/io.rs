@@ -883,6 +883,16 @@ mod tests {
             }
         }
 
+        /// Rows of a table that could be rows of the one before.
+        #[test]
+        fn a_part_ends_with_its_table(vertices in 3..12usize, faces in 1..12usize, size in 1..120usize) {
+            let mut text = format!("ply\nformat ascii 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float \
+                z\nproperty int w\nelement face {faces}\nproperty list uchar int vertex_index\nend_header\n");
+            text += &"3 0 1 2\n".repeat(vertices + faces);
+            let loaded = ply::read_in_parts(text.as_bytes(), Path::new("a.ply"), size).unwrap();
+            prop_assert_eq!((loaded.mesh.len(), loaded.mesh.faces.len()), (vertices, faces));
+        }
+
         #[test]
         fn parts_of_binary_files_give_the_same_mesh_or_message(
             faces in prop::collection::vec(prop::collection::vec(0..9u32, 2..6), 0..30),

@@ -132,6 +132,8 @@ impl Dash {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {
     Circle,
+    /// Smaller, and without the rim that parts others from their neighbours.
+    Dot,
     Square,
     Diamond,
     Triangle,
@@ -340,6 +342,8 @@ impl Canvas {
                 let arm = |(dx, dy)| vec![(at.0 - dx, at.1 - dy), (at.0 + dx, at.1 + dy)];
                 self.shapes.push(Shape::Lines { paths: arms.map(arm).to_vec(), width: 0.5 * radius, colour });
             }
+            // Rims would cover what lies close by.
+            Marker::Dot => self.shape(at, marker, 0.6 * radius, colour),
             _ => {
                 self.shape(at, marker, radius + RIM, WHITE);
                 self.shape(at, marker, radius, colour);
@@ -354,7 +358,7 @@ impl Canvas {
             Marker::Diamond => &[(0.0, -1.2), (1.2, 0.0), (0.0, 1.2), (-1.2, 0.0)],
             Marker::Triangle => &[(0.0, -1.25), (1.15, 0.75), (-1.15, 0.75)],
             Marker::InvertedTriangle => &[(0.0, 1.25), (1.15, -0.75), (-1.15, -0.75)],
-            Marker::Circle | Marker::Cross | Marker::Plus => {
+            Marker::Circle | Marker::Dot | Marker::Cross | Marker::Plus => {
                 return self.shapes.push(Shape::Disc { centre: at, radius, colour });
             }
         };

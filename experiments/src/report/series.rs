@@ -119,6 +119,11 @@ impl Series {
         Series { line: Line::None, marker: Some(Marker::Circle), ..Series::line(name, points) }
     }
 
+    /// Points that are many and lie close: an eigenvalue each.
+    pub fn cloud(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Series::scatter(name, points).marker(Marker::Dot)
+    }
+
     /// The same series with this marker.
     pub fn marker(mut self, marker: Marker) -> Self {
         self.marker = Some(marker);

@@ -197,7 +197,7 @@ impl ComplexFindings {
         let panel = |relaxation: &Relaxation| LinePlot {
             x_label: format!("Re λ of {}", relaxation.name),
             y_label: "Im λ".into(),
-            series: vec![Series::scatter(relaxation.name, relaxation.eigenvalues.iter().copied())],
+            series: vec![Series::cloud(relaxation.name, relaxation.eigenvalues.iter().copied())],
             ..LinePlot::default()
         };
         let [a, jacobi] = self.relaxations.each_ref().map(panel);

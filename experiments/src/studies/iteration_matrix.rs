@@ -287,10 +287,16 @@ fn grid(panels: Vec<LinePlot>) -> Figure {
     Figure { width: 440 * columns as u32, height: 340 * rows, columns, share_x: false, ..Figure::row(panels) }
 }
 
-/// The eigenvalues in the complex plane, a panel a method, with the circle of radius ρ.
+/// The eigenvalues in the complex plane, a panel a method, with the circle of radius ρ, all on one scale.
 pub fn plane(caption: &str, all: &[&Found]) -> Figure {
+    let largest = all.iter().map(|f| f.radius()).fold(0.0, f64::max);
+    let reach = if largest > 0.0 { 1.12 * largest } else { 1.0 };
     let panel = |f: &&Found| {
-        let reach = 1.08 * f.radius().max(1.0);
+        let unit = (reach >= 1.0).then(|| circle("unit circle", 1.0).dash(Dash::Dotted));
+        let found = [
+            circle(format!("ρ = {:.4}", f.radius()), f.radius()).dash(Dash::Dashed),
+            Series::cloud("eigenvalues", f.eigenvalues.iter().map(|z| (z.value.re, z.value.im))).colour(f.colour),
+        ];
         LinePlot {
             title: f.name(),
             x_label: "Re λ".into(),
@@ -298,11 +304,7 @@ pub fn plane(caption: &str, all: &[&Found]) -> Figure {
             x_range: Some((-reach, reach)),
             y_range: Some((-reach, reach)),
             equal_units: true,
-            series: vec![
-                circle("unit circle", 1.0).dash(Dash::Dotted),
-                circle(format!("ρ = {:.4}", f.radius()), f.radius()).dash(Dash::Dashed),
-                Series::scatter("eigenvalues", f.eigenvalues.iter().map(|z| (z.value.re, z.value.im))).colour(f.colour),
-            ],
+            series: unit.into_iter().chain(found).collect(),
             ..LinePlot::default()
         }
     };
@@ -341,7 +343,7 @@ pub fn pseudospectra(caption: &str, all: &[&Found]) -> Option<Figure> {
         let mut series = pseudospectrum.series();
         series.push(circle("unit circle", 1.0).dash(Dash::Dotted));
         let eigenvalues = f.eigenvalues.iter().map(|z| (z.value.re, z.value.im));
-        series.push(Series::scatter("eigenvalues", eigenvalues).colour(palette(6)));
+        series.push(Series::cloud("eigenvalues", eigenvalues).colour(palette(6)));
         let reach = reach.max(1.08);
         let range = Some((-reach, reach));
         Some(LinePlot {

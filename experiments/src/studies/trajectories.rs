@@ -106,7 +106,7 @@ pub fn figure(caption: &str, all: &[Followed]) -> Figure {
         let step = found.rows.len().div_ceil(SHOWN).max(1);
         let chosen = found.rows.iter().step_by(step).enumerate();
         let series = chosen.map(|(k, (omega, values))| {
-            Series::scatter(format!("ω = {}", short(*omega)), values.iter().map(|z| (z.re, z.im))).colour(palette(k))
+            Series::cloud(format!("ω = {}", short(*omega)), values.iter().map(|z| (z.re, z.im))).colour(palette(k))
         });
         let series: Vec<Series> = series.collect();
         let reach = series.iter().flat_map(|s| &s.points).map(|p| p.0.hypot(p.1)).fold(1.0, f64::max) * 1.05;
@@ -127,9 +127,9 @@ pub fn figure(caption: &str, all: &[Followed]) -> Figure {
         };
         let radius = found.rows.iter().map(|(omega, values)| (*omega, values.first().map_or(0.0, |z| z.norm())));
         let mut series = vec![
-            Series::scatter("not real", of(|_, im| im > REAL)).colour(palette(5)),
-            Series::scatter("negative", of(|re, im| im <= REAL && re < 0.0)).colour(palette(3)),
-            Series::scatter("positive", of(|re, im| im <= REAL && re >= 0.0)).colour(palette(2)),
+            Series::cloud("not real", of(|_, im| im > REAL)).colour(palette(5)),
+            Series::cloud("negative", of(|re, im| im <= REAL && re < 0.0)).colour(palette(3)),
+            Series::cloud("positive", of(|re, im| im <= REAL && re >= 0.0)).colour(palette(2)),
             Series::line("ρ", radius).colour(*colour),
         ];
         series.retain(|s| !s.points.is_empty());

@@ -40,7 +40,7 @@ fn commands_of_the_guide_show_what_it_says() {
         }
         commands += 1;
     }
-    assert_eq!(commands, 7);
+    assert_eq!(commands, 8);
     let picture = fs::read(folder.path().join("out/sweep-omega-house-catmull-clark.png")).unwrap();
     assert!(picture.starts_with(b"\x89PNG"));
     for picture in [

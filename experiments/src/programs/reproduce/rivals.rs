@@ -103,6 +103,9 @@ struct Made {
 
 const PIA: Accelerated = Accelerated::Pia { omega: None };
 
+/// The rival that solves under the scheme of the mesh.
+const AUTO: &str = "auto";
+
 /// The papers' rivals in the order of their years; first those that solve the system.
 const RIVALS_OF_THE_PAPERS: [Rival; 25] = [
     Rival {
@@ -169,7 +172,7 @@ const RIVALS_OF_THE_PAPERS: [Rival; 25] = [
         way: Way::Solve(Method::Ldlt, 1.0),
     },
     Rival {
-        name: "auto",
+        name: AUTO,
         source: "this house",
         rule: "Chebyshev in single precision, corrected in double; others where it makes no progress",
         needs: "nothing else",
@@ -388,10 +391,15 @@ fn times(rows: &[Row]) -> Table {
 fn panel(caption: String, rows: &[Row], mesh: &str) -> LinePlot {
     let surfaces = rows.iter().filter(|(of, rival, ..)| *of == mesh && matches!(rival.way, Way::Make(_)));
     let series = surfaces.filter_map(|(_, rival, case, made)| {
+        // `auto` solves under the scheme of the mesh, which may be one of the others.
+        let name = if rival.name == AUTO { case.scheme.name() } else { rival.name };
+        if rival.name == AUTO && RIVALS_OF_THE_PAPERS.iter().any(|other| other.name == name) {
+            return None;
+        }
         let at = (case.deviations(made)?.0, case.bending(made)?);
         let k = RIVALS_OF_THE_PAPERS.iter().position(|known| known.name == rival.name)?;
         // The fairest surface is the measure itself.
-        (at.0 > 0.0).then(|| Series::scatter(rival.name, [at]).marker(marker(k)).colour(palette(k + k / COLOURS)))
+        (at.0 > 0.0).then(|| Series::scatter(name, [at]).marker(marker(k)).colour(palette(k + k / COLOURS)))
     });
     LinePlot {
         title: caption,
