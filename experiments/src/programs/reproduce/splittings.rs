@@ -184,7 +184,7 @@ fn young_table(rows: &[Theory]) -> Table {
         "Were the order consistent with A, ρ of Gauss-Seidel would be ρ(J)² with J = I − D⁻¹A, the best ω 2/(1 + √(1 − ρ(J)²)), and ρ = ω − \
          1 there. Faces couple their corners in rings of odd length, and edges go round a torus of 11 rows in such, so that no \
          order is; where ρ(J) ≥ 1 the formula has no value. \
-         ρ(J)² overstates the radius of Gauss-Seidel, and the best ω is nearer to 1.",
+         ρ(J)² overstates the radius of Gauss-Seidel, and where there is one, the best ω is nearer to 1.",
     );
     table
 }
