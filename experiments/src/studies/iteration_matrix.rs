@@ -49,7 +49,7 @@ pub struct Found {
     colour: Colour,
     omega: f64,
     order: String,
-    /// The largest modulus first; where all are computed the residual is rounding, Nε.
+    /// The largest modulus first; the residual is no less than rounding, Nε, which it is where all are computed.
     pub eigenvalues: Vec<RitzValue>,
     /// Whether these are all.
     complete: bool,
@@ -96,12 +96,14 @@ impl Found {
             pseudospectrum: None,
         };
         let small = system.len() <= dense::LARGEST;
+        let rounding = system.len() as f64 * f64::EPSILON;
         if !(wish.full || wish.pseudospectra || small) {
             found.eigenvalues = outermost_eigenvalues(system, method, OUTERMOST)?;
+            // The process tells of residuals that no product could show.
+            found.eigenvalues.iter_mut().for_each(|z| z.residual = z.residual.max(rounding));
             return Ok(found);
         }
         let t = IterationMatrix::new(system, method)?;
-        let rounding = system.len() as f64 * f64::EPSILON;
         found.eigenvalues = t.eigenvalues()?.into_iter().map(|value| RitzValue { value, residual: rounding }).collect();
         found.complete = true;
         // First, as it is refused on the smallest meshes.
