@@ -2,121 +2,81 @@
 
 use std::ops::Range;
 
-use super::face_sums::Polygons;
 use super::neighbours::Codes;
 use super::weights::{RowKind, RowWeights, WeightsByValence};
 use crate::error::{Error, Result};
-use crate::mesh::incidence::{next_in, prev_in};
+use crate::mesh::breadth_first::{in_fronts, in_fronts_along, in_kinds};
+use crate::mesh::incidence::{next_in, prev_in, split_rows};
 use crate::mesh::order::Numbering;
 use crate::mesh::{Faces, Incidence, Topology};
 use crate::pages::large;
 use crate::parallel;
+use crate::prefetch::prefetch;
 use crate::schemes::{Masks, Scheme};
 
-/// What the rows are built from.
+/// Vertices of one task.
+const CHUNK: usize = 4096;
+
+/// The order of the rows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum RowOrder<'a> {
+    /// That of the vertices, or this one.
+    Given(Option<&'a Numbering>),
+    /// [In fronts](in_fronts).
+    Fronts,
+    /// [In kinds](in_kinds).
+    Kinds,
+}
+
+/// The neighbours of all vertices, of v from `starts[v]` on.
+pub(super) struct Neighbourhoods {
+    starts: Vec<u32>,
+    vertices: Vec<u32>,
+}
+
+/// What the rows are built from: all by vertex, as faces come, and put into the order of the rows at the end.
 pub(super) struct RowSource<'a> {
     faces: &'a Faces,
     incidence: &'a Incidence,
     /// The sides without an opposite, where there are such.
     open: Option<&'a Topology>,
-    /// Which row is that of which vertex; the k-th of the k-th unless told.
-    numbering: Option<&'a Numbering>,
     scheme: Scheme,
-    /// By row, as all that is made here.
+    /// Of fixed vertices, 0.
     pub(super) valences: Vec<u32>,
+    /// A fixed row is a vertex without edges.
+    pub(super) kinds: Vec<RowKind>,
 }
 
 impl<'a> RowSource<'a> {
+    /// Without `free`, no vertex is fixed.
+    ///
     /// # Panics
-    /// If the numbering is not of these vertices.
+    /// If there is not one mark a vertex.
     pub(super) fn new(
         faces: &'a Faces,
         (incidence, open): (&'a Incidence, Option<&'a Topology>),
         scheme: Scheme,
-        (numbering, free): (Option<&'a Numbering>, Option<&'a [bool]>),
+        free: Option<&'a [bool]>,
     ) -> Self {
         let n = incidence.vertices();
-        let order = numbering.map(Numbering::order);
-        assert!(order.is_none_or(|order| order.len() == n), "one entry a vertex");
         assert!(free.is_none_or(|free| free.len() == n), "one mark a vertex");
-        let vertex = |k: usize| order.map_or(k, |order| order[k] as usize);
-        let valences = parallel::collect(n, |k| match open {
-            _ if free.is_some_and(|free| !free[vertex(k)]) => 0,
-            None => incidence.face_count(vertex(k)) as u32,
-            Some(topology) => topology.edge_valence(faces, vertex(k)) as u32,
+        let valences = parallel::collect(n, |v| match open {
+            _ if free.is_some_and(|free| !free[v]) => 0,
+            None => incidence.face_count(v) as u32,
+            Some(topology) => topology.edge_valence(faces, v) as u32,
         });
-        RowSource { faces, incidence, open, numbering, scheme, valences }
+        let kinds = kinds(faces, incidence, scheme, &valences);
+        RowSource { faces, incidence, open, scheme, valences, kinds }
     }
 
-    /// The vertex of a row.
-    fn vertex(&self, k: usize) -> usize {
-        self.numbering.map_or(k, |numbering| numbering.order()[k] as usize)
-    }
-
-    /// Fetches what rows after `k` will read, where they are not in the file's order.
-    #[inline(always)]
-    fn fetch_ahead(&self, k: usize) {
-        if let Some(numbering) = self.numbering {
-            self.incidence.fetch_ahead(self.faces, numbering.order(), k);
-        }
-    }
-
-    /// The row of a vertex.
-    fn row(&self, v: u32) -> u32 {
-        self.numbering.map_or(v, |numbering| numbering.place()[v as usize])
-    }
-
-    /// The kind of every row; a fixed one is a vertex without edges.
-    pub(super) fn kinds(&self) -> Vec<RowKind> {
-        let edges_only = self.scheme.edges_only();
-        let of_size = |size: usize| match size {
-            _ if edges_only => RowKind::Edges,
-            3 => RowKind::Edges,
-            4 => RowKind::Quads,
-            _ => RowKind::Polygons,
-        };
-        let n = self.valences.len();
-        // Where all faces are of one size, they need not be looked at.
-        if let Some(kind) = self.faces.uniform_size().map(of_size) {
-            return parallel::collect(n, |k| if self.valences[k] == 0 { RowKind::Edges } else { kind });
-        }
-        let incidence = self.incidence;
-        parallel::collect(n, |k| {
-            if self.valences[k] == 0 {
-                return RowKind::Edges;
-            }
-            self.fetch_ahead(k);
-            // One bit for each kind that occurs: no branch on what there is no pattern in.
-            let at = incidence.corners_at(self.vertex(k)).iter();
-            let met = at.fold(0, |met, &c| {
-                let kind = of_size(self.faces.range(incidence.face_of(c)).len());
-                met | 1u8 << kind as u8
-            });
-            let only = |kind: RowKind| met == 1 << kind as u8;
-            if only(RowKind::Quads) {
-                RowKind::Quads
-            } else if only(RowKind::Edges) {
-                RowKind::Edges
-            } else {
-                RowKind::Polygons
-            }
-        })
-    }
-
-    /// The faces that are summed, and the rows that read them.
-    pub(super) fn polygons(&self, kinds: &[RowKind]) -> Polygons {
-        let rows = (kinds, self.valences.as_slice());
-        Polygons::new(self.faces, self.incidence, self.scheme, self.numbering, rows)
-    }
-
-    /// Where the neighbours of each row start, and the end.
+    /// Where the neighbours of each row start, and the end, of rows of such kinds and valences.
     ///
     /// # Errors
     /// More than 2³² − 1 neighbours.
-    pub(super) fn offsets(&self, kinds: &[RowKind]) -> Result<Vec<u32>> {
+    pub(super) fn offsets(&self, kinds: &[RowKind], valences: &[u32]) -> Result<Vec<u32>> {
         let among_polygons = u32::from(self.scheme.edge_weight() != 0.0);
         let lengths = || {
-            kinds.iter().zip(&self.valences).map(|(kind, n)| match kind {
+            kinds.iter().zip(valences).map(|(kind, n)| match kind {
                 RowKind::Quads => 2 * n,
                 RowKind::Edges => *n,
                 RowKind::Polygons => among_polygons * n,
@@ -132,62 +92,143 @@ impl<'a> RowSource<'a> {
         Ok(offsets)
     }
 
-    /// The neighbours of all rows; `runs` are the first rows of those of equal kind and valence.
-    pub(super) fn codes(&self, kinds: &[RowKind], offsets: Vec<u32>, runs: Vec<u32>) -> Codes {
-        // Where all faces are of one size, the corners of a face take no look-up.
-        match self.faces.uniform_size() {
-            Some(3) => self.codes_by(kinds, (offsets, runs), |c| c / 3 * 3..c / 3 * 3 + 3),
-            Some(4) => self.codes_by(kinds, (offsets, runs), |c| c / 4 * 4..c / 4 * 4 + 4),
-            _ => self.codes_by(kinds, (offsets, runs), |c| self.faces.range(self.incidence.face_of(c as u32))),
+    /// The numbering of the rows if one is to be made, and if they are to be put in order, the neighbours by vertex: where
+    /// these are listed first, faces that meet are near, and a row comes from one place then.
+    ///
+    /// # Errors
+    /// As [`offsets`](Self::offsets).
+    pub(super) fn in_order(&self, order: &RowOrder) -> Result<(Option<Numbering>, Option<Neighbourhoods>)> {
+        let (faces, incidence) = (self.faces, self.incidence);
+        // Where no vertex is fixed, the lists of triangles are what the search goes along.
+        let is_listed = self.open.is_none() && !self.valences.contains(&0) && faces.uniform_size() == Some(3);
+        match order {
+            RowOrder::Given(None) => Ok((None, None)),
+            RowOrder::Given(Some(numbering)) => {
+                assert_eq!(numbering.order().len(), self.valences.len(), "one row a vertex");
+                Ok((None, Some(self.neighbourhoods()?)))
+            }
+            RowOrder::Kinds => match in_kinds(faces, incidence) {
+                Some(numbering) => Ok((Some(numbering), Some(self.neighbourhoods()?))),
+                None => Ok((None, None)),
+            },
+            RowOrder::Fronts if is_listed => {
+                let neighbours = self.neighbourhoods()?;
+                let numbering = in_fronts_along(faces, incidence, (&neighbours.starts, &neighbours.vertices));
+                Ok((Some(numbering), Some(neighbours)))
+            }
+            // The search is one thread's work.
+            RowOrder::Fronts => {
+                let (numbering, neighbours) = rayon::join(|| in_fronts(faces, incidence), || self.neighbourhoods());
+                Ok((Some(numbering), Some(neighbours?)))
+            }
         }
     }
 
+    fn neighbourhoods(&self) -> Result<Neighbourhoods> {
+        let starts = self.offsets(&self.kinds, &self.valences)?;
+        let mut vertices = large(vec![0; starts[starts.len() - 1] as usize]);
+        // Where all faces are of one size, the corners of a face take no look-up.
+        match self.faces.uniform_size() {
+            Some(3) => self.list(&starts, &mut vertices, |c| c / 3 * 3..c / 3 * 3 + 3),
+            Some(4) => self.list(&starts, &mut vertices, |c| c / 4 * 4..c / 4 * 4 + 4),
+            _ => self.list(&starts, &mut vertices, |c| self.faces.range(self.incidence.face_of(c as u32))),
+        }
+        Ok(Neighbourhoods { starts, vertices })
+    }
+
     /// `corners_by` tells the corners of the face of a corner.
-    fn codes_by(
-        &self,
-        kinds: &[RowKind],
-        (offsets, runs): (Vec<u32>, Vec<u32>),
-        corners_by: impl Fn(usize) -> Range<usize> + Sync,
-    ) -> Codes {
-        let incidence = self.incidence;
-        let corners = self.faces.corners();
-        Codes::new(offsets, runs, |k, row| {
-            if row.is_empty() {
-                return;
+    fn list(&self, starts: &[u32], vertices: &mut [u32], corners_by: impl Fn(usize) -> Range<usize> + Sync) {
+        parallel::parts(split_rows(starts, CHUNK, vertices), |vertices, mut part| {
+            for v in vertices {
+                let (row, rest) = part.split_at_mut((starts[v + 1] - starts[v]) as usize);
+                self.neighbours(v, row, &corners_by);
+                part = rest;
             }
-            self.fetch_ahead(k);
-            let v = self.vertex(k);
-            match kinds[k] {
-                RowKind::Quads => {
-                    let (edge, opposite) = row.split_at_mut(row.len() / 2);
-                    let at = incidence.corners_at(v).iter();
-                    for ((edge, opposite), &c) in edge.iter_mut().zip(opposite).zip(at) {
-                        let range = corners_by(c as usize);
-                        let place = c as usize - range.start;
-                        let face = &corners[range];
-                        *edge = self.row(face[(place + 1) % 4]);
-                        *opposite = self.row(face[(place + 2) % 4]);
+        });
+    }
+
+    /// The neighbours of all rows, which start at `offsets`; `runs` are the first rows of those of equal kind and valence. The
+    /// k-th row is that of the k-th vertex, or by a numbering, from what [`in_order`](Self::in_order) has listed.
+    pub(super) fn codes(
+        &self,
+        numbering: Option<(&Numbering, &Neighbourhoods)>,
+        offsets: Vec<u32>,
+        runs: Vec<u32>,
+    ) -> Codes {
+        /// Rows between one look-up and the next. Tuned.
+        const AHEAD: usize = 12;
+        let Some((numbering, Neighbourhoods { starts, vertices: neighbours })) = numbering else {
+            let corners_by = |c: usize| self.faces.range(self.incidence.face_of(c as u32));
+            return Codes::new(offsets, runs, |v, row| self.neighbours(v, row, corners_by));
+        };
+        let (order, place) = (numbering.order(), numbering.place());
+        Codes::new(offsets, runs, |k, row| {
+            if let Some(&v) = order.get(k + 2 * AHEAD) {
+                prefetch(starts, v as usize);
+            }
+            if let Some(&v) = order.get(k + AHEAD) {
+                prefetch(neighbours, starts[v as usize] as usize);
+                prefetch(neighbours, starts[v as usize + 1] as usize);
+            }
+            let there = &neighbours[starts[order[k] as usize] as usize..];
+            let moved = |row: &mut [u32], there: &[u32]| {
+                for (slot, &w) in row.iter_mut().zip(there) {
+                    *slot = place[w as usize];
+                }
+            };
+            // Without a loop for the usual lengths.
+            match row.len() {
+                4 => moved(&mut row[..4], &there[..4]),
+                6 => moved(&mut row[..6], &there[..6]),
+                8 => moved(&mut row[..8], &there[..8]),
+                _ => moved(row, there),
+            }
+        })
+    }
+
+    /// The neighbours of a vertex.
+    #[inline(always)]
+    fn neighbours(&self, v: usize, row: &mut [u32], corners_by: impl Fn(usize) -> Range<usize>) {
+        if row.is_empty() {
+            return;
+        }
+        let (incidence, corners) = (self.incidence, self.faces.corners());
+        match self.kinds[v] {
+            RowKind::Quads => {
+                let (edge, opposite) = row.split_at_mut(row.len() / 2);
+                let at = incidence.corners_at(v).iter();
+                for ((edge, opposite), &c) in edge.iter_mut().zip(opposite).zip(at) {
+                    let range = corners_by(c as usize);
+                    let place = c as usize - range.start;
+                    let face = &corners[range];
+                    *edge = face[(place + 1) % 4];
+                    *opposite = face[(place + 2) % 4];
+                }
+            }
+            // Every edge leaves v in one of its faces; on a boundary it may only enter.
+            RowKind::Edges | RowKind::Polygons => match self.open {
+                None => {
+                    for (slot, &c) in row.iter_mut().zip(incidence.corners_at(v)) {
+                        *slot = corners[next_in(&corners_by(c as usize), c) as usize];
                     }
                 }
-                RowKind::Edges | RowKind::Polygons => {
-                    // Every edge leaves v in one of its faces; on a boundary it may only enter.
+                Some(topology) => {
                     let mut slots = row.iter_mut();
                     for &c in incidence.corners_at(v) {
                         let range = corners_by(c as usize);
                         let into = prev_in(&range, c);
                         if let Some(slot) = slots.next() {
-                            *slot = self.row(corners[next_in(&range, c) as usize]);
+                            *slot = corners[next_in(&range, c) as usize];
                         }
-                        if let Some(topology) = self.open
-                            && topology.twin(into).is_none()
+                        if topology.twin(into).is_none()
                             && let Some(slot) = slots.next()
                         {
-                            *slot = self.row(corners[into as usize]);
+                            *slot = corners[into as usize];
                         }
                     }
                 }
-            }
-        })
+            },
+        }
     }
 
     /// The weights of rows by valence, times h.
@@ -220,6 +261,40 @@ impl<'a> RowSource<'a> {
     }
 }
 
+/// The kind of the row of every vertex.
+fn kinds(faces: &Faces, incidence: &Incidence, scheme: Scheme, valences: &[u32]) -> Vec<RowKind> {
+    let edges_only = scheme.edges_only();
+    let of_size = |size: usize| match size {
+        _ if edges_only => RowKind::Edges,
+        3 => RowKind::Edges,
+        4 => RowKind::Quads,
+        _ => RowKind::Polygons,
+    };
+    // Where all faces are of one size, they need not be looked at.
+    let uniform = faces.uniform_size().map(of_size);
+    parallel::collect(valences.len(), |v| {
+        if valences[v] == 0 {
+            return RowKind::Edges;
+        }
+        if let Some(kind) = uniform {
+            return kind;
+        }
+        // One bit for each kind that occurs: no branch on what there is no pattern in.
+        let met = incidence.corners_at(v).iter().fold(0, |met, &c| {
+            let kind = of_size(faces.range(incidence.face_of(c)).len());
+            met | 1u8 << kind as u8
+        });
+        let only = |kind: RowKind| met == 1 << kind as u8;
+        if only(RowKind::Quads) {
+            RowKind::Quads
+        } else if only(RowKind::Edges) {
+            RowKind::Edges
+        } else {
+            RowKind::Polygons
+        }
+    })
+}
+
 /// More neighbours than 32-bit numbers count: from 5.4·10⁸ vertices on among quads of valence 4, 7.1·10⁸ among triangles.
 fn too_many(neighbours: u64, rows: usize) -> Error {
     Error::TooLarge {
@@ -238,12 +313,12 @@ mod tests {
     fn more_neighbours_than_32_bits_count_are_refused_with_their_number() {
         let surface = Surface::new(builtin::builtin("cube").unwrap()).unwrap();
         let (faces, incidence) = (surface.faces(), surface.incidence());
-        let mut source = RowSource::new(faces, (incidence, None), Scheme::CatmullClark, (None, None));
+        let mut source = RowSource::new(faces, (incidence, None), Scheme::CatmullClark, None);
         source.valences.fill(1 << 28);
-        let kinds = source.kinds();
-        let message = source.offsets(&kinds).unwrap_err().to_string();
+        let offsets = |source: &RowSource| source.offsets(&source.kinds, &source.valences);
+        let message = offsets(&source).unwrap_err().to_string();
         assert!(message.contains("4294967296 neighbours in 8 rows, more than 2³² − 1"), "{message}");
         source.valences[3] -= 1;
-        assert_eq!(source.offsets(&kinds).unwrap().last(), Some(&(u32::MAX - 1)));
+        assert_eq!(offsets(&source).unwrap().last(), Some(&(u32::MAX - 1)));
     }
 }

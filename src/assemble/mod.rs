@@ -24,6 +24,7 @@ pub mod streamed;
 pub mod system;
 pub mod weights;
 
+pub(crate) use build::RowOrder;
 pub use csr::Csr;
 pub use general::GeneralSystem;
 pub use operator::Operator;

@@ -10,7 +10,7 @@ use crate::parallel;
 use crate::prefetch::prefetch;
 
 /// Rows of one task.
-const CHUNK: usize = 4096;
+const CHUNK: usize = 1024;
 /// Bytes between what a row reads and what it fetches for later rows. Tuned.
 const AHEAD: usize = 512;
 
@@ -168,23 +168,32 @@ fn encode<C: Code>(offsets: &[u32], fill: &(impl Fn(usize, &mut [u32]) + Sync)) 
     let mut codes = large(vec![C::default(); offsets[n] as usize]);
     let too_far = AtomicBool::new(false);
     let reaches = parallel::parts(split_rows(offsets, CHUNK, &mut codes), |rows, mut part| {
+        if too_far.load(Ordering::Relaxed) {
+            return 0;
+        }
         let (mut reach, mut last) = (0, 0);
-        let mut neighbours = Vec::new();
+        let mut neighbours = vec![0; part.len()];
+        let mut rest = &mut neighbours[..];
         for i in rows {
-            if too_far.load(Ordering::Relaxed) {
-                break;
-            }
             let length = (offsets[i + 1] - offsets[i]) as usize;
-            neighbours.clear();
-            neighbours.resize(length, 0);
-            fill(i, &mut neighbours);
-            let (row, after) = part.split_at_mut(length);
-            for (code, &j) in row.iter_mut().zip(&*neighbours) {
-                reach = reach.max(j.abs_diff(i as u32));
-                last = last.max(j);
-                *code = C::new(i as u32, j);
-            }
+            let (row, after) = rest.split_at_mut(length);
+            rest = after;
+            fill(i, row);
+            let (codes, after) = part.split_at_mut(length);
             part = after;
+            let mut encode = |row: &[u32], codes: &mut [C]| {
+                for (code, &j) in codes.iter_mut().zip(row) {
+                    reach = reach.max(j.abs_diff(i as u32));
+                    last = last.max(j);
+                    *code = C::new(i as u32, j);
+                }
+            };
+            match length {
+                4 => encode(&row[..4], &mut codes[..4]),
+                6 => encode(&row[..6], &mut codes[..6]),
+                8 => encode(&row[..8], &mut codes[..8]),
+                _ => encode(row, codes),
+            }
         }
         assert!((last as usize) < n, "a neighbour that is no vertex: {last}");
         if reach > C::REACH {

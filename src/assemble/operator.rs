@@ -6,8 +6,8 @@ use std::sync::OnceLock;
 use glam::DVec3;
 
 use super::bounds::SpectralBounds;
-use super::build::RowSource;
-use super::face_sums::Others;
+use super::build::{RowOrder, RowSource};
+use super::face_sums::{Others, Polygons};
 use super::kernel::{Stencil, runs};
 use super::neighbours::Neighbours;
 use super::system::{check, require_one_block};
@@ -61,11 +61,12 @@ impl Operator {
         check(surface, scheme)?;
         require_one_block(surface)?;
         let open = if surface.is_closed() { None } else { Some(surface.topology()) };
-        Self::build(surface.faces(), (surface.incidence(), open), scheme, (numbering, None))
+        let order = RowOrder::Given(numbering);
+        Ok(Self::build(surface.faces(), (surface.incidence(), open), scheme, (order, None))?.0)
     }
 
-    /// As [`in_order`](Self::in_order), on the renumbered faces where a surface has such inside; the numbering is one of
-    /// those vertices.
+    /// As [`in_order`](Self::in_order), on the renumbered faces where a surface has such inside; a numbering is one of
+    /// those vertices. Also the numbering that was made, if one was.
     ///
     /// The rows of vertices that are not marked `free` are *fixed*: zero, (A x)_i = 0. For x that vanishes there, the other
     /// rows are those of the principal submatrix A_SS, whose eigenvalues keep to the bounds by interlacing. On an open or
@@ -76,16 +77,16 @@ impl Operator {
     pub(crate) fn inside(
         surface: &Surface,
         scheme: Scheme,
-        numbering: Option<&Numbering>,
+        order: RowOrder,
         free: Option<&[bool]>,
-    ) -> Result<Self> {
-        let rows = (numbering, free);
+    ) -> Result<(Self, Option<Numbering>)> {
+        let rows = (order, free);
         match surface.renumbered() {
             Some(inside) => {
                 check(surface, scheme)?;
                 Self::build(&inside.faces, (&inside.incidence, None), scheme, rows)
             }
-            None => Self::with_fixed(surface, scheme, rows),
+            None => Self::of_file(surface, scheme, rows),
         }
     }
 
@@ -93,8 +94,16 @@ impl Operator {
     pub(super) fn with_fixed(
         surface: &Surface,
         scheme: Scheme,
-        rows: (Option<&Numbering>, Option<&[bool]>),
+        (numbering, free): (Option<&Numbering>, Option<&[bool]>),
     ) -> Result<Self> {
+        Ok(Self::of_file(surface, scheme, (RowOrder::Given(numbering), free))?.0)
+    }
+
+    fn of_file(
+        surface: &Surface,
+        scheme: Scheme,
+        rows: (RowOrder, Option<&[bool]>),
+    ) -> Result<(Self, Option<Numbering>)> {
         check(surface, scheme)?;
         let is_whole = surface.is_closed() || surface.features().is_some();
         let open = if is_whole { None } else { Some(surface.topology()) };
@@ -105,42 +114,51 @@ impl Operator {
         faces: &Faces,
         sides: (&Incidence, Option<&Topology>),
         scheme: Scheme,
-        rows: (Option<&Numbering>, Option<&[bool]>),
-    ) -> Result<Self> {
+        (order, free): (RowOrder, Option<&[bool]>),
+    ) -> Result<(Self, Option<Numbering>)> {
         let closed = sides.1.is_none();
-        let source = RowSource::new(faces, sides, scheme, rows);
-        let kinds = source.kinds();
-        let greatest = source.valences.iter().copied().max().unwrap_or(0);
+        let source = RowSource::new(faces, sides, scheme, free);
+        let (made, neighbours) = source.in_order(&order)?;
+        let numbering = match order {
+            RowOrder::Given(numbering) => numbering,
+            RowOrder::Kinds | RowOrder::Fronts => made.as_ref(),
+        };
+        let (kinds, valences) = match numbering {
+            Some(numbering) => (numbering.there(&source.kinds), numbering.there(&source.valences)),
+            None => (source.kinds.clone(), source.valences.clone()),
+        };
+        let greatest = valences.iter().copied().max().unwrap_or(0);
         let h: Vec<f64> = (0..=greatest).map(|n| scheme.h(n.max(1) as usize)).collect();
-        let polygons = source.polygons(&kinds);
-        let offsets = source.offsets(&kinds)?;
-        let runs = runs(&kinds, &source.valences);
-        let codes = source.codes(&kinds, offsets, runs);
+        let polygons = Polygons::new(faces, sides.0, scheme, numbering, (&kinds, &valences));
+        let offsets = source.offsets(&kinds, &valences)?;
+        let runs = runs(&kinds, &valences);
+        let codes = source.codes(numbering.zip(neighbours.as_ref()), offsets, runs);
         let double = source.rings();
         let stencil = Stencil { codes, kinds, single: double.single(), double, polygons };
         // The rows of a run are alike, but for the sizes of faces that are summed: there the extremes tell all.
         let extremes = parallel::collect(stencil.codes.runs().len(), |k| {
             let run = stencil.codes.run(k);
-            let n = source.valences[run.start];
+            let n = valences[run.start];
             let [least, greatest] = stencil.extremes(run);
             [(n, least), (n, greatest)]
         });
-        let (valences, diagonal): (Vec<u32>, Vec<f64>) = extremes.into_iter().flatten().filter(|e| e.0 > 0).unzip();
+        let (occurring, diagonal): (Vec<u32>, Vec<f64>) = extremes.into_iter().flatten().filter(|e| e.0 > 0).unzip();
         let triangles = faces.uniform_size() == Some(3);
         let bounds = if closed {
-            SpectralBounds::closed(scheme, &valences, triangles, &diagonal)
+            SpectralBounds::closed(scheme, &occurring, triangles, &diagonal)
         } else {
             SpectralBounds::gershgorin(&diagonal)
         };
-        Ok(Operator {
+        let operator = Operator {
             stencil,
             h,
             weights: OnceLock::new(),
             diagonal: OnceLock::new(),
             others: OnceLock::new(),
             bounds,
-            usual_lambda_min: usual_lambda_min(scheme, faces, &source.valences),
-        })
+            usual_lambda_min: usual_lambda_min(scheme, faces, &valences),
+        };
+        Ok((operator, made))
     }
 
     /// The number of vertices N.
@@ -332,7 +350,7 @@ mod tests {
                 let expected: Vec<DVec3> = (0..n).map(row).collect();
                 let (mut sums, mut image) = (Vec::new(), vec![DVec3::ONE; n]);
                 for order in [None, Some(&fronts)] {
-                    let fixed = Operator::inside(&surface, scheme, order, Some(&free)).unwrap();
+                    let fixed = Operator::inside(&surface, scheme, RowOrder::Given(order), Some(&free)).unwrap().0;
                     let there = |values: &[DVec3]| order.map_or(values.to_vec(), |order| order.there(values));
                     let (x, expected) = (there(&x), there(&expected));
                     fixed.all_sums(&x, &mut sums);

@@ -14,10 +14,10 @@
 //!
 //! *Order.* A large mesh whose vertices lie [scattered](crate::mesh::space_filling::is_scattered) in memory has been
 //! renumbered along a space-filling curve by [`Surface`]. From [`ORDERED`] vertices on, the rows of the operator are [breadth
-//! first](in_fronts), which gives it the narrow band that groups of iterations need. Below, all arrays stay in cache in
-//! any order, and rows are [grouped by kind](in_kinds) only; so they are for mixed faces under Nasri and Zheng-Cai, where
-//! iterations are too few to pay for the search, and in files whose own order keeps to a band as narrow. Results come back in
-//! the order of the surface.
+//! first](breadth_first::in_fronts), which gives it the narrow band that groups of iterations need. Below, all arrays stay
+//! in cache in any order, and rows are [grouped by kind](breadth_first::in_kinds) only; so they are for mixed faces under
+//! Nasri and Zheng-Cai, where iterations are too few to pay for the search, and in files whose own order keeps to a band as
+//! narrow. Results come back in the order of the surface.
 //!
 //! *Boundaries, creases, some vertices only.* What is known before is computed first, as in [`Stages`]: curves exactly, and
 //! V_j = P_j at corners and at vertices that are not interpolated. From these, and P at all others, the unknown is a
@@ -44,10 +44,11 @@ use crate::analysis::spectrum::spectrum;
 use crate::assemble::curves::Curves;
 use crate::assemble::stages::free;
 use crate::assemble::stars::StarRows;
-use crate::assemble::{LimitSystem, Operator, Stages};
+use crate::assemble::{LimitSystem, Operator, RowOrder, Stages};
 use crate::error::{Error, Result};
 use crate::memory::require;
-use crate::mesh::breadth_first::{in_fronts, in_kinds};
+#[cfg(doc)]
+use crate::mesh::breadth_first;
 use crate::mesh::features::Features;
 use crate::mesh::order::Numbering;
 use crate::mesh::{Faces, Mesh, Surface, diagonal};
@@ -230,7 +231,7 @@ pub fn limit_points(surface: &Surface, scheme: Scheme) -> Result<Vec<DVec3>> {
         (Some(inside), Some(marks)) => Some(inside.numbering.there(marks)),
         (_, marks) => marks.clone(),
     };
-    let operator = Operator::inside(surface, scheme, None, marks.as_deref())?;
+    let (operator, _) = Operator::inside(surface, scheme, RowOrder::Given(None), marks.as_deref())?;
     let points = there(control);
     let points = points.as_deref().unwrap_or(control);
     let mut limits = vec![DVec3::ZERO; control.len()];
@@ -381,22 +382,16 @@ impl Interpolator {
     /// If there is not one mark a vertex.
     pub fn new(surface: &Surface, scheme: Scheme, interpolated: Option<&[bool]>) -> Result<Self> {
         let free = free(surface, interpolated)?;
-        let (faces, incidence) = match surface.renumbered() {
-            Some(inside) => (&inside.faces, &inside.incidence),
-            None => (surface.faces(), surface.incidence()),
-        };
+        let faces = surface.renumbered().map_or(surface.faces(), |inside| &inside.faces);
         // Among mixed faces the search costs twice as much.
         let few = scheme.usual_lambda_min() >= FEW && faces.uniform_size().is_none();
-        let rows = if surface.len() >= ORDERED && !few && !is_narrow(faces, surface.len()) {
-            Some(in_fronts(faces, incidence))
-        } else {
-            in_kinds(faces, incidence)
-        };
+        let is_ordered = surface.len() >= ORDERED && !few && !is_narrow(faces, surface.len());
+        let order = if is_ordered { RowOrder::Fronts } else { RowOrder::Kinds };
         let marks = match (surface.renumbered(), free) {
             (Some(inside), Some(marks)) => Some(inside.numbering.there(&marks)),
             (_, marks) => marks,
         };
-        let operator = Operator::inside(surface, scheme, rows.as_ref(), marks.as_deref())?;
+        let (operator, rows) = Operator::inside(surface, scheme, order, marks.as_deref())?;
         let free = marks.map(|marks| rows.as_ref().map_or(marks.clone(), |rows| rows.there(&marks)));
         let numbering = match (surface.renumbered(), rows) {
             (Some(inside), Some(rows)) => Some(Numbering::new(rows.there(inside.numbering.order()))),

@@ -1,23 +1,28 @@
 //! Degenerate positions: vertices on the same point, faces on the same points, faces without area.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use glam::DVec3;
-use rayon::slice::ParallelSliceMut;
 
-use super::Faces;
 use super::frame::magnitude;
+use super::incidence::NONE;
+use super::numbering::add_up;
 use super::origin::Numbers;
+use super::{Faces, Incidence};
 use crate::error::counted;
-use crate::pages::large;
 use crate::parallel;
-use crate::prefetch::prefetch;
 
 /// A remark for each kind of oddity that occurs, with its count and first place, in the [`Numbers`] of the file.
 ///
+/// A mesh that `is_closed` is a closed surface with valences from 3 on. Two of its triangles on three vertices would share
+/// all edges, and no other face could be at these vertices: there they need not be looked for.
+///
 /// # Panics
 /// If a face names a vertex that does not exist.
-pub(super) fn remarks(positions: &[DVec3], faces: &Faces, numbers: &Numbers) -> Vec<String> {
+pub(super) fn remarks(
+    positions: &[DVec3],
+    (faces, incidence): (&Faces, &Incidence),
+    numbers: &Numbers,
+    is_closed: bool,
+) -> Vec<String> {
     let mut remarks = Vec::new();
     let copies = duplicate_positions(positions);
     if let Some([v, original]) = copies.first().map(|&(v, w)| [v, w].map(|v| numbers.vertex(v))) {
@@ -26,7 +31,11 @@ pub(super) fn remarks(positions: &[DVec3], faces: &Faces, numbers: &Numbers) -> 
             counted(copies.len(), "duplicate position")
         ));
     }
-    let copies = duplicate_faces(faces, positions.len(), &copies);
+    let copies = if is_closed && copies.is_empty() && faces.uniform_size() == Some(3) {
+        Vec::new()
+    } else {
+        duplicate_faces(faces, incidence, &copies)
+    };
     if let Some([f, original]) = copies.first().map(|&(f, g)| [f, g].map(|f| numbers.face(f))) {
         remarks.push(format!(
             "{} on the same positions as another (first: face {f} lies on face {original})",
@@ -42,96 +51,128 @@ pub(super) fn remarks(positions: &[DVec3], faces: &Faces, numbers: &Numbers) -> 
 }
 
 /// The vertices whose coordinates equal those of a vertex before them, with the first such vertex; ascending.
-/// Zeros of either sign are equal; vertices that are not finite do not count. O(n log n).
-fn duplicate_positions(positions: &[DVec3]) -> Vec<(u32, u32)> {
-    // Adding +0 makes −0 to +0.
-    let bits = |v: u32| (positions[v as usize] + DVec3::ZERO).to_array().map(f64::to_bits);
-    let key = |v: u32| {
-        let is_finite = positions[v as usize].is_finite();
-        is_finite.then(|| bits(v).into_iter().fold(0, |h, b| mix(h ^ b)))
-    };
-    copies(positions.len() as u32, key, bits)
-}
-
-/// The faces whose corners, in any order, lie on the same positions as those of a face before them, with the
-/// first such face; ascending. O(n log n). `same` are the duplicate positions.
-fn duplicate_faces(faces: &Faces, vertices: usize, same: &[(u32, u32)]) -> Vec<(u32, u32)> {
-    let mut table: Vec<u32> = Vec::new();
-    if !same.is_empty() {
-        table.extend(0..vertices as u32);
-        for &(v, original) in same {
-            table[v as usize] = original;
-        }
-    }
-    let place = |&v: &u32| table.get(v as usize).copied().unwrap_or(v);
-    let key = |f: u32| {
-        // A sum does not depend on the order of the corners.
-        let places = faces.face(f as usize).iter().map(place);
-        Some(places.fold(0u64, |h, p| h.wrapping_add(mix(u64::from(p)))))
-    };
-    copies(faces.len() as u32, key, |f| {
-        let mut places: Vec<u32> = faces.face(f as usize).iter().map(place).collect();
-        places.sort_unstable();
-        places
-    })
-}
-
-/// Of `count` items, those equal to one before them by `value`, each with the first of its equals. Equal values must
-/// have equal keys; few unequal ones may. Items without a key have no equals.
+/// Zeros of either sign are equal; vertices that are not finite do not count. O(n).
 ///
-/// Only items that share a bit of a table with another are sorted, an eighth if all are different.
-fn copies<T: Ord>(count: u32, key: impl Fn(u32) -> Option<u64> + Sync, value: impl Fn(u32) -> T) -> Vec<(u32, u32)> {
-    const BITS_PER_ITEM: usize = 16;
-    const BLOCK: usize = 64;
-    let bits = (BITS_PER_ITEM * count as usize).next_power_of_two().max(64);
-    let table = || -> Vec<AtomicU64> {
-        let mut words = large(Vec::with_capacity(bits / 64));
-        parallel::extend(&mut words, bits / 64, |_| |_| AtomicU64::new(0));
-        words
-    };
-    let (met, met_again) = (table(), table());
-    let place = |key: u64| {
-        let bit = key as usize & (bits - 1);
-        (bit / 64, 1u64 << (bit % 64))
-    };
-    // Each look into a table is a wait for memory, unless it is asked for some items before.
-    let block = |k: u32, table: &[AtomicU64]| {
-        let items = k * BLOCK as u32..count.min((k + 1) * BLOCK as u32);
-        let mut keys = [None; BLOCK];
-        for (slot, item) in keys.iter_mut().zip(items.clone()) {
-            *slot = key(item);
-            if let Some(key) = *slot {
-                prefetch(table, place(key).0);
+/// Equal vertices have equal keys, and fall into one of 256 parts by the first bits of these. A part stays in cache; there,
+/// only items that share a bit of a table with another are sorted, an eighth if all are different.
+fn duplicate_positions(positions: &[DVec3]) -> Vec<(u32, u32)> {
+    const PARTS: usize = 256;
+    const CHUNK: usize = 1 << 16;
+    let key = |v: usize| bits_of(positions[v]).into_iter().fold(0, |h, b| mix(h ^ b));
+    let part = |item: u64| (item >> 56) as usize;
+    let chunks = parallel::map(positions.len(), CHUNK, |range| {
+        let finite = range.filter(|&v| positions[v].is_finite());
+        // The upper half of the key, and the vertex.
+        let items: Vec<u64> = finite.map(|v| key(v) >> 32 << 32 | v as u64).collect();
+        let mut starts = [0u32; PARTS + 1];
+        for &item in &items {
+            starts[part(item) + 1] += 1;
+        }
+        add_up(&mut starts);
+        let mut next = starts;
+        let mut sorted = vec![0; items.len()];
+        for &item in &items {
+            let next = &mut next[part(item)];
+            sorted[*next as usize] = item;
+            *next += 1;
+        }
+        (starts, sorted)
+    });
+    let mut copies = parallel::flat_map(PARTS, 1, |range| {
+        let part = |k: usize| {
+            let lists = chunks.iter().map(move |(starts, sorted)| &sorted[starts[k] as usize..starts[k + 1] as usize]);
+            lists.flatten().copied()
+        };
+        let count = part(range.start).count();
+        let bits = (16 * count).next_power_of_two().max(64);
+        let place = |item: u64| {
+            let bit = (item >> 32) as usize & (bits - 1);
+            (bit / 64, 1u64 << (bit % 64))
+        };
+        let mut met = vec![[0u64; 2]; bits / 64];
+        for item in part(range.start) {
+            let (word, bit) = place(item);
+            let [once, again] = &mut met[word];
+            *again |= *once & bit;
+            *once |= bit;
+        }
+        let shared = part(range.start).filter(|&item| {
+            let (word, bit) = place(item);
+            met[word][1] & bit != 0
+        });
+        equal_by(shared.map(|item| ((item >> 32) as u32, item as u32)), |v| bits_of(positions[v as usize]))
+    });
+    copies.sort_unstable();
+    copies
+}
+
+/// Of a position, alike for zeros of either sign: adding +0 makes −0 to +0.
+fn bits_of(position: DVec3) -> [u64; 3] {
+    (position + DVec3::ZERO).to_array().map(f64::to_bits)
+}
+
+/// The faces whose corners, in any order, lie on the same positions as those of a face before them, with the first such face;
+/// ascending. `same` are the duplicate positions. O(corners), with sorts among the faces that have one smallest vertex.
+fn duplicate_faces(faces: &Faces, incidence: &Incidence, same: &[(u32, u32)]) -> Vec<(u32, u32)> {
+    if same.is_empty() {
+        return faces_on_the_same_vertices(faces, incidence);
+    }
+    let mut place: Vec<u32> = (0..incidence.vertices() as u32).collect();
+    for &(v, original) in same {
+        place[v as usize] = original;
+    }
+    let mut moved = faces.copied();
+    parallel::change(moved.corners_mut(), |_, v| *v = place[*v as usize]);
+    let incidence = Incidence::new(&moved, place.len());
+    faces_on_the_same_vertices(&moved, &incidence)
+}
+
+/// Faces on the same vertices are among those that have one smallest vertex.
+fn faces_on_the_same_vertices(faces: &Faces, incidence: &Incidence) -> Vec<(u32, u32)> {
+    let smallest = parallel::collect(faces.len(), |f| faces.face(f).iter().copied().min().unwrap_or(NONE));
+    let mut copies = parallel::flat_map(incidence.vertices(), 4096, |range| {
+        let (mut copies, mut met) = (Vec::new(), Vec::new());
+        for v in range {
+            met.clear();
+            for &c in incidence.corners_at(v) {
+                let f = incidence.face_of(c) as u32;
+                // A face may pass the vertex more than once.
+                if smallest[f as usize] == v as u32 && met.last() != Some(&f) {
+                    met.push(f);
+                }
+            }
+            if met.len() > 1 {
+                copies.extend(equal_by(met.iter().map(|&f| (sum_of(faces.face(f as usize)), f)), |f| {
+                    let mut vertices = faces.face(f as usize).to_vec();
+                    vertices.sort_unstable();
+                    vertices
+                }));
             }
         }
-        items.zip(keys).filter_map(|(item, key)| Some((key?, item)))
-    };
-    let blocks = count.div_ceil(BLOCK as u32) as usize;
-    parallel::each(blocks, |k| {
-        for (key, _) in block(k as u32, &met) {
-            let (word, bit) = place(key);
-            if met[word].fetch_or(bit, Ordering::Relaxed) & bit != 0 {
-                met_again[word].fetch_or(bit, Ordering::Relaxed);
-            }
-        }
+        copies
     });
-    let shares_a_bit = |&(key, _): &(u64, u32)| {
-        let (word, bit) = place(key);
-        met_again[word].load(Ordering::Relaxed) & bit != 0
-    };
-    let mut keys: Vec<(u64, u32)> = parallel::flat_map(blocks, BLOCK, |range| {
-        range.flat_map(|k| block(k as u32, &met_again).filter(shares_a_bit)).collect()
-    });
-    keys.par_sort_unstable();
+    copies.sort_unstable();
+    copies
+}
+
+/// A number that does not depend on the order of the corners.
+fn sum_of(face: &[u32]) -> u64 {
+    face.iter().fold(0, |sum: u64, &v| sum.wrapping_add(mix(u64::from(v))))
+}
+
+/// Of items by their keys, those equal to one before them by `value`, each with the first of its equals. Equal values must have
+/// equal keys; few unequal ones may.
+fn equal_by<K: Ord + Copy, T: Ord>(items: impl Iterator<Item = (K, u32)>, value: impl Fn(u32) -> T) -> Vec<(u32, u32)> {
+    let mut items: Vec<(K, u32)> = items.collect();
+    items.sort_unstable();
     let mut copies = Vec::new();
-    for run in keys.chunk_by(|a, b| a.0 == b.0).filter(|run| run.len() > 1) {
+    for run in items.chunk_by(|a, b| a.0 == b.0).filter(|run| run.len() > 1) {
         let mut values: Vec<(T, u32)> = run.iter().map(|&(_, item)| (value(item), item)).collect();
         values.sort_unstable();
         for equal in values.chunk_by(|a, b| a.0 == b.0) {
             copies.extend(equal[1..].iter().map(|&(_, item)| (item, equal[0].1)));
         }
     }
-    copies.sort_unstable();
     copies
 }
 
@@ -193,8 +234,41 @@ mod tests {
     fn faces_are_compared_by_position_in_any_rotation_and_direction() {
         let faces = Faces::from_lists([[0u32, 1, 2], [2, 3, 1], [1, 0, 4], [1, 2, 0], [4, 1, 3]]);
         // 4 lies on 2.
-        let copies = duplicate_faces(&faces, 5, &[(4, 2)]);
+        let copies = duplicate_faces(&faces, &Incidence::new(&faces, 5), &[(4, 2)]);
         assert_eq!(copies, [(2, 0), (3, 0), (4, 1)]);
+    }
+
+    /// More than one chunk of them, some far apart, against a map of all.
+    #[test]
+    fn duplicates_are_found_among_many() {
+        use std::collections::HashMap;
+        let position = |v: u32| {
+            let v = if v % 97 == 5 { v / 3 } else { v };
+            DVec3::new(f64::from(v % 1000), f64::from(v / 1000), 0.5)
+        };
+        let positions: Vec<DVec3> = (0..200_000).map(position).collect();
+        let mut first = HashMap::new();
+        let expected: Vec<(u32, u32)> = (0..)
+            .zip(&positions)
+            .filter_map(|(v, p)| {
+                let original = *first.entry(p.to_array().map(f64::to_bits)).or_insert(v);
+                (original != v).then_some((v, original))
+            })
+            .collect();
+        assert!(expected.len() > 2000);
+        assert_eq!(duplicate_positions(&positions), expected);
+    }
+
+    /// Quads on the same vertices in another order share two edges, and may be part of a surface.
+    #[test]
+    fn faces_of_one_smallest_vertex_are_compared_with_each_other() {
+        let faces = Faces::from_lists([[0u32, 1, 2, 3], [4, 1, 0, 5], [0, 2, 1, 3], [0, 1, 2, 6], [3, 4, 5, 6]]);
+        assert_eq!(duplicate_faces(&faces, &Incidence::new(&faces, 7), &[]), [(2, 0)]);
+        // More than can be at a vertex of a surface, the same face passing one of its vertices twice.
+        let mut lists: Vec<Vec<u32>> = (1..60).map(|k| vec![0, k, k + 1]).collect();
+        lists.extend([vec![0, 7, 0, 8], vec![8, 0, 7], vec![41, 0, 40]]);
+        let faces = Faces::from_lists(lists);
+        assert_eq!(duplicate_faces(&faces, &Incidence::new(&faces, 61), &[]), [(60, 6), (61, 39)]);
     }
 
     #[test]

@@ -56,8 +56,13 @@ impl Incidence {
     /// # Panics
     /// If a corner names a vertex ≥ `vertices` (the validator reports such faces before).
     pub fn new(faces: &Faces, vertices: usize) -> Self {
-        let (offsets, corners) = sorted_by(faces.corners(), vertices);
-        Incidence::from_parts(offsets, corners, faces)
+        Self::checked(faces, vertices).expect("every corner names a vertex")
+    }
+
+    /// As [`new`](Self::new); `None` if a corner names no vertex.
+    pub(crate) fn checked(faces: &Faces, vertices: usize) -> Option<Self> {
+        let (offsets, corners) = sorted_below(faces.corners(), vertices)?;
+        Some(Incidence::from_parts(offsets, corners, faces))
     }
 
     /// From its arrays.
@@ -171,10 +176,34 @@ impl Incidence {
     /// assert_eq!(boundary(&Faces::from_lists([[0u32, 1, 2], [0, 1, 3]])), None);
     /// ```
     pub fn boundary_vertices(&self, faces: &Faces) -> Option<Vec<u32>> {
+        // Compiled for each kind of face.
+        match &self.face {
+            FaceOf::Triangles => self.boundary_by(faces, |c| (c - c % 3 + (c + 1) % 3, c - c % 3 + (c + 2) % 3)),
+            FaceOf::Quads => self.boundary_by(faces, |c| (c & !3 | (c + 1) & 3, c & !3 | (c + 3) & 3)),
+            FaceOf::Table(_) => self.boundary_by(faces, |c| (self.next(faces, c), self.prev(faces, c))),
+        }
+    }
+
+    /// `beside` tells the corners after and before one in its face.
+    fn boundary_by(&self, faces: &Faces, beside: impl Fn(u32) -> (u32, u32) + Sync) -> Option<Vec<u32>> {
+        let corners = faces.corners();
         let parts = parallel::map(self.vertices(), CHUNK, |range| {
             let mut found = Vec::new();
             for v in range {
-                if !self.is_umbrella(faces, v) {
+                if self.is_met_twice(v) {
+                    return None;
+                }
+                let sides = self.corners_at(v).iter().map(|&c| {
+                    let (after, before) = beside(c);
+                    (corners[after as usize], corners[before as usize])
+                });
+                // Eight at a time, by one comparison of all: a vertex of more faces is rare.
+                let is_umbrella = match sides.len() {
+                    n if n > FEW => one_umbrella(v, sides),
+                    n if n <= FEW / 2 => each_once::<{ FEW / 2 }>(v, sides),
+                    _ => each_once::<FEW>(v, sides),
+                };
+                if !is_umbrella {
                     fan(v, self.sides_at(faces, v))?;
                     found.push(v as u32);
                 }
@@ -209,15 +238,12 @@ impl Incidence {
         })
     }
 
+    /// Whether a face passes `v` more than once.
     #[inline(always)]
-    fn is_umbrella(&self, faces: &Faces, v: usize) -> bool {
-        let sides = self.sides_at(faces, v);
-        // Eight at a time, by one comparison of all: a vertex of more faces is rare.
-        match self.face_count(v) {
-            n if n > FEW => one_umbrella(v, sides),
-            n if n <= FEW / 2 => each_once::<{ FEW / 2 }>(v, sides),
-            _ => each_once::<FEW>(v, sides),
-        }
+    fn is_met_twice(&self, v: usize) -> bool {
+        // Among triangles such corners follow each other: a side from `v` to itself.
+        let at = self.corners_at(v);
+        !matches!(self.face, FaceOf::Triangles) && at.windows(2).any(|c| self.face_of(c[0]) == self.face_of(c[1]))
     }
 }
 
@@ -227,6 +253,11 @@ impl Incidence {
 /// # Panics
 /// If a key is `end` or greater.
 pub(super) fn sorted_by(keys: &[u32], end: usize) -> (Vec<u32>, Vec<u32>) {
+    sorted_below(keys, end).expect("every key is below the end")
+}
+
+/// As [`sorted_by`]; `None` if a key is `end` or greater.
+fn sorted_below(keys: &[u32], end: usize) -> Option<(Vec<u32>, Vec<u32>)> {
     /// Beyond these many threads, reading the keys outweighs sorting them.
     const MOST_PARTS: usize = 8;
     let parts = rayon::current_num_threads().min(MOST_PARTS);
@@ -243,7 +274,9 @@ pub(super) fn sorted_by(keys: &[u32], end: usize) -> (Vec<u32>, Vec<u32>) {
     for key in 0..end {
         offsets[key + 1] += offsets[key];
     }
-    assert!(offsets[end] as usize == keys.len(), "every key is below the end");
+    if offsets[end] as usize != keys.len() {
+        return None;
+    }
     let mut sorted = large(vec![0u32; keys.len()]);
     parallel::parts(split_rows(&offsets, share, &mut sorted), |rows, sorted| {
         let base = offsets[rows.start];
@@ -257,7 +290,7 @@ pub(super) fn sorted_by(keys: &[u32], end: usize) -> (Vec<u32>, Vec<u32>) {
             }
         }
     });
-    (offsets, sorted)
+    Some((offsets, sorted))
 }
 
 /// Whether the vertices where sides leave `v` for are the ones that sides enter it from, no two the same and none `v`,
@@ -271,19 +304,18 @@ fn each_once<const MOST: usize>(v: usize, sides: impl Iterator<Item = (u32, u32)
         (out[k], into[k]) = (to, from);
         count += 1;
     }
-    let times = |list: &[u32; MOST], w: u32| list.iter().map(|&x| u32::from(x == w)).sum::<u32>();
-    let mut wrong = 0;
-    for &w in &out[..count] {
-        wrong |= (times(&out, w) ^ 1) | (times(&into, w) ^ 1) | u32::from(w as usize == v);
+    // Across the side that enters, the next face counter-clockwise: one bit for each side that leaves for the same vertex.
+    let mut next = [0u32; MOST];
+    let mut wrong = u32::from(count == 0);
+    for (next, &w) in next.iter_mut().zip(&into[..count]) {
+        let meeting: u32 = (0..MOST).zip(out).map(|(k, x)| u32::from(x == w) << k).sum();
+        wrong |= u32::from(!meeting.is_power_of_two()) | u32::from(w as usize == v);
+        *next = meeting.trailing_zeros();
     }
-    if wrong != 0 || count == 0 {
+    if wrong != 0 {
         return false;
     }
-    // Across the side that enters, the next face counter-clockwise.
-    let mut next = [0u32; MOST];
-    for (next, &w) in next.iter_mut().zip(&into[..count]) {
-        *next = (0..MOST as u32).zip(out).map(|(k, x)| if x == w { k } else { 0 }).sum();
-    }
+    // A turn through all faces passes each side that leaves once, so that no two lead to one vertex.
     let mut place = 0;
     for turns in 1..=count {
         place = next[place as usize];

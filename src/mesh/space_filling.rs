@@ -12,11 +12,11 @@ use crate::parallel;
 
 /// Whether vertices that faces bring together lie scattered through memory: of the vertices that a face does not
 /// share with the face before it, fewer than a quarter are within 128 places of one of that face's. Looks
-/// at 65 536 faces at the most; O(C log C) in their corners C.
+/// at 16 384 faces at the most; O(C log C) in their corners C.
 pub fn is_scattered(faces: &Faces) -> bool {
     const NEAR: u32 = 128;
     const NEAR_SHARE: f64 = 0.25;
-    const SAMPLE: usize = 1 << 16;
+    const SAMPLE: usize = 1 << 14;
     let (mut fresh, mut near) = (0u32, 0u32);
     let mut before = Vec::new();
     for f in (1..faces.len()).step_by(faces.len() / SAMPLE + 1) {

@@ -17,8 +17,6 @@ use crate::{Error, Result, parallel};
 
 /// From this many vertices on, a scattered mesh is renumbered. Tuned.
 const SCATTERED: usize = 50_000;
-/// Up to so many corners of a face, each is compared with each.
-const FEW: usize = 16;
 
 /// A mesh that the validator has passed, with its topology: an oriented manifold, closed unless a boundary was allowed,
 /// of faces with three different vertices or more, every vertex finite and of valence 3 or more.
@@ -346,11 +344,23 @@ impl Surface {
         if let Some(renumbered) = self.renumbered() {
             // Looking for what is not there is many times faster so. What is there needs the file's own numbers.
             let positions = renumbered.numbering.there(self.positions());
-            if degenerate::remarks(&positions, &renumbered.faces, &Numbers::default()).is_empty() {
+            if degenerate::remarks(
+                &positions,
+                (&renumbered.faces, &renumbered.incidence),
+                &Numbers::default(),
+                self.is_closed(),
+            )
+            .is_empty()
+            {
                 return remarks;
             }
         }
-        remarks.extend(degenerate::remarks(self.positions(), self.faces(), numbers));
+        remarks.extend(degenerate::remarks(
+            self.positions(),
+            (self.faces(), self.incidence()),
+            numbers,
+            self.is_closed(),
+        ));
         remarks
     }
 
@@ -371,6 +381,7 @@ impl Connectivity {
     /// another boundary.
     fn manifold(mesh: &Mesh, boundary: Boundary) -> Option<Self> {
         let renumbered = if mesh.len() >= SCATTERED && is_scattered(&mesh.faces) { along_curve(mesh) } else { None };
+
         Self::checked(mesh, boundary, renumbered)
     }
 
@@ -380,16 +391,15 @@ impl Connectivity {
             Some((moved, ..)) => (&moved.faces, &moved.positions),
             None => (&mesh.faces, &mesh.positions),
         };
-        let corners = faces.corners();
-        let in_range = parallel::all(corners.len(), |c| (corners[c] as usize) < points.len());
-        if faces.is_empty() || !in_range {
+        let has_sides = faces.uniform_size().is_some_and(|size| size >= 3)
+            || parallel::all(faces.len(), |f| faces.range(f).len() >= 3);
+        if faces.is_empty() || !has_sides {
             return None;
         }
-        let incidence = Incidence::new(faces, points.len());
+        let incidence = Incidence::checked(faces, points.len())?;
         let is_sharp = matches!(boundary, Boundary::EdgeAndCorner | Boundary::EdgeOnly);
         let least = if is_sharp { 1 } else { 3 };
-        let sound = parallel::all(points.len(), |v| points[v].is_finite() && incidence.face_count(v) >= least)
-            && parallel::all(faces.len(), |f| are_distinct(faces.face(f)));
+        let sound = parallel::all(points.len(), |v| points[v].is_finite() && incidence.face_count(v) >= least);
         let on_boundary = if sound { incidence.boundary_vertices(faces)? } else { return None };
         if on_boundary.is_empty() {
             if !parallel::all(points.len(), |v| incidence.face_count(v) >= 3) {
@@ -434,17 +444,6 @@ impl Connectivity {
         let incidence = OnceLock::from(Arc::new(incidence));
         Some(Connectivity { boundary, sides, features, incidence, renumbered, ..Connectivity::new(false) })
     }
-}
-
-/// Whether a face has three corners or more, no two the same vertex.
-fn are_distinct(face: &[u32]) -> bool {
-    let n = face.len();
-    if n <= FEW {
-        return n >= 3 && (1..n).all(|i| !face[..i].contains(&face[i]));
-    }
-    let mut sorted = face.to_vec();
-    sorted.sort_unstable();
-    sorted.windows(2).all(|w| w[0] != w[1])
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Mesh validation: all defects at once, each with its place, and remarks on what is merely odd.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
@@ -215,14 +216,14 @@ fn examine(mesh: &Mesh, boundary: Boundary) -> Validation {
     }
     let corners = mesh.faces.corners();
     let indices_are_good = parallel::all(corners.len(), |c| (corners[c] as usize) < mesh.len());
+    let incidence = indices_are_good.then(|| Arc::new(Incidence::new(&mesh.faces, mesh.len())));
     let ((defects, isolated), remarks) = rayon::join(
         || examine_faces(mesh),
         || {
-            if !indices_are_good {
-                return Vec::new();
-            }
-            let topology = || examine_topology(mesh, boundary, &mut report);
-            rayon::join(topology, || degenerate::remarks(&mesh.positions, &mesh.faces, &Numbers::default())).1
+            let Some(incidence) = &incidence else { return Vec::new() };
+            let topology = || examine_topology(mesh, Arc::clone(incidence), boundary, &mut report);
+            let all = (&mesh.faces, &**incidence);
+            rayon::join(topology, || degenerate::remarks(&mesh.positions, all, &Numbers::default(), false)).1
         },
     );
     report.remarks.extend(remarks);
@@ -280,9 +281,9 @@ fn examine_faces(mesh: &Mesh) -> (Vec<Defect>, usize) {
 }
 
 /// Defects of edges and vertices, the counts, and the topology itself.
-fn examine_topology(mesh: &Mesh, boundary: Boundary, report: &mut Validation) {
+fn examine_topology(mesh: &Mesh, incidence: Arc<Incidence>, boundary: Boundary, report: &mut Validation) {
     let faces = &mesh.faces;
-    let topology = Topology::new(faces, mesh.len());
+    let topology = Topology::of(incidence, faces);
     let incidence = &topology.incidence;
     for edge in topology.irregular_edges().iter().filter(|e| !e.is_loop()) {
         let [first, last] = edge.half_edges.map(|c| incidence.face_of(c));
