@@ -507,7 +507,7 @@ proptest! {
 
 /// The folder of models beside the repository, if it is there.
 fn collection() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes");
     if !folder.is_dir() {
         let _ = writeln!(std::io::stderr(), "skipped: no ../shared/meshes");
         return None;

@@ -76,7 +76,7 @@ fn the_largest_update_ends_the_sweeps() {
 /// Zheng-Cai §3.5, first example: three sweeps at 0.3 % on the model with 562 vertices.
 #[test]
 fn the_paper_s_first_example_takes_three_sweeps() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/meshes/closed/psb_m1630_hat_562v.off");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/meshes/closed/psb_m1630_hat_562v.off");
     let Ok(loaded) = io::read(path.as_ref()) else {
         use std::io::Write;
         writeln!(std::io::stderr(), "skipped: {path} is not there").unwrap();
