@@ -5,6 +5,8 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 
+use crate::parallel;
+
 /// The paper's two errors of an iterate: over the vertices, in the units of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
@@ -229,7 +231,15 @@ pub fn solve(method: &mut dyn Iterate, stop: &Stop, watch: &mut dyn FnMut(&Step)
 
 /// The largest coordinate.
 pub(crate) fn largest(points: &[DVec3]) -> f64 {
-    points.iter().fold(0.0f64, |m, p| m.max(p.abs().max_element()))
+    largest_of(points, |p| p.abs().max_element())
+}
+
+/// The largest `value` of a point, 0 at least; what is not a number does not count. In parallel.
+pub(crate) fn largest_of(points: &[DVec3], value: impl Fn(DVec3) -> f64 + Sync) -> f64 {
+    const CHUNK: usize = 4096;
+    let parts =
+        parallel::map(points.len(), CHUNK, |range| points[range].iter().fold(0.0, |m: f64, &p| m.max(value(p))));
+    parts.into_iter().fold(0.0, f64::max)
 }
 
 /// As [`solve`], for data whose largest coordinate is `size`.

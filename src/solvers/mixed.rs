@@ -127,8 +127,7 @@ fn in_pool(
     // Residuals in units of the tolerance are far from the ends of single precision's range.
     let unit = if stop.tolerance > 0.0 { stop.tolerance } else { 1.0 };
     let least = operator.bounds().lambda_min.clamp(LOWEST, 1.0);
-    let largest = points.iter().map(|p| p.length_squared()).fold(0.0, f64::max);
-    let floor = FLOOR * f64::EPSILON * largest.sqrt();
+    let floor = FLOOR * f64::EPSILON * iteration::largest_of(points, DVec3::length_squared).sqrt();
     let size = size.max(iteration::largest(points));
     let goal = stop.tolerance.max(iteration::floor(size));
     let mut history: Vec<Recorded> = Vec::new();
