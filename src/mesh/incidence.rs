@@ -309,7 +309,7 @@ fn each_once<const MOST: usize>(v: usize, sides: impl Iterator<Item = (u32, u32)
     let mut wrong = u32::from(count == 0);
     for (next, &w) in next.iter_mut().zip(&into[..count]) {
         let meeting: u32 = (0..MOST).zip(out).map(|(k, x)| u32::from(x == w) << k).sum();
-        wrong |= u32::from(!meeting.is_power_of_two()) | u32::from(w as usize == v);
+        wrong |= u32::from(meeting == 0) | u32::from(w as usize == v);
         *next = meeting.trailing_zeros();
     }
     if wrong != 0 {

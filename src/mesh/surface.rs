@@ -528,6 +528,10 @@ mod tests {
         // A vertex that one face passes twice, under one umbrella.
         let twice = mesh(5, &[&[0, 1, 2, 0, 3, 4], &[0, 2, 1], &[0, 4, 3]]);
         assert!(!agree(&twice));
+        // So too beside a boundary, where valences may be low and nothing else is wrong; and a side from a vertex to itself.
+        assert!(!agree(&mesh(8, &[&[0, 1, 2, 0, 3, 4], &[0, 2, 1], &[0, 4, 3], &[5, 6, 7]])));
+        assert!(!agree(&mesh(6, &[&[0, 1, 2], &[3, 4, 3, 5]])));
+        assert!(!agree(&mesh(5, &[&[0, 1, 2], &[3, 3, 4]])));
         assert!(agree(&mesh(4, &[&[0, 1, 2], &[0, 2, 3], &[0, 3, 1], &[1, 3, 2]])));
         // A face of many corners, one of them twice.
         let prism = builtin::prism(40);

@@ -326,6 +326,14 @@ impl Rules {
 mod tests {
     use super::*;
 
+    #[test]
+    fn the_largest_is_found_among_many() {
+        let mut points = vec![DVec3::ONE; 10_000];
+        (points[20], points[9_999]) = (DVec3::NAN, DVec3::new(0.0, -3.0, 4.0));
+        assert_eq!((largest(&points), largest_of(&points, DVec3::length_squared)), (4.0, 25.0));
+        assert_eq!(largest(&[]), 0.0);
+    }
+
     /// An iteration whose errors are a given sequence.
     struct Script<'a> {
         errors: &'a dyn Fn(usize) -> f64,
