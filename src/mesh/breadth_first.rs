@@ -40,34 +40,52 @@ pub fn breadth_first(faces: &Faces, incidence: &Incidence) -> Vec<u32> {
     }
 }
 
-fn search(faces: &Faces, incidence: &Incidence, face_at: impl Fn(usize) -> (usize, Range<usize>)) -> Vec<u32> {
-    let n = incidence.vertices();
-    let (mut vertices, mut opened) = (Met::new(n), Met::new(faces.len()));
+/// The queue of a breadth-first search, which is the order in the end: the first vertices have left it.
+struct Queue {
+    met: Met,
     // One place more, for what is written there and not kept.
-    let mut order = vec![0u32; n + 1];
-    let (mut next, mut end) = (0, 0);
-    for seed in 0..n {
-        order[end] = seed as u32;
-        end += usize::from(vertices.meet(seed));
-        while next < end {
-            let v = order[next];
-            // Places of the queue that are not taken yet hold a vertex too.
-            incidence.fetch_ahead(faces, &order, next);
-            next += 1;
-            for &c in incidence.corners_at(v as usize) {
-                let (f, range) = face_at(c as usize);
-                if opened.meet(f) {
-                    // No branch on what was met: there is no pattern that a processor could predict.
-                    for &w in &faces.corners()[range] {
-                        order[end] = w;
-                        end += usize::from(vertices.meet(w as usize));
-                    }
-                }
+    order: Vec<u32>,
+    next: usize,
+    end: usize,
+}
+
+impl Queue {
+    /// All vertices, from the first of every component: `visit(queue, k)` lets in the neighbours of the vertex at place k.
+    #[inline]
+    fn search(vertices: usize, mut visit: impl FnMut(&mut Queue, usize)) -> Vec<u32> {
+        let mut queue = Queue { met: Met::new(vertices), order: vec![0; vertices + 1], next: 0, end: 0 };
+        for seed in 0..vertices as u32 {
+            queue.let_in(seed);
+            while queue.next < queue.end {
+                let k = queue.next;
+                queue.next += 1;
+                visit(&mut queue, k);
             }
         }
+        queue.order.truncate(vertices);
+        queue.order
     }
-    order.truncate(n);
-    order
+
+    /// Lets a vertex in that was not met yet. No branch on what was met: there is no pattern that a processor could predict.
+    #[inline]
+    fn let_in(&mut self, v: u32) {
+        self.order[self.end] = v;
+        self.end += usize::from(self.met.meet(v as usize));
+    }
+}
+
+fn search(faces: &Faces, incidence: &Incidence, face_at: impl Fn(usize) -> (usize, Range<usize>)) -> Vec<u32> {
+    let mut opened = Met::new(faces.len());
+    Queue::search(incidence.vertices(), |queue, k| {
+        // Places of the queue that are not taken yet hold a vertex too.
+        incidence.fetch_ahead(faces, &queue.order, k);
+        for &c in incidence.corners_at(queue.order[k] as usize) {
+            let (f, range) = face_at(c as usize);
+            if opened.meet(f) {
+                faces.corners()[range].iter().for_each(|&w| queue.let_in(w));
+            }
+        }
+    })
 }
 
 /// The vertices breadth first from the first of every component, over lists of neighbours, those of v from `starts[v]` on.
@@ -75,31 +93,17 @@ fn along(starts: &[u32], neighbours: &[u32]) -> Vec<u32> {
     /// Vertices between one look-up and the next. Tuned.
     const AHEAD: usize = 12;
     let row = |v: u32| starts[v as usize] as usize..starts[v as usize + 1] as usize;
-    let n = starts.len() - 1;
-    let mut vertices = Met::new(n);
-    let mut order = vec![0u32; n + 1];
-    let (mut next, mut end) = (0, 0);
-    for seed in 0..n {
-        order[end] = seed as u32;
-        end += usize::from(vertices.meet(seed));
-        while next < end {
-            if let Some(&v) = order.get(next + 2 * AHEAD) {
-                prefetch(starts, v as usize);
-            }
-            if let Some(&v) = order.get(next + AHEAD) {
-                let row = row(v);
-                prefetch(neighbours, row.start);
-                prefetch(neighbours, row.end);
-            }
-            for &w in &neighbours[row(order[next])] {
-                order[end] = w;
-                end += usize::from(vertices.meet(w as usize));
-            }
-            next += 1;
+    Queue::search(starts.len() - 1, |queue, k| {
+        if let Some(&v) = queue.order.get(k + 2 * AHEAD) {
+            prefetch(starts, v as usize);
         }
-    }
-    order.truncate(n);
-    order
+        if let Some(&v) = queue.order.get(k + AHEAD) {
+            let row = row(v);
+            prefetch(neighbours, row.start);
+            prefetch(neighbours, row.end);
+        }
+        neighbours[row(queue.order[k])].iter().for_each(|&w| queue.let_in(w));
+    })
 }
 
 /// An order for sweeps that share passes over memory: breadth first, so that neighbours lie within a narrow band, and [rows of

@@ -139,6 +139,12 @@ impl Binary<'_> {
             self.at += rows * row;
             return rows as u64;
         }
+        // Where the length of the only list stands in a row. As far as it stays what it is, all rows take the same room.
+        let mut lists = element.properties.iter().enumerate().filter_map(|(k, p)| Some((k, p.length?)));
+        let only_list = lists.next().filter(|_| lists.next().is_none());
+        let before = |k: usize| element.properties[..k].iter().map(|p| p.scalar.bytes()).sum::<usize>();
+        let length_at = only_list.map(|(k, length)| before(k)..before(k) + length.bytes());
+
         let end = self.at.saturating_add(size);
         let mut rows = 0;
         while rows < wanted && self.at < end {
@@ -154,11 +160,20 @@ impl Binary<'_> {
                 }
             }
             rows += 1;
+            if let Some(length_at) = &length_at {
+                let (first, others) = self.bytes[start..].split_at(self.at - start);
+                let most = (wanted - rows).min((end.saturating_sub(self.at).div_ceil(first.len())) as u64);
+                let others = others.chunks_exact(first.len()).take(usize::try_from(most).unwrap_or(usize::MAX));
+                let alike = others.take_while(|row| row[length_at.clone()] == first[length_at.clone()]).count();
+                self.at += alike * first.len();
+                rows += alike as u64;
+            }
         }
         rows
     }
 
     /// The bytes of one value, the least significant first; moves to the end if there are too few.
+    #[inline]
     fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
         let Some(&(mut value)) = self.bytes[self.at..].first_chunk::<N>() else {
             self.at = self.bytes.len();
@@ -211,6 +226,7 @@ impl Values for Binary<'_> {
         Ok(())
     }
 
+    #[inline]
     fn number(&mut self, scalar: Scalar) -> Option<f64> {
         Some(match scalar {
             Scalar::I8 => i8::from_le_bytes(self.take()?).into(),
@@ -224,6 +240,7 @@ impl Values for Binary<'_> {
         })
     }
 
+    #[inline]
     fn unsigned<T: TryFrom<u64>>(&mut self, scalar: Scalar) -> Option<T> {
         let start = self.at;
         let value = match scalar {
@@ -243,6 +260,7 @@ impl Values for Binary<'_> {
         fitting
     }
 
+    #[inline]
     fn skip(&mut self, scalar: Scalar, count: u64) -> Option<()> {
         let length =
             usize::try_from(count).ok().and_then(|n| n.checked_mul(scalar.bytes())).filter(|&n| n <= self.bytes_left());
