@@ -1,6 +1,7 @@
-//! Memory requirements of a computation, compared with what is available before the work begins.
+//! The machine's memory: what a computation requires, compared with what is available before the work begins, and the cache.
 
 use std::hint::black_box;
+use std::sync::LazyLock;
 
 use sysinfo::System;
 
@@ -70,9 +71,44 @@ fn addresses(wanted: u64) -> u64 {
     least
 }
 
+/// Bytes of the last cache before memory, which processors may share, as Linux tells; 32 MiB where it is not told. For
+/// the length of passes only: no result depends on it.
+pub(crate) fn last_level_cache() -> usize {
+    static SIZE: LazyLock<usize> = LazyLock::new(|| {
+        let of_level = |k: usize| {
+            let file = format!("/sys/devices/system/cpu/cpu0/cache/index{k}/size");
+            std::fs::read_to_string(file).ok().as_deref().and_then(bytes)
+        };
+        (0..8).map_while(of_level).max().unwrap_or(32 << 20)
+    });
+    *SIZE
+}
+
+/// A size as `48K` or `32M`.
+fn bytes(size: &str) -> Option<usize> {
+    let size = size.trim_end();
+    let unit = size.find(|c: char| !c.is_ascii_digit()).unwrap_or(size.len());
+    let factor = match &size[unit..] {
+        "" => 1,
+        "K" => 1 << 10,
+        "M" => 1 << 20,
+        "G" => 1 << 30,
+        _ => return None,
+    };
+    size[..unit].parse::<usize>().ok()?.checked_mul(factor)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_of_caches_are_read() {
+        let read = ["48K\n", "491520K", "32M", "1G", "512", "", "K", "12 K", "99999999999999999999K"].map(bytes);
+        assert_eq!(read[..5], [48 << 10, 480 << 20, 32 << 20, 1 << 30, 512].map(Some));
+        assert_eq!(read[5..], [None; 4]);
+        assert!(last_level_cache() >= 1 << 15);
+    }
 
     #[test]
     fn what_no_machine_has_is_refused_with_both_numbers() {

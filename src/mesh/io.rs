@@ -577,6 +577,7 @@ impl Builder {
         self.corners.truncate(first);
     }
 
+    #[inline]
     pub fn vertex(&mut self, position: DVec3, line: usize) -> std::result::Result<(), String> {
         if self.vertices() == u32::MAX as usize {
             return Err("more vertices than 32-bit indices can name, 4294967295".into());
@@ -593,6 +594,7 @@ impl Builder {
         self.corners.push(vertex);
     }
 
+    #[inline]
     pub fn end_face(&mut self, line: usize) -> std::result::Result<(), String> {
         let size = self.corners.len() - self.offsets[self.offsets.len() - 1] as usize;
         if size < 3 {

@@ -164,7 +164,7 @@ impl Binary<'_> {
                 let (first, others) = self.bytes[start..].split_at(self.at - start);
                 let most = (wanted - rows).min((end.saturating_sub(self.at).div_ceil(first.len())) as u64);
                 let others = others.chunks_exact(first.len()).take(usize::try_from(most).unwrap_or(usize::MAX));
-                let alike = others.take_while(|row| row[length_at.clone()] == first[length_at.clone()]).count();
+                let alike = others.take_while(|row| length_at.clone().all(|k| row[k] == first[k])).count();
                 self.at += alike * first.len();
                 rows += alike as u64;
             }
