@@ -5,11 +5,15 @@
 //! that those near one another are a block of memory, which a thread takes as a whole with those around it: it works through all
 //! elements that touch the block and keeps what they add to the block. An element at the edge of blocks is worked through for
 //! each of them, in exchange no two threads write to one place, and sums do not depend on how many there are.
+//!
+//! The products are compiled for what processors may have, and chosen when the program runs: four numbers at once (AVX2) take
+//! half the time of two, which all x86-64 have. No multiplication is fused with a sum, so that results are the same on all.
 
 use std::collections::HashMap;
 use std::ops::Range;
 
 use glam::DVec3;
+use pulp::{Arch, Simd, WithSimd, bytemuck};
 
 use super::energy::{
     Gram, QUARTER, Sectors, StepMasks, WHOLE, Weighted, Weights, patch_grams, pulled_back, regular_patch,
@@ -24,8 +28,8 @@ use crate::{Error, Result};
 const BLOCK: usize = 4096;
 /// Groups of four fine faces of one task.
 const CHUNK: usize = 2048;
-/// Rows of a matrix are filled up to a multiple of this: the numbers that a processor of any kind takes at once.
-const LANES: usize = 4;
+/// Rows of a matrix are filled up to a multiple of this: the most numbers that a processor of any kind takes at once.
+const LANES: usize = 8;
 
 /// The elements of one mesh. Points are in the order of the [numbering](Self::there) within.
 #[derive(Clone, Debug)]
@@ -448,16 +452,12 @@ impl Elements {
         y: &mut [DVec3],
         then: &OfBlock<R>,
     ) -> Vec<R> {
+        let arch = Arch::new();
         parallel::parts(self.parts(y), |k, part| {
             let block = &self.blocks[k.start];
             let local = block.gather(x);
             let mut sums = vec![[0.0; 3]; local.len()];
-            let mut own = Vec::new();
-            self.each_element(block, |kind, places| {
-                own.clear();
-                own.extend(places.iter().map(|&place| local[place as usize]));
-                product(&forms[kind], &own, places, &mut sums);
-            });
+            arch.dispatch(Products { elements: self, block, forms, local: &local, sums: &mut sums });
             part.iter_mut().zip(&sums).for_each(|(y, sum)| *y = DVec3::from_array(*sum));
             then(k.start, x, part)
         })
@@ -504,12 +504,15 @@ impl Elements {
     }
 
     /// Calls `visit` with the kind and the places of each element that touches a block.
+    #[inline(always)]
     fn each_element(&self, block: &Block, mut visit: impl FnMut(usize, &[u16])) {
         let mut places = block.places.as_slice();
         for &(kind, count) in &block.runs {
             let points = self.kinds[kind as usize].points;
             let (of_run, rest) = places.split_at(count as usize * points);
-            of_run.chunks_exact(points).for_each(|places| visit(kind as usize, places));
+            for places in of_run.chunks_exact(points) {
+                visit(kind as usize, places);
+            }
             places = rest;
         }
     }
@@ -620,24 +623,81 @@ pub(in crate::interpolate) fn require_room(points: usize, valence: usize) -> Res
     require(bytes, what, "use a mesh of smaller valences")
 }
 
-/// Adds K x of one element with the points x: four rows at once, by columns, the matrix being symmetric.
+/// K x of all elements that touch a block, to be added to `sums`.
+struct Products<'a> {
+    elements: &'a Elements,
+    block: &'a Block,
+    forms: &'a [Vec<f64>],
+    local: &'a [[f64; 3]],
+    sums: &'a mut [[f64; 3]],
+}
+
+impl WithSimd for Products<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let mut own = Vec::new();
+        self.elements.each_element(
+            self.block,
+            #[inline(always)]
+            |kind, places| {
+                own.clear();
+                own.extend(places.iter().map(|&place| self.local[place as usize]));
+                product(simd, &self.forms[kind], &own, places, self.sums);
+            },
+        );
+    }
+}
+
+/// Adds K x of one element with the points x: some rows at once, by columns, the matrix being symmetric.
 #[inline(always)]
-fn product(form: &[f64], own: &[[f64; 3]], places: &[u16], sums: &mut [[f64; 3]]) {
-    for (block, rows) in places.chunks(LANES).enumerate() {
-        let mut sum = [[0.0; LANES]; 3];
-        for (column, x) in form.chunks_exact(stride(own.len())).zip(own) {
-            let column = &column[block * LANES..][..LANES];
-            for (sum, x) in sum.iter_mut().zip(x) {
-                for (sum, k) in sum.iter_mut().zip(column) {
-                    *sum += k * x;
-                }
+fn product<S: Simd>(simd: S, form: &[f64], own: &[[f64; 3]], places: &[u16], sums: &mut [[f64; 3]]) {
+    let (registers, _) = S::as_simd_f64s(form);
+    let mut rows = places.chunks(S::F64_LANES);
+    let mut first = 0;
+    // Two registers of each coordinate, so that no sum need wait for the one before it.
+    while let Some(one) = rows.next() {
+        if let Some(other) = rows.next() {
+            let [part, next] = of_rows(simd, registers, first, own);
+            scatter(simd, part, one, sums);
+            scatter(simd, next, other, sums);
+        } else {
+            let [part] = of_rows(simd, registers, first, own);
+            scatter(simd, part, one, sums);
+        }
+        first += 2;
+    }
+}
+
+/// What R registers of rows from the `first` on give.
+#[inline(always)]
+fn of_rows<S: Simd, const R: usize>(
+    simd: S,
+    registers: &[S::f64s],
+    first: usize,
+    own: &[[f64; 3]],
+) -> [[S::f64s; 3]; R] {
+    let mut sums = [[simd.splat_f64s(0.0); 3]; R];
+    for (column, x) in registers.chunks_exact(stride(own.len()) / S::F64_LANES).zip(own) {
+        let column = &column[first..first + R];
+        let x = [simd.splat_f64s(x[0]), simd.splat_f64s(x[1]), simd.splat_f64s(x[2])];
+        for r in 0..R {
+            for axis in 0..3 {
+                sums[r][axis] = simd.add_f64s(sums[r][axis], simd.mul_f64s(column[r], x[axis]));
             }
         }
-        for (lane, &place) in rows.iter().enumerate() {
-            let y = &mut sums[place as usize];
-            for axis in 0..3 {
-                y[axis] += sum[axis][lane];
-            }
+    }
+    sums
+}
+
+#[inline(always)]
+fn scatter<S: Simd>(_: S, part: [S::f64s; 3], places: &[u16], sums: &mut [[f64; 3]]) {
+    let part: [&[f64]; 3] = std::array::from_fn(|axis| bytemuck::cast_slice(std::slice::from_ref(&part[axis])));
+    for (lane, &place) in places.iter().enumerate() {
+        let y = &mut sums[place as usize];
+        for axis in 0..3 {
+            y[axis] += part[axis][lane];
         }
     }
 }
