@@ -344,23 +344,13 @@ impl Surface {
         if let Some(renumbered) = self.renumbered() {
             // Looking for what is not there is many times faster so. What is there needs the file's own numbers.
             let positions = renumbered.numbering.there(self.positions());
-            if degenerate::remarks(
-                &positions,
-                (&renumbered.faces, &renumbered.incidence),
-                &Numbers::default(),
-                self.is_closed(),
-            )
-            .is_empty()
-            {
+            let faces = (&renumbered.faces, &renumbered.incidence);
+            if degenerate::remarks(&positions, faces, &Numbers::default(), self.is_closed()).is_empty() {
                 return remarks;
             }
         }
-        remarks.extend(degenerate::remarks(
-            self.positions(),
-            (self.faces(), self.incidence()),
-            numbers,
-            self.is_closed(),
-        ));
+        let faces = (self.faces(), self.incidence());
+        remarks.extend(degenerate::remarks(self.positions(), faces, numbers, self.is_closed()));
         remarks
     }
 
@@ -381,7 +371,6 @@ impl Connectivity {
     /// another boundary.
     fn manifold(mesh: &Mesh, boundary: Boundary) -> Option<Self> {
         let renumbered = if mesh.len() >= SCATTERED && is_scattered(&mesh.faces) { along_curve(mesh) } else { None };
-
         Self::checked(mesh, boundary, renumbered)
     }
 
