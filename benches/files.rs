@@ -1,18 +1,19 @@
 //! Reading and writing meshes, with tobj on the same OBJ file: `cargo bench --bench files`.
 //!
-//! By hand, at 10⁶ vertices and as many quads, 17 digits a coordinate (OBJ 91 MB, OFF 89 MB), least of three in turn, on two
-//! cores that had other work too: milliseconds of the processor for all threads, before reading and writing was done in parts
-//! and on one thread, and since.
+//! By hand, at 10⁶ vertices and as many quads, 17 digits a coordinate (OBJ 91 MB, OFF and text PLY 89 MB, binary PLY 41 MB), in turn
+//! on a machine of two cores that had no other work: milliseconds by the wall on two threads, the least of five, and of three such
+//! the median; before reading and writing was done in parts and on one thread, and since.
 //!
-//! | | before | in parts |
-//! |---|---|---|
-//! | OBJ, read / written | 390 / 333 | 207 / 190 |
-//! | OFF, read / written | 373 / 327 | 235 / 180 |
-//! | text PLY, read / written | 360 / 340 | 297 / 213 |
-//! | the OBJ by fast_obj (d620667, one thread), rapidobj (fe4c779, two), both in single precision, read | 159, 250 | |
-//! | the OBJ by trimesh 5.2, meshio 5.3, read | 3761, 7722 | |
+//! | | before | in parts | MB/s |
+//! |---|---|---|---|
+//! | OBJ, read / written | 379 / 330 | 120 / 126 | 757 / 720 |
+//! | OFF, read / written | 325 / 322 | 115 / 121 | 772 / 734 |
+//! | text PLY, read / written | 332 / 332 | 110 / 125 | 807 / 710 |
+//! | the OBJ by fast_obj (d620667, one thread), rapidobj (fe4c779, two), both in single precision, read | 131, 130 | | 693, 698 |
+//! | the OBJ by trimesh 5.2, meshio 5.3, read | 3761, 7722 | | 24, 12 |
 //!
-//! The system takes some 45 % of a read, to copy the file and to clear memory.
+//! Binary PLY was read in 61.7 ms and is in 49.3 (831 MB/s); of bytes in memory 48.7 and 36.4. Nearly half of that is the
+//! system's, which copies the file and clears memory, as it is of the time of a text file.
 
 #![allow(missing_docs, reason = "the functions that criterion's macro writes")]
 
