@@ -701,3 +701,42 @@ fn scatter<S: Simd>(_: S, part: [S::f64s; 3], places: &[u16], sums: &mut [[f64; 
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use pulp::Scalar;
+
+    use super::*;
+
+    struct One<'a>(&'a [f64], &'a [[f64; 3]], &'a [u16], &'a mut [[f64; 3]]);
+
+    impl WithSimd for One<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) {
+            product(simd, self.0, self.1, self.2, self.3);
+        }
+    }
+
+    #[test]
+    fn products_have_the_same_bits_by_all_instructions() {
+        for points in [1, 3, 4, 5, 8, 13, 16, 25, 33] {
+            let entry = |i: usize, j: usize| ((7 * i.min(j) + 3 * i.max(j)) as f64).sin();
+            let kind = Kind::new(points, |i, j| [entry(i, j), 0.0]);
+            let own: Vec<[f64; 3]> = (0..points).map(|i| [0.3, 1.7, 2.9].map(|a| (a * i as f64).cos())).collect();
+            let places: Vec<u16> = (0..points as u16).rev().collect();
+            let mut expected = vec![[1.0; 3]; points];
+            for (i, &place) in places.iter().enumerate() {
+                for axis in 0..3 {
+                    expected[place as usize][axis] += (0..points).fold(0.0, |sum, j| sum + entry(i, j) * own[j][axis]);
+                }
+            }
+            let (mut one_by_one, mut at_hand) = (vec![[1.0; 3]; points], vec![[1.0; 3]; points]);
+            One(&kind.forms[0], &own, &places, &mut one_by_one).with_simd(Scalar);
+            Arch::new().dispatch(One(&kind.forms[0], &own, &places, &mut at_hand));
+            assert_eq!(one_by_one, expected, "{points}");
+            assert_eq!(at_hand, expected, "{points}");
+        }
+    }
+}
