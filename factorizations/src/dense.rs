@@ -13,7 +13,7 @@ use faer::linalg::solvers::{SelfAdjointEigen, Solve, Svd};
 use faer::linalg::svd::SvdError;
 use faer::linalg::triangular_solve;
 use faer::{Mat, MatMut, MatRef, Par, Side, c64};
-use nalgebra::{Complex, DMatrix, DVector, Dyn, Hessenberg, LU, QR, Schur, SymmetricEigen};
+use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn, Hessenberg, LU, QR, SVD, Schur, SymmetricEigen};
 
 /// The eigenvalues of a square matrix, in no order.
 ///
@@ -116,6 +116,16 @@ pub fn small_eigenvalues(matrix: DMatrix<f64>, tolerance: f64, iterations: usize
     Schur::try_new(matrix, tolerance, iterations).map(|schur| schur.complex_eigenvalues().iter().copied().collect())
 }
 
+/// The eigenvalues of a small complex matrix, in no order; `None` if they do not converge, as above.
+#[inline(never)]
+pub fn small_complex_eigenvalues(
+    matrix: DMatrix<Complex<f64>>,
+    tolerance: f64,
+    iterations: usize,
+) -> Option<DVector<Complex<f64>>> {
+    Schur::try_new(matrix, tolerance, iterations)?.eigenvalues()
+}
+
 /// H of a matrix QHQᵀ.
 #[inline(never)]
 pub fn hessenberg(matrix: DMatrix<f64>) -> DMatrix<f64> {
@@ -138,4 +148,22 @@ pub fn small_complex_lu(matrix: DMatrix<Complex<f64>>) -> LU<Complex<f64>, Dyn, 
 #[inline(never)]
 pub fn small_qr(matrix: DMatrix<f64>) -> QR<f64, Dyn, Dyn> {
     matrix.qr()
+}
+
+/// L of a small symmetric matrix, of which the lower triangle is read; `None` if it is not positive definite.
+#[inline(never)]
+pub fn small_cholesky(matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+    matrix.cholesky()
+}
+
+/// U, S and V of a small matrix, S descending.
+#[inline(never)]
+pub fn small_svd(matrix: DMatrix<f64>) -> SVD<f64, Dyn, Dyn> {
+    matrix.svd(true, true)
+}
+
+/// The singular values of a small matrix, descending.
+#[inline(never)]
+pub fn small_singular_values(matrix: DMatrix<f64>) -> DVector<f64> {
+    matrix.singular_values()
 }

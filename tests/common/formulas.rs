@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 
 use limitlab::mesh::Mesh;
 use limitlab::schemes::Scheme;
+use limitlab_factorizations::dense::small_symmetric_eigenvalues;
 use nalgebra::DMatrix;
 use nalgebra_sparse::convert::serial::convert_csr_dense;
 use nalgebra_sparse::{CooMatrix, CsrMatrix};
@@ -131,7 +132,7 @@ impl Plain {
                 matrix[(i, j)] *= scale[i] * scale[j];
             }
         }
-        let mut values = matrix.symmetric_eigenvalues().as_slice().to_vec();
+        let mut values = small_symmetric_eigenvalues(matrix).as_slice().to_vec();
         values.sort_by(f64::total_cmp);
         values
     }

@@ -7,6 +7,7 @@ use limitlab::mesh::Surface;
 use limitlab::mesh::features::Tags;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Method, Stop};
+use limitlab_factorizations::dense::small_lu;
 use nalgebra::{DMatrix, DVector};
 
 use crate::common::meshes::built_in;
@@ -33,7 +34,7 @@ fn columns(stages: &Stages, vertex: usize) -> [Vec<f64>; 2] {
     let stop = Stop { tolerance: 1e-15, max_iterations: 2 };
     let found = staged::run(stages, &points, Method::Cholesky, &stop).points.iter().map(|v| v.x).collect();
     let matrix = stages.matrix();
-    let dense = DMatrix::from_fn(n, n, |i, j| matrix.get(i, j)).lu();
+    let dense = small_lu(DMatrix::from_fn(n, n, |i, j| matrix.get(i, j)));
     let right = DVector::from_fn(n, |i, _| if i == vertex { 1.0 } else { 0.0 });
     [found, dense.solve(&right).unwrap().as_slice().to_vec()]
 }

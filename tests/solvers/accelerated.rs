@@ -6,6 +6,7 @@ use glam::DVec3;
 use limitlab::assemble::LimitSystem;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::{Accelerated, Method, Outcome, Stop, run_watched};
+use limitlab_factorizations::dense::small_svd;
 use nalgebra::{DMatrix, DVector};
 
 use super::methods::checked;
@@ -52,7 +53,7 @@ impl Relaxation {
     fn nearest(&self, columns: &[DVector<f64>], target: &DVector<f64>) -> DVector<f64> {
         let roots = self.weights.map(f64::sqrt);
         let scaled: Vec<_> = columns.iter().map(|c| c.component_mul(&roots)).collect();
-        let svd = DMatrix::from_columns(&scaled).svd(true, true);
+        let svd = small_svd(DMatrix::from_columns(&scaled));
         svd.solve(&target.component_mul(&roots), 1e-13 * svd.singular_values.max()).unwrap()
     }
 

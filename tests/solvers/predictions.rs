@@ -6,6 +6,7 @@ use limitlab::analysis::{Extremes, Spectrum};
 use limitlab::mesh::order::Order;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::Method;
+use limitlab_factorizations::dense::{self, small_lu};
 use nalgebra::{Complex, DMatrix};
 
 use crate::common::formulas::assemble;
@@ -21,7 +22,7 @@ fn sweep(a: &DMatrix<f64>, omega: f64, order: &[u32]) -> DMatrix<f64> {
         std::cmp::Ordering::Equal => a[(i, i)] / omega,
         std::cmp::Ordering::Greater => 0.0,
     });
-    DMatrix::identity(n, n) - split.lu().solve(a).unwrap()
+    DMatrix::identity(n, n) - small_lu(split).solve(a).unwrap()
 }
 
 fn symmetric_sweep(a: &DMatrix<f64>, omega: f64, order: &[u32]) -> DMatrix<f64> {
@@ -31,7 +32,7 @@ fn symmetric_sweep(a: &DMatrix<f64>, omega: f64, order: &[u32]) -> DMatrix<f64> 
 
 /// By faer: nalgebra's iteration does not end on some of these matrices, which have many eigenvalues near 0.
 fn eigenvalues(e: &DMatrix<f64>) -> Vec<Complex<f64>> {
-    faer::Mat::from_fn(e.nrows(), e.ncols(), |i, j| e[(i, j)]).eigenvalues().unwrap()
+    dense::eigenvalues(&faer::Mat::from_fn(e.nrows(), e.ncols(), |i, j| e[(i, j)])).unwrap()
 }
 
 fn radius(e: &DMatrix<f64>) -> f64 {

@@ -12,6 +12,7 @@ use limitlab::mesh::space_filling::along_curve;
 use limitlab::schemes::Scheme;
 use limitlab::solvers::direct::SINGULAR;
 use limitlab::solvers::{Method, Outcome, Solution, Stop, run};
+use limitlab_factorizations::dense::small_lu;
 use nalgebra::{DMatrix, DVector};
 
 use super::{Case, on_any_threads};
@@ -158,7 +159,7 @@ fn automatic(surface: &Surface, scheme: Scheme, stop: &Stop) -> (Vec<DVec3>, Out
 
 /// Gaussian elimination with row pivots.
 fn eliminate(a: &DMatrix<f64>, points: &[DVec3]) -> Vec<DVec3> {
-    let lu = a.clone().lu();
+    let lu = small_lu(a.clone());
     let [x, y, z] = [0, 1, 2].map(|k| {
         let column = DVector::from_iterator(points.len(), points.iter().map(|p| p[k]));
         lu.solve(&column).expect("a regular matrix")

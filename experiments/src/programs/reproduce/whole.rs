@@ -2,7 +2,8 @@
 //! it.
 
 use glam::DVec3;
-use nalgebra::{Complex, DMatrix, Schur};
+use limitlab_factorizations::dense::small_eigenvalues;
+use nalgebra::{Complex, DMatrix};
 
 use limitlab::Result;
 use limitlab::analysis::dense;
@@ -110,10 +111,8 @@ fn eigenvalues(matrix: DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     const TOLERANCE: f64 = 1e-14;
     const ITERATIONS: usize = 10_000;
     let n = matrix.nrows();
-    let schur = Schur::try_new(matrix, TOLERANCE, ITERATIONS);
-    let schur =
-        schur.ok_or_else(|| Error::Computation(format!("the eigenvalues of a matrix of order {n} are not found")))?;
-    Ok(schur.complex_eigenvalues().iter().copied().collect())
+    small_eigenvalues(matrix, TOLERANCE, ITERATIONS)
+        .ok_or_else(|| Error::Computation(format!("the eigenvalues of a matrix of order {n} are not found")))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
+use limitlab_factorizations::dense::small_lu;
 use nalgebra::{DMatrix, DVector};
 
 use limitlab::Result;
@@ -552,7 +553,7 @@ fn explicit_mask(_: &Lab) -> Result<Finding> {
             (2, true) => mu * mu,
             _ => 0.0,
         });
-        let weights = matrix.lu().solve(&wanted);
+        let weights = small_lu(matrix).solve(&wanted);
         let (_, ring) = labsik_greiner::extraordinary_mask(n);
         let off = weights.map_or(f64::NAN, |weights| largest(weights.iter().zip(&ring).map(|(w, r)| (w - r).abs())));
         solved = largest([solved, off]);

@@ -1,6 +1,7 @@
 //! The unified √3 scheme with an α of its own at every vertex: extraordinary vertices and surfaces (L17).
 
 use glam::{DVec2, DVec3};
+use limitlab_factorizations::dense::small_lu;
 use nalgebra::{DMatrix, DVector};
 
 use limitlab::Result;
@@ -256,7 +257,7 @@ fn rate(n: usize, alpha: f64) -> Result<f64> {
 /// The distance of points from the nearest image of the net under c + p₁x + p₂y, in parts of their size.
 fn off_image(points: &[DVec3], net: &[DVec2]) -> f64 {
     let columns = DMatrix::from_fn(net.len(), 3, |i, j| [1.0, net[i].x, net[i].y][j]);
-    let gram = (columns.transpose() * &columns).lu();
+    let gram = small_lu(columns.transpose() * &columns);
     let mut off = vec![DVec3::ZERO; points.len()];
     for axis in 0..3 {
         let own = DVector::from_fn(points.len(), |i, _| points[i][axis]);

@@ -1,5 +1,6 @@
 //! Open and creased meshes: P13–P17, on what PIA §5 leaves open, and Z26.
 
+use limitlab_factorizations::dense::{small_singular_values, small_symmetric_eigen};
 use nalgebra::{DMatrix, DVector};
 
 use limitlab::Result;
@@ -128,7 +129,7 @@ fn variants(mesh: &Mesh) -> Result<Vec<(Surface, usize)>> {
 
 /// The singular values of all of A that vanish, and the least of the others.
 fn kernel(surface: &Surface, scheme: Scheme) -> Result<(usize, f64)> {
-    let values = Whole::new(surface, scheme)?.dense().singular_values();
+    let values = small_singular_values(Whole::new(surface, scheme)?.dense());
     let zero = values.iter().filter(|&&x| x <= ZERO).count();
     Ok((zero, smallest(values.iter().copied().filter(|&x| x > ZERO))))
 }
@@ -370,7 +371,7 @@ impl Jordan {
         let whole = Whole::of(&stages).dense();
         let n = whole.nrows();
         let mut values: Vec<f64> =
-            (&whole - DMatrix::identity(n, n) * lambda).singular_values().iter().copied().collect();
+            small_singular_values(&whole - DMatrix::identity(n, n) * lambda).iter().copied().collect();
         values.sort_unstable_by(f64::total_cmp);
         let geometric = values.iter().filter(|&&x| x <= ROUNDING).count();
         let [vanishing, next] =
@@ -384,7 +385,8 @@ impl Jordan {
         let shifted = &self.whole - DMatrix::identity(n, n) * self.lambda;
         // Of the null space of (A − λ)², what is orthogonal to that of A − λ.
         let null = |matrix: DMatrix<f64>, count: usize| -> Vec<DVector<f64>> {
-            let gram = (matrix.transpose() * &matrix).symmetric_eigen();
+            let gram = small_symmetric_eigen(matrix.transpose() * &matrix, f64::EPSILON, 0);
+            let Some(gram) = gram else { return Vec::new() };
             let mut order: Vec<usize> = (0..n).collect();
             order.sort_unstable_by(|&a, &b| gram.eigenvalues[a].total_cmp(&gram.eigenvalues[b]));
             order[..count].iter().map(|&k| gram.eigenvectors.column(k).into_owned()).collect()
@@ -505,7 +507,7 @@ fn contraction(whole: &DMatrix<f64>, w: &[f64]) -> f64 {
         let identity = if i == j { 1.0 } else { 0.0 };
         (identity - whole[(i, j)]) * (w[i] / w[j]).sqrt()
     });
-    largest(scaled.singular_values().iter().copied())
+    largest(small_singular_values(scaled).iter().copied())
 }
 
 /// h⁻¹ at smooth vertices; at the others what the rule makes of it.

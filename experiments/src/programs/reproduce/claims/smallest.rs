@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
 
 use chacha20::ChaCha8Rng;
+use limitlab_factorizations::dense::small_symmetric_eigenvalues;
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 
@@ -105,7 +106,7 @@ fn least(count: usize, faces: &Lists) -> f64 {
     }
     let scale = |v: usize| 1.0 / ((valence[v] * (valence[v] + 5)) as f64).sqrt();
     let scaled = DMatrix::from_fn(count, count, |i, j| scale(i) * m[(i, j)] * scale(j));
-    smallest(scaled.symmetric_eigenvalues().iter().copied())
+    smallest(small_symmetric_eigenvalues(scaled).iter().copied())
 }
 
 /// Takes out a random edge; the two faces become one, the last of the list. `None` where that has a vertex twice.

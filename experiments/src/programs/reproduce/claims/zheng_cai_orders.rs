@@ -3,7 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
-use nalgebra::{Complex, DMatrix, Schur};
+use limitlab_factorizations::dense::{small_cholesky, small_complex_eigenvalues, small_symmetric_eigenvalues};
+use nalgebra::{Complex, DMatrix};
 
 use limitlab::Result;
 use limitlab::analysis::spectral_radius::sweep_radius;
@@ -42,7 +43,7 @@ impl Sweep {
         let n = order.len();
         let whole = DMatrix::from_fn(n, n, |i, j| whole.get(order[i] as usize, order[j] as usize));
         let mut lower = whole.lower_triangle();
-        let factor = whole.cholesky()?.l();
+        let factor = small_cholesky(whole)?.l();
         let swept = lower.solve_lower_triangular(&factor)?;
         let matrix = DMatrix::identity(n, n) - factor.transpose() * swept;
         lower -= DMatrix::identity(n, n);
@@ -64,7 +65,7 @@ impl Sweep {
 
 /// ‖B‖₂
 fn norm(matrix: &DMatrix<f64>) -> f64 {
-    largest((matrix.transpose() * matrix).symmetric_eigenvalues().iter().copied()).max(0.0).sqrt()
+    largest(small_symmetric_eigenvalues(matrix.transpose() * matrix).iter().copied()).max(0.0).sqrt()
 }
 
 fn radius(system: &LimitSystem, order: &[u32]) -> Result<f64> {
@@ -121,7 +122,7 @@ impl Row {
             }
         }
         let error = block.lower_triangle().solve_lower_triangular(&(block.lower_triangle() - &block));
-        let values = error.and_then(|t| Schur::try_new(t, f64::EPSILON, 1000)?.eigenvalues());
+        let values = error.and_then(|t| small_complex_eigenvalues(t, f64::EPSILON, 1000));
         values.map_or(f64::NAN, |values| largest(values.iter().map(|z| z.norm())))
     }
 }
