@@ -110,12 +110,14 @@ pub fn write_index(root: &Path, folder: &Path, items: &[Item], provenance: &Prov
 
 /// The sections on what a clock measured, by other programs than this: files that begin with a stem.
 fn measured(folder: &Path, files: &[String]) -> Result<Vec<Section>> {
-    let large = if folder.join("ten-million").is_dir() { "; [ten million vertices](ten-million)" } else { "" };
+    let apart = [("ten-million", "ten million vertices"), ("quiet-machine", "one iteration on a quieter machine")];
+    let apart = apart.into_iter().filter(|(at, _)| folder.join(at).is_dir());
+    let apart: String = apart.map(|(at, what)| format!("; [{what}]({at})")).collect();
     let all = [
         (
             "scaling",
             "How do time and memory grow with the mesh?",
-            format!("As the program `scaling` measured them on one machine{large}."),
+            format!("As the program `scaling` measured them on one machine{apart}."),
             "Time and memory over growing meshes",
         ),
         (
