@@ -5,6 +5,8 @@
 //! pointer. As chains of parallel iterators, each of which is compiled for itself, loops took two fifths of the
 //! library's machine code, and of its build; compiled once for a type of element, still an eighth.
 
+mod team;
+
 use std::marker::PhantomData;
 use std::mem::MaybeUninit;
 use std::ops::Range;
@@ -12,12 +14,16 @@ use std::slice;
 
 use rayon::prelude::*;
 
+pub use team::team;
+
 /// Elements of a chunk where nothing is summed up.
 const CHUNK: usize = 4096;
 
 /// Calls `body(k)` for every k below `count`, once each.
 fn share(count: usize, body: &(dyn Fn(usize) + Sync)) {
-    (0..count).into_par_iter().for_each(body);
+    if !team::share(count, body) {
+        (0..count).into_par_iter().for_each(body);
+    }
 }
 
 /// An array whose parts threads take, each once.
@@ -159,6 +165,19 @@ pub fn parts<A: Send, R: Send>(
         let (range, part) = &mut unsafe { parts.part(k, 1) }[0];
         body(range.clone(), part)
     })
+}
+
+/// Calls `body(item)` for each, in turn for all threads.
+pub fn tasks<T: Send>(items: Vec<T>, body: impl Fn(T) + Sync) {
+    let mut items: Vec<Option<T>> = items.into_iter().map(Some).collect();
+    let count = items.len();
+    let items = Shared::new(&mut items);
+    share(count, &|k| {
+        // SAFETY: every k comes once.
+        if let Some(item) = unsafe { items.part(k, 1) }[0].take() {
+            body(item);
+        }
+    });
 }
 
 /// Calls `visit(i)` for all i below `count`.

@@ -4,7 +4,8 @@
 //! narrow band, the vertices are cut into bands as long as a row reaches: band j of iterate k + 1 can be made as
 //! soon as band j + 1 of iterate k is there, long before that iterate is complete. A wave therefore advances band
 //! w − 2k of every iterate k at once; these updates touch disjoint parts of two arrays and run in parallel, and all
-//! that they touch stays in cache from one wave to the next. Where rows read [sums over
+//! that they touch stays in cache from one wave to the next. Each thread of a team has the same iterates in
+//! every wave, so that it finds there what it wrote itself. Where rows read [sums over
 //! faces](crate::assemble::face_sums), the sums of a band are made one wave before its rows, and iterates follow each
 //! other three bands apart. Every number is computed from the same operands as in
 //! iterations one after the other, so results do not depend on the number of threads, nor on the length of a group
@@ -13,7 +14,6 @@
 use std::ops::Range;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::chebyshev::Recurrence;
 use super::system::STRIP;
@@ -30,8 +30,7 @@ use crate::prefetch::{POINTS_AHEAD, prefetch};
 const GROUP: usize = 16;
 /// Rows of one task where iterations go one after the other, and of a band at the least.
 const CHUNK: usize = 4096;
-/// Rows of one task in a group: short tasks end together, so that no thread waits long enough to fall asleep, which
-/// costs more than a task. Tuned.
+/// Rows of one task in a group: short tasks end together. Tuned.
 const PIECE: usize = 2048;
 /// Below, all arrays stay in cache anyhow, and iterations go one after the other.
 const SMALL: usize = 100_000;
@@ -137,15 +136,17 @@ impl<'a> Wavefront<'a> {
             .collect();
         let lag = if sums.is_empty() { 2 } else { 3 };
         let length = self.band.map_or(1, |band| self.group_length::<P>(lag * band));
-        for group in coefficients.chunks(length) {
-            match self.band {
-                Some(band) => self.group(band, group, r, (x, other), sums),
-                None => self.plain(group[0], r, (x, other), sums),
+        parallel::team(|| {
+            for group in coefficients.chunks(length) {
+                match self.band {
+                    Some(band) => self.group(band, group, r, (x, other), sums),
+                    None => self.plain(group[0], r, (x, other), sums),
+                }
+                if group.len() % 2 == 1 {
+                    std::mem::swap(x, other);
+                }
             }
-            if group.len() % 2 == 1 {
-                std::mem::swap(x, other);
-            }
-        }
+        });
         recurrence.step();
         recurrence
     }
@@ -175,42 +176,44 @@ impl<'a> Wavefront<'a> {
         let operator = self.operator;
         let sums_of = |rows: Range<usize>| if operator.sums_follow() { operator.sums_of(rows) } else { 0..0 };
         let mut sums = filled(sums_of(0..n).len(), DVec3::ZERO);
-        for first in (0..count).step_by(length) {
-            let sweeps = length.min(count - first);
-            for wave in 0..bands + 3 * (sweeps - 1) {
-                let mut rest = (&mut *x, 0);
-                let mut rest_of_sums = (&mut *sums, 0);
-                let tasks: Vec<_> = (0..sweeps)
-                    .rev()
-                    .filter_map(|k| wave.checked_sub(3 * k).filter(|&j| j < bands))
-                    .map(|j| {
-                        let seen = at(j.saturating_sub(1))..at(j + 2);
-                        let known = sums_of(at(j.saturating_sub(1))..at(j + 1));
-                        let (start, first) = (seen.start, known.start);
-                        let sums = (cut(&mut rest_of_sums, known), first);
-                        (at(j)..at(j + 1), (cut(&mut rest, seen), start), sums)
-                    })
-                    .collect();
-                tasks.into_par_iter().with_max_len(1).for_each(|(rows, (window, start), (sums, first))| {
-                    if sums.is_empty() {
-                        for i in rows {
-                            let e = p[i] - operator.row_within(i, (window, start));
-                            window[i - start] += (omega / diagonal[i]) * e;
+        parallel::team(|| {
+            for first in (0..count).step_by(length) {
+                let sweeps = length.min(count - first);
+                for wave in 0..bands + 3 * (sweeps - 1) {
+                    let mut rest = (&mut *x, 0);
+                    let mut rest_of_sums = (&mut *sums, 0);
+                    let tasks: Vec<_> = (0..sweeps)
+                        .rev()
+                        .filter_map(|k| wave.checked_sub(3 * k).filter(|&j| j < bands))
+                        .map(|j| {
+                            let seen = at(j.saturating_sub(1))..at(j + 2);
+                            let known = sums_of(at(j.saturating_sub(1))..at(j + 1));
+                            let (start, first) = (seen.start, known.start);
+                            let sums = (cut(&mut rest_of_sums, known), first);
+                            (at(j)..at(j + 1), (cut(&mut rest, seen), start), sums)
+                        })
+                        .collect();
+                    parallel::tasks(tasks, |(rows, (window, start), (sums, first))| {
+                        if sums.is_empty() {
+                            for i in rows {
+                                let e = p[i] - operator.row_within(i, (window, start));
+                                window[i - start] += (omega / diagonal[i]) * e;
+                            }
+                            return;
                         }
-                        return;
-                    }
-                    // No row of a face whose first one is here has been passed by this sweep, all by the one before it.
-                    let made = operator.sums_of(rows.clone());
-                    operator.sums(made.start, (window, start), &mut sums[made.start - first..made.end - first]);
-                    for i in rows {
-                        let e = p[i] - operator.row_by_sums(i, (window, start), |f| sums[f - first]);
-                        let change = (omega / diagonal[i]) * e;
-                        window[i - start] += change;
-                        operator.follow(i, change, |f, part| sums[f - first] += part);
-                    }
-                });
+                        // No row of a face whose first one is here has been passed by this sweep, all by the one before it.
+                        let made = operator.sums_of(rows.clone());
+                        operator.sums(made.start, (window, start), &mut sums[made.start - first..made.end - first]);
+                        for i in rows {
+                            let e = p[i] - operator.row_by_sums(i, (window, start), |f| sums[f - first]);
+                            let change = (omega / diagonal[i]) * e;
+                            window[i - start] += change;
+                            operator.follow(i, change, |f, part| sums[f - first] += part);
+                        }
+                    });
+                }
             }
-        }
+        });
     }
 
     /// How many iterations fit half of the last-level cache if each is `lag` rows behind the one before it. As few as fit the
@@ -286,7 +289,7 @@ impl<'a> Wavefront<'a> {
                     }
                 }
             }
-            tasks.into_par_iter().for_each(|task| match task {
+            parallel::tasks(tasks, |task| match task {
                 Task::Rows(update) => self.update(update, r),
                 Task::Faces { window, first, sums } => self.operator.sums(first, window, sums),
             });
