@@ -8,7 +8,7 @@ use crate::parallel;
 
 /// Smaller arrays are left to the allocator, which uses memory anew that was given back: that needs no clearing.
 #[cfg(target_os = "linux")]
-const LEAST: usize = 4 << 20;
+const LEAST: usize = 1 << 20;
 
 /// `vector`, with large pages wherever its memory is touched for the first time from now on. Without a meaning for the
 /// result of a program, and without an effect on systems other than Linux.

@@ -14,6 +14,8 @@ use std::slice;
 
 use rayon::prelude::*;
 
+use crate::pages::large;
+
 pub use team::team;
 
 /// Elements of a chunk where nothing is summed up.
@@ -217,6 +219,7 @@ pub fn collect<T: Send>(count: usize, item: impl Fn(usize) -> T + Sync) -> Vec<T
 /// first, as a slice must be.
 pub fn extend<T: Send, F: FnMut(usize) -> T>(vector: &mut Vec<T>, count: usize, start: impl Fn(usize) -> F + Sync) {
     vector.reserve(count);
+    *vector = large(std::mem::take(vector));
     let length = vector.len();
     let spare: &mut [MaybeUninit<T>] = &mut vector.spare_capacity_mut()[..count];
     chunks(spare, CHUNK, |first, part| {
@@ -244,6 +247,34 @@ pub fn starts(lengths: impl Iterator<Item = usize>) -> Vec<usize> {
         end
     }));
     starts
+}
+
+/// Where rows of such lengths start, one after the other, and the end.
+///
+/// # Errors
+/// The end, if it does not fit 32 bits.
+pub fn offsets(rows: usize, length: impl Fn(usize) -> u32 + Sync) -> Result<Vec<u32>, u64> {
+    let sums = map(rows, CHUNK, |range| range.map(|i| u64::from(length(i))).sum::<u64>());
+    let mut end = 0;
+    let after = |sum| {
+        end += sum;
+        end - sum
+    };
+    let starts: Vec<u64> = sums.into_iter().map(after).collect();
+    if u32::try_from(end).is_err() {
+        return Err(end);
+    }
+    let mut offsets = large(Vec::with_capacity(rows + 1));
+    offsets.push(0);
+    extend(&mut offsets, rows, |first| {
+        let mut end = starts[first / CHUNK] as u32;
+        let length = &length;
+        move |i| {
+            end += length(i);
+            end
+        }
+    });
+    Ok(offsets)
 }
 
 /// Appends `item(k, x)` for the elements x of every part, the k-th, one part after the other.
@@ -319,6 +350,19 @@ mod tests {
             assert!(ranges.iter().all(|r| !r.is_empty() && r.len() <= 5));
             assert!(ranges.into_iter().flatten().eq(0..n));
         }
+    }
+
+    #[test]
+    fn offsets_are_running_sums() {
+        for n in [0, 1, 4095, 4096, 4097, 20_000] {
+            let length = |i: usize| (i * i % 7) as u32;
+            let mut expected = vec![0];
+            (0..n).for_each(|i| expected.push(expected[i] + length(i)));
+            assert_eq!(offsets(n, length), Ok(expected));
+        }
+        let most = |i: usize| if i < 2 { u32::MAX / 2 } else { (i == 5000).into() };
+        assert_eq!(offsets(5001, most).unwrap()[5001], u32::MAX);
+        assert_eq!(offsets(5002, |i| most(i) + u32::from(i == 5001)), Err(1 << 32));
     }
 
     #[test]

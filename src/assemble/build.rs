@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::neighbours::Codes;
-use super::weights::{RowKind, RowWeights, WeightsByValence};
+use super::weights::{RowKind, RowShape, RowWeights, WeightsByValence};
 use crate::error::{Error, Result};
 use crate::mesh::breadth_first::{in_fronts, in_fronts_along, in_kinds};
 use crate::mesh::incidence::{next_in, prev_in, split_rows};
@@ -41,10 +41,8 @@ pub(super) struct RowSource<'a> {
     /// The sides without an opposite, where there are such.
     open: Option<&'a Topology>,
     scheme: Scheme,
-    /// Of fixed vertices, 0.
-    pub(super) valences: Vec<u32>,
     /// A fixed row is a vertex without edges.
-    pub(super) kinds: Vec<RowKind>,
+    pub(super) shapes: Vec<RowShape>,
 }
 
 impl<'a> RowSource<'a> {
@@ -60,36 +58,30 @@ impl<'a> RowSource<'a> {
     ) -> Self {
         let n = incidence.vertices();
         assert!(free.is_none_or(|free| free.len() == n), "one mark a vertex");
-        let valences = parallel::collect(n, |v| match open {
+        let valence = |v: usize| match open {
             _ if free.is_some_and(|free| !free[v]) => 0,
             None => incidence.face_count(v) as u32,
             Some(topology) => topology.edge_valence(faces, v) as u32,
-        });
-        let kinds = kinds(faces, incidence, scheme, &valences);
-        RowSource { faces, incidence, open, scheme, valences, kinds }
+        };
+        let shapes = shapes(faces, incidence, scheme, valence);
+        RowSource { faces, incidence, open, scheme, shapes }
     }
 
-    /// Where the neighbours of each row start, and the end, of rows of such kinds and valences.
+    /// Where the neighbours of each row start, and the end, of rows of such shapes.
     ///
     /// # Errors
     /// More than 2³² − 1 neighbours.
-    pub(super) fn offsets(&self, kinds: &[RowKind], valences: &[u32]) -> Result<Vec<u32>> {
+    pub(super) fn offsets(&self, shapes: &[RowShape]) -> Result<Vec<u32>> {
         let among_polygons = u32::from(self.scheme.edge_weight() != 0.0);
-        let lengths = || {
-            kinds.iter().zip(valences).map(|(kind, n)| match kind {
+        let length = |i: usize| {
+            let n = shapes[i].valence();
+            match shapes[i].kind() {
                 RowKind::Quads => 2 * n,
-                RowKind::Edges => *n,
+                RowKind::Edges => n,
                 RowKind::Polygons => among_polygons * n,
-            })
+            }
         };
-        let mut offsets = large(Vec::with_capacity(kinds.len() + 1));
-        offsets.push(0);
-        let mut end = 0u32;
-        for length in lengths() {
-            end = end.checked_add(length).ok_or_else(|| too_many(lengths().map(u64::from).sum(), kinds.len()))?;
-            offsets.push(end);
-        }
-        Ok(offsets)
+        parallel::offsets(shapes.len(), length).map_err(|neighbours| too_many(neighbours, shapes.len()))
     }
 
     /// The numbering of the rows if one is to be made, and if they are to be put in order, the neighbours by vertex: where
@@ -100,11 +92,13 @@ impl<'a> RowSource<'a> {
     pub(super) fn in_order(&self, order: &RowOrder) -> Result<(Option<Numbering>, Option<Neighbourhoods>)> {
         let (faces, incidence) = (self.faces, self.incidence);
         // Where no vertex is fixed, the lists of triangles are what the search goes along.
-        let is_listed = self.open.is_none() && !self.valences.contains(&0) && faces.uniform_size() == Some(3);
+        let is_free = |v: usize| self.shapes[v].valence() > 0;
+        let is_listed =
+            self.open.is_none() && faces.uniform_size() == Some(3) && parallel::all(self.shapes.len(), is_free);
         match order {
             RowOrder::Given(None) => Ok((None, None)),
             RowOrder::Given(Some(numbering)) => {
-                assert_eq!(numbering.order().len(), self.valences.len(), "one row a vertex");
+                assert_eq!(numbering.order().len(), self.shapes.len(), "one row a vertex");
                 Ok((None, Some(self.neighbourhoods()?)))
             }
             RowOrder::Kinds => match in_kinds(faces, incidence) {
@@ -125,7 +119,7 @@ impl<'a> RowSource<'a> {
     }
 
     fn neighbourhoods(&self) -> Result<Neighbourhoods> {
-        let starts = self.offsets(&self.kinds, &self.valences)?;
+        let starts = self.offsets(&self.shapes)?;
         let mut vertices = large(vec![0; starts[starts.len() - 1] as usize]);
         // Where all faces are of one size, the corners of a face take no look-up.
         match self.faces.uniform_size() {
@@ -193,7 +187,7 @@ impl<'a> RowSource<'a> {
             return;
         }
         let (incidence, corners) = (self.incidence, self.faces.corners());
-        match self.kinds[v] {
+        match self.shapes[v].kind() {
             RowKind::Quads => {
                 let (edge, opposite) = row.split_at_mut(row.len() / 2);
                 let at = incidence.corners_at(v).iter();
@@ -231,9 +225,15 @@ impl<'a> RowSource<'a> {
         }
     }
 
+    /// The greatest valence of a row.
+    pub(super) fn greatest_valence(&self) -> u32 {
+        let greatest = |rows: Range<usize>| self.shapes[rows].iter().map(|s| s.valence()).max();
+        parallel::map(self.shapes.len(), CHUNK, greatest).into_iter().flatten().max().unwrap_or(0)
+    }
+
     /// The weights of rows by valence, times h.
     pub(super) fn rings(&self) -> WeightsByValence<f64> {
-        let greatest = self.valences.iter().copied().max().unwrap_or(0) as usize;
+        let greatest = self.greatest_valence() as usize;
         let s = self.scheme;
         let weights = |n: usize| (s.h(n.max(1)), s.vertex_weight(n.max(1)), n as f64);
         // Where all faces are of one size.
@@ -261,8 +261,13 @@ impl<'a> RowSource<'a> {
     }
 }
 
-/// The kind of the row of every vertex.
-fn kinds(faces: &Faces, incidence: &Incidence, scheme: Scheme, valences: &[u32]) -> Vec<RowKind> {
+/// The shape of the row of every vertex.
+fn shapes(
+    faces: &Faces,
+    incidence: &Incidence,
+    scheme: Scheme,
+    valence: impl Fn(usize) -> u32 + Sync,
+) -> Vec<RowShape> {
     let edges_only = scheme.edges_only();
     let of_size = |size: usize| match size {
         _ if edges_only => RowKind::Edges,
@@ -272,10 +277,7 @@ fn kinds(faces: &Faces, incidence: &Incidence, scheme: Scheme, valences: &[u32])
     };
     // Where all faces are of one size, they need not be looked at.
     let uniform = faces.uniform_size().map(of_size);
-    parallel::collect(valences.len(), |v| {
-        if valences[v] == 0 {
-            return RowKind::Edges;
-        }
+    let kind = |v: usize| {
         if let Some(kind) = uniform {
             return kind;
         }
@@ -292,6 +294,10 @@ fn kinds(faces: &Faces, incidence: &Incidence, scheme: Scheme, valences: &[u32])
         } else {
             RowKind::Polygons
         }
+    };
+    parallel::collect(incidence.vertices(), |v| match valence(v) {
+        0 => RowShape::new(RowKind::Edges, 0),
+        n => RowShape::new(kind(v), n),
     })
 }
 
@@ -313,12 +319,21 @@ mod tests {
     fn more_neighbours_than_32_bits_count_are_refused_with_their_number() {
         let surface = Surface::new(builtin::builtin("cube").unwrap()).unwrap();
         let (faces, incidence) = (surface.faces(), surface.incidence());
-        let mut source = RowSource::new(faces, (incidence, None), Scheme::CatmullClark, None);
-        source.valences.fill(1 << 28);
-        let offsets = |source: &RowSource| source.offsets(&source.kinds, &source.valences);
-        let message = offsets(&source).unwrap_err().to_string();
+        let source = RowSource::new(faces, (incidence, None), Scheme::CatmullClark, None);
+        let mut shapes = vec![RowShape::new(RowKind::Quads, 1 << 28); 8];
+        let message = source.offsets(&shapes).unwrap_err().to_string();
         assert!(message.contains("4294967296 neighbours in 8 rows, more than 2³² − 1"), "{message}");
-        source.valences[3] -= 1;
-        assert_eq!(offsets(&source).unwrap().last(), Some(&(u32::MAX - 1)));
+        shapes[3] = RowShape::new(RowKind::Quads, (1 << 28) - 1);
+        assert_eq!(source.offsets(&shapes).unwrap().last(), Some(&(u32::MAX - 1)));
+    }
+
+    #[test]
+    fn a_shape_is_a_kind_and_a_valence() {
+        for kind in [RowKind::Quads, RowKind::Edges, RowKind::Polygons] {
+            for valence in [0, 3, 4, 1 << 29] {
+                let shape = RowShape::new(kind, valence);
+                assert_eq!((shape.kind(), shape.valence()), (kind, valence));
+            }
+        }
     }
 }

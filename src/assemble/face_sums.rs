@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3A};
 
-use super::weights::{Point, RowKind, Weight};
+use super::weights::{Point, RowKind, RowShape, Weight};
 use crate::mesh::incidence::split_rows;
 use crate::mesh::numbering::add_up;
 use crate::mesh::order::Numbering;
@@ -82,15 +82,15 @@ impl Polygons {
         incidence: &Incidence,
         scheme: Scheme,
         numbering: Option<&Numbering>,
-        (kinds, valences): (&[RowKind], &[u32]),
+        shapes: &[RowShape],
     ) -> Self {
         let mut all = Polygons::default();
-        if !kinds.contains(&RowKind::Polygons) {
+        if parallel::all(shapes.len(), |i| shapes[i].kind() != RowKind::Polygons) {
             return all;
         }
         let row = |v: u32| numbering.map_or(v, |numbering| numbering.place()[v as usize]);
-        let mut numbers = all.keys(faces, kinds, row);
-        let sorted = all.sort(&mut numbers, kinds.len().div_ceil(BLOCK));
+        let mut numbers = all.keys(faces, shapes, row);
+        let sorted = all.sort(&mut numbers, shapes.len().div_ceil(BLOCK));
         all.measure(faces, scheme, &sorted);
         all.corners = large(vec![0; all.offsets.last().map_or(0, |&end| end as usize)]);
         parallel::parts(split_rows(&all.offsets, CHUNK, &mut all.corners), |some, mut rest| {
@@ -101,12 +101,12 @@ impl Polygons {
                 rest = after;
             }
         });
-        all.list(faces, incidence, numbering, (kinds, valences), &numbers);
+        all.list(faces, incidence, numbering, shapes, &numbers);
         all
     }
 
     /// By face: the key to sort it by; [`NONE`] if no row needs its sum.
-    fn keys(&mut self, faces: &Faces, kinds: &[RowKind], row: impl Fn(u32) -> u32 + Sync) -> Vec<u32> {
+    fn keys(&mut self, faces: &Faces, shapes: &[RowShape], row: impl Fn(u32) -> u32 + Sync) -> Vec<u32> {
         let mut keys = large(vec![NONE; faces.len()]);
         let mut reach = vec![0; keys.len().div_ceil(CHUNK)];
         parallel::chunks_with(&mut keys, CHUNK, &mut reach, |start, keys, reach| {
@@ -116,7 +116,7 @@ impl Polygons {
                 for &v in face {
                     let i = row(v);
                     (first, last) = (first.min(i), last.max(i));
-                    summed |= kinds[i as usize] == RowKind::Polygons;
+                    summed |= shapes[i as usize].kind() == RowKind::Polygons;
                 }
                 if summed {
                     *key = (first as usize / BLOCK * (LARGE + 1) + face.len().min(LARGE)) as u32;
@@ -188,16 +188,11 @@ impl Polygons {
         faces: &Faces,
         incidence: &Incidence,
         numbering: Option<&Numbering>,
-        (kinds, valences): (&[RowKind], &[u32]),
+        shapes: &[RowShape],
         numbers: &[u32],
     ) {
-        self.starts = large(Vec::with_capacity(kinds.len() + 1));
-        self.starts.push(0);
-        let mut end = 0;
-        self.starts.extend(kinds.iter().zip(valences).map(|(&kind, n)| {
-            end += if kind == RowKind::Polygons { *n } else { 0 };
-            end
-        }));
+        let length = |i: usize| if shapes[i].kind() == RowKind::Polygons { shapes[i].valence() } else { 0 };
+        self.starts = parallel::offsets(shapes.len(), length).expect("no more faces at all rows than corners");
         let listed = self.table(faces, incidence, numbering, |c| numbers[incidence.face_of(c)]);
         if self.parts > 1 {
             let places = self.table(faces, incidence, numbering, |c| {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::memory::require;
 use crate::mesh::incidence::{next_in, prev_in, split_rows};
-use crate::mesh::numbering::{Numbering, add_up, rows_back};
+use crate::mesh::numbering::{Numbering, rows_back};
 use crate::mesh::{Faces, Surface, Topology};
 use crate::pages::large;
 use crate::parallel;
@@ -234,13 +234,12 @@ impl<'a> Gather<'a> {
     /// More than 2³² − 1 entries, or than memory has room for.
     pub(super) fn arrays(&self) -> Result<Arrays> {
         let mut lengths = self.greatest_lengths();
-        let total: u64 = lengths.iter().map(|&l| u64::from(l)).sum();
-        if u32::try_from(total).is_err() {
-            return Err(Error::TooLarge {
-                what: format!("the matrix would have {total} entries"),
-                advice: "use a smaller mesh or one without very large faces",
-            });
-        }
+        let mut offsets = parallel::offsets(lengths.len(), |i| lengths[i]).map_err(|total| Error::TooLarge {
+            what: format!("the matrix would have {total} entries"),
+            advice: "use a smaller mesh or one without very large faces",
+        })?;
+        let end = offsets[lengths.len()];
+        let total = u64::from(end);
         // A column and a value of M and of A each, and numbers for every row. To be put in order, the first two twice.
         let each = if self.numbering.is_some() { 32 } else { 20 };
         let bytes = total * each + lengths.len() as u64 * 24;
@@ -250,13 +249,6 @@ impl<'a> Gather<'a> {
             what,
             "use a smaller mesh or one without very large faces, or a method without a stored matrix",
         )?;
-        let mut offsets = large(Vec::with_capacity(lengths.len() + 1));
-        offsets.push(0u32);
-        let mut end = 0u32;
-        for length in &lengths {
-            end += length;
-            offsets.push(end);
-        }
         let mut columns = large(vec![0u32; end as usize]);
         let mut m = large(vec![0.0; end as usize]);
         // Rows that will be put in order have their part of A then.
@@ -314,9 +306,8 @@ impl<'a> Gather<'a> {
         diagonal: &[f64],
     ) -> Arrays {
         let place = numbering.place();
-        let mut offsets = large(vec![0; place.len() + 1]);
-        parallel::fill(&mut offsets[1..], |v| lengths[place[v] as usize]);
-        add_up(&mut offsets);
+        let offsets = parallel::offsets(place.len(), |v| lengths[place[v] as usize]);
+        let offsets = offsets.expect("as many entries as before");
         let moved = rows_back(numbering, &columns, starts, &offsets);
         drop(columns);
         let columns = moved;

@@ -11,7 +11,11 @@ use glam::Vec3A;
 
 use super::face_sums::Polygons;
 use super::neighbours::{Code, Codes, RowNeighbours, Window, Windows};
-use super::weights::{Point, RowKind, RowWeights, Weight, WeightsByValence};
+use super::weights::{Point, RowKind, RowShape, RowWeights, Weight, WeightsByValence};
+use crate::parallel;
+
+/// Rows of one task where they are built.
+const CHUNK: usize = 4096;
 
 /// The rows of A.
 #[derive(Clone, Debug)]
@@ -25,9 +29,9 @@ pub struct Stencil {
 }
 
 /// The first rows of the runs of rows of equal kind and valence.
-pub(super) fn runs(kinds: &[RowKind], valences: &[u32]) -> Vec<u32> {
-    let key = |i: usize| (kinds[i], valences[i]);
-    (0..kinds.len()).filter(|&i| i == 0 || key(i) != key(i - 1)).map(|i| i as u32).collect()
+pub(super) fn runs(shapes: &[RowShape]) -> Vec<u32> {
+    let is_first = |i: &usize| *i == 0 || shapes[*i] != shapes[i - 1];
+    parallel::flat_map(shapes.len(), CHUNK, |rows| rows.filter(is_first).map(|i| i as u32).collect())
 }
 
 impl Stencil {

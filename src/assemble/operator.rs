@@ -11,7 +11,7 @@ use super::face_sums::{Others, Polygons};
 use super::kernel::{Stencil, runs};
 use super::neighbours::Neighbours;
 use super::system::{check, require_one_block};
-use super::weights::Point;
+use super::weights::{Point, RowShape};
 use crate::error::Result;
 use crate::mesh::order::Numbering;
 use crate::mesh::{Faces, Incidence, Surface, Topology};
@@ -123,22 +123,20 @@ impl Operator {
             RowOrder::Given(numbering) => numbering,
             RowOrder::Kinds | RowOrder::Fronts => made.as_ref(),
         };
-        let (kinds, valences) = match numbering {
-            Some(numbering) => (numbering.there(&source.kinds), numbering.there(&source.valences)),
-            None => (source.kinds.clone(), source.valences.clone()),
-        };
-        let greatest = valences.iter().copied().max().unwrap_or(0);
-        let h: Vec<f64> = (0..=greatest).map(|n| scheme.h(n.max(1) as usize)).collect();
-        let polygons = Polygons::new(faces, sides.0, scheme, numbering, (&kinds, &valences));
-        let offsets = source.offsets(&kinds, &valences)?;
-        let runs = runs(&kinds, &valences);
+        let there = numbering.map(|numbering| numbering.there(&source.shapes));
+        let shapes = there.as_deref().unwrap_or(&source.shapes);
+        let h: Vec<f64> = (0..=source.greatest_valence()).map(|n| scheme.h(n.max(1) as usize)).collect();
+        let polygons = Polygons::new(faces, sides.0, scheme, numbering, shapes);
+        let offsets = source.offsets(shapes)?;
+        let runs = runs(shapes);
         let codes = source.codes(numbering.zip(neighbours.as_ref()), offsets, runs);
         let double = source.rings();
+        let kinds = parallel::collect(shapes.len(), |i| shapes[i].kind());
         let stencil = Stencil { codes, kinds, single: double.single(), double, polygons };
         // The rows of a run are alike, but for the sizes of faces that are summed: there the extremes tell all.
         let extremes = parallel::collect(stencil.codes.runs().len(), |k| {
             let run = stencil.codes.run(k);
-            let n = valences[run.start];
+            let n = shapes[run.start].valence();
             let [least, greatest] = stencil.extremes(run);
             [(n, least), (n, greatest)]
         });
@@ -156,7 +154,7 @@ impl Operator {
             diagonal: OnceLock::new(),
             others: OnceLock::new(),
             bounds,
-            usual_lambda_min: usual_lambda_min(scheme, faces, &valences),
+            usual_lambda_min: usual_lambda_min(scheme, faces, shapes),
         };
         Ok((operator, made))
     }
@@ -312,7 +310,7 @@ impl Operator {
 }
 
 /// [`Operator::usual_lambda_min`]: single vertices of another valence hardly move λ_min, several next to each other do.
-fn usual_lambda_min(scheme: Scheme, faces: &Faces, valences: &[u32]) -> f64 {
+fn usual_lambda_min(scheme: Scheme, faces: &Faces, shapes: &[RowShape]) -> f64 {
     /// The most irregular vertices, in parts of all.
     const FEW: f64 = 0.01;
     /// Of the least value of the symbol.
@@ -323,10 +321,10 @@ fn usual_lambda_min(scheme: Scheme, faces: &Faces, valences: &[u32]) -> f64 {
         return usual;
     }
     // Fixed rows have none.
-    let irregular = parallel::map(valences.len(), 8192, |range| {
-        valences[range].iter().filter(|&&n| n != valence && n != 0).count()
+    let irregular = parallel::map(shapes.len(), 8192, |range| {
+        shapes[range].iter().map(|shape| shape.valence()).filter(|&n| n != valence && n != 0).count()
     });
-    let is_regular = irregular.iter().sum::<usize>() as f64 <= FEW * valences.len() as f64;
+    let is_regular = irregular.iter().sum::<usize>() as f64 <= FEW * shapes.len() as f64;
     if is_regular { usual.max(PART * scheme.regular_symbol().0) } else { usual }
 }
 

@@ -168,3 +168,28 @@ pub enum RowKind {
     /// Anything else: n edge neighbours, if edges have a weight, and the sums over n faces.
     Polygons,
 }
+
+/// The kind and the valence of a row in one number, so that one look-up brings both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct RowShape(u32);
+
+impl RowShape {
+    /// # Panics
+    /// If the valence is 2³⁰ or more.
+    pub(super) fn new(kind: RowKind, valence: u32) -> Self {
+        assert!(valence < 1 << 30, "a valence below 2³⁰");
+        RowShape(valence << 2 | kind as u32)
+    }
+
+    pub(super) fn kind(self) -> RowKind {
+        match self.0 & 3 {
+            0 => RowKind::Quads,
+            1 => RowKind::Edges,
+            _ => RowKind::Polygons,
+        }
+    }
+
+    pub(super) fn valence(self) -> u32 {
+        self.0 >> 2
+    }
+}

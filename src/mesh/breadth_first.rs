@@ -53,7 +53,7 @@ impl Queue {
     /// All vertices, from the first of every component: `visit(queue, k)` lets in the neighbours of the vertex at place k.
     #[inline]
     fn search(vertices: usize, mut visit: impl FnMut(&mut Queue, usize)) -> Vec<u32> {
-        let mut queue = Queue { met: Met::new(vertices), order: vec![0; vertices + 1], next: 0, end: 0 };
+        let mut queue = Queue { met: Met::new(vertices), order: large(vec![0; vertices + 1]), next: 0, end: 0 };
         for seed in 0..vertices as u32 {
             queue.let_in(seed);
             while queue.next < queue.end {
@@ -149,6 +149,8 @@ pub fn in_kinds(faces: &Faces, incidence: &Incidence) -> Option<Numbering> {
 /// one kind are left as they come.
 fn group_kinds(faces: &Faces, incidence: &Incidence, order: &mut [u32]) {
     const GROUP: usize = 256;
+    /// Vertices between a look-up and the one that is fetched for it.
+    const AHEAD: usize = 16;
     /// Larger valences count as one.
     const MOST: usize = 63;
     let uniform = faces.uniform_size();
@@ -167,7 +169,10 @@ fn group_kinds(faces: &Faces, incidence: &Incidence, order: &mut [u32]) {
         let mut vertices = [(0, 0); GROUP];
         let vertices = &mut vertices[..group.len()];
         let mut starts = [0; 3 * (MOST + 1) + 1];
-        for (slot, &v) in vertices.iter_mut().zip(&*group) {
+        for (k, (slot, &v)) in vertices.iter_mut().zip(&*group).enumerate() {
+            if let Some(&later) = group.get(k + AHEAD) {
+                prefetch(incidence.offsets(), later as usize);
+            }
             *slot = (v, key(v));
             starts[slot.1 + 1] += 1;
         }

@@ -7,10 +7,10 @@ use glam::DVec3;
 
 use super::edge_numbers::FirstSides;
 use super::incidence::split_rows;
-use super::numbering::{Numbering, add_up, inverse, rows_back};
+use super::numbering::{Numbering, inverse, rows_back};
 use super::topology::NONE;
 use super::{Faces, Incidence, Mesh, Surface, Topology};
-use crate::pages::{copied, large};
+use crate::pages::copied;
 use crate::parallel;
 
 /// Vertices of one task.
@@ -86,9 +86,8 @@ impl Renumbered {
     /// Rows of corners, as many at each vertex as it has, in the order and by the numbers of the file; and where each starts.
     pub(crate) fn of_vertices(&self, file: &Faces, corners: &[u32]) -> (Vec<u32>, Vec<u32>) {
         let place = self.numbering.place();
-        let mut offsets = large(vec![0; place.len() + 1]);
-        parallel::fill(&mut offsets[1..], |v| self.incidence.face_count(place[v] as usize) as u32);
-        add_up(&mut offsets);
+        let offsets = parallel::offsets(place.len(), |v| self.incidence.face_count(place[v] as usize) as u32);
+        let offsets = offsets.expect("as many corners as before");
         // First in this order, where faces that meet are near; then row by row, each from one place.
         let moved = parallel::collect(corners.len(), |k| self.in_file(file, corners[k]));
         let rows = rows_back(&self.numbering, &moved, self.incidence.offsets(), &offsets);
