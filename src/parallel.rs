@@ -169,14 +169,11 @@ pub fn parts<A: Send, R: Send>(
     })
 }
 
-/// Calls `body(item)` for each, in turn for all threads.
+/// Calls `body(item)` for each.
 pub fn tasks<T: Send>(items: Vec<T>, body: impl Fn(T) + Sync) {
     let mut items: Vec<Option<T>> = items.into_iter().map(Some).collect();
-    let count = items.len();
-    let items = Shared::new(&mut items);
-    share(count, &|k| {
-        // SAFETY: every k comes once.
-        if let Some(item) = unsafe { items.part(k, 1) }[0].take() {
+    chunks(&mut items, 1, |_, item| {
+        if let Some(item) = item[0].take() {
             body(item);
         }
     });

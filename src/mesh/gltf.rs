@@ -10,7 +10,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::io::{Builder, Loaded, joined};
+use super::builder::{Builder, joined};
+use super::io::Loaded;
 use super::magic::other_kind;
 use super::usd::StageMetadata;
 use crate::{Error, Result};

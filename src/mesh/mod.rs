@@ -4,6 +4,7 @@
 pub mod attributes;
 mod boundary;
 pub mod breadth_first;
+mod builder;
 pub mod builtin;
 pub mod colours;
 mod cuthill_mckee;

@@ -7,9 +7,10 @@ use glam::DVec3;
 
 use super::Mesh;
 use super::attributes::{Attributes, CornerLines, STATEMENTS};
+use super::builder::Builder;
 use super::features::Tags;
 use super::file_tags::{CornerTag, CreaseTag, FileTags, check_sharpness};
-use super::io::{Builder, Lines, Loaded, WriteOptions, check_normals, write_rows};
+use super::io::{Lines, Loaded, WriteOptions, check_normals, write_rows};
 use super::magic::other_kind;
 use super::validate::Boundary;
 use crate::error::counted;

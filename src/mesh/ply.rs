@@ -6,7 +6,8 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::Mesh;
-use super::io::{Builder, Lines, Loaded, WriteOptions, check_normals, write_text_rows};
+use super::builder::Builder;
+use super::io::{Lines, Loaded, WriteOptions, check_normals, write_text_rows};
 use crate::text::Scanner;
 use crate::text::parts::{Output, PART, read_rows};
 use crate::{Result, parallel};

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::io::{Builder, Lines, Loaded, joined};
+use super::builder::{Builder, joined};
+use super::io::{Lines, Loaded};
 use super::magic::other_kind;
 use crate::text::{Scanner, quoted};
 use crate::{Error, Result};

@@ -5,8 +5,9 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::super::attributes::Attributes;
+use super::super::builder::few_corners;
 use super::super::file_tags::{CornerTag, CreaseTag, FileTags, Subdivision, check_sharpness, not_there};
-use super::super::io::{Lines, Loaded, few_corners};
+use super::super::io::{Lines, Loaded};
 use super::super::validate::Boundary;
 use super::super::{Faces, Mesh};
 use super::StageMetadata;
